@@ -1,0 +1,99 @@
+#pragma once
+/// A pack of doubles that fills one SIMD register of the target, and the few operations that kernels and laws need.
+/// GCC/Clang vector extensions underneath; width 8 (AVX-512), 4 (AVX) or 2.
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace perikit {
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+inline constexpr int pack_width = 8;
+#elif defined(__AVX__)
+inline constexpr int pack_width = 4;
+#else
+inline constexpr int pack_width = 2;
+#endif
+
+namespace detail {
+typedef double Lanes __attribute__((vector_size(8 * pack_width)));
+typedef double UnalignedLanes __attribute__((vector_size(8 * pack_width), aligned(8), may_alias));
+typedef std::int64_t Bits __attribute__((vector_size(8 * pack_width)));
+}  // namespace detail
+
+/// Result of a lane-wise comparison: all bits set where it holds.
+struct PackMask {
+  detail::Bits v;
+  friend PackMask operator&(PackMask a, PackMask b) noexcept { return {a.v & b.v}; }
+  friend PackMask operator|(PackMask a, PackMask b) noexcept { return {a.v | b.v}; }
+  friend PackMask operator!(PackMask a) noexcept { return {~a.v}; }
+  bool operator[](int lane) const noexcept { return v[lane] != 0; }
+};
+
+struct Pack {
+  detail::Lanes v;
+
+  Pack() noexcept : v{} {}
+  Pack(double a) noexcept : v(detail::Lanes{} + a) {}
+  Pack(detail::Lanes lanes) noexcept : v(lanes) {}
+
+  /// p need not be aligned.
+  static Pack load(const double* p) noexcept { return {*reinterpret_cast<const detail::UnalignedLanes*>(p)}; }
+  void store(double* p) const noexcept { *reinterpret_cast<detail::UnalignedLanes*>(p) = v; }
+  /// The first n lanes from p, zero in the rest.
+  static Pack load_first(const double* p, int n) noexcept {
+    Pack r;
+    for (int i = 0; i < n; ++i) r.v[i] = p[i];
+    return r;
+  }
+  void store_first(double* p, int n) const noexcept {
+    for (int i = 0; i < n; ++i) p[i] = v[i];
+  }
+  double operator[](int lane) const noexcept { return v[lane]; }
+
+  friend Pack operator+(Pack a, Pack b) noexcept { return {a.v + b.v}; }
+  friend Pack operator-(Pack a, Pack b) noexcept { return {a.v - b.v}; }
+  friend Pack operator*(Pack a, Pack b) noexcept { return {a.v * b.v}; }
+  friend Pack operator/(Pack a, Pack b) noexcept { return {a.v / b.v}; }
+  friend Pack operator-(Pack a) noexcept { return {-a.v}; }
+  Pack& operator+=(Pack b) noexcept { v += b.v; return *this; }
+  Pack& operator-=(Pack b) noexcept { v -= b.v; return *this; }
+  Pack& operator*=(Pack b) noexcept { v *= b.v; return *this; }
+  Pack& operator/=(Pack b) noexcept { v /= b.v; return *this; }
+
+  friend PackMask operator<(Pack a, Pack b) noexcept { return {a.v < b.v}; }
+  friend PackMask operator>(Pack a, Pack b) noexcept { return {a.v > b.v}; }
+  friend PackMask operator<=(Pack a, Pack b) noexcept { return {a.v <= b.v}; }
+  friend PackMask operator>=(Pack a, Pack b) noexcept { return {a.v >= b.v}; }
+  friend PackMask operator==(Pack a, Pack b) noexcept { return {a.v == b.v}; }
+};
+
+inline Pack select(PackMask m, Pack a, Pack b) noexcept { return {m.v ? a.v : b.v}; }
+inline double select(bool m, double a, double b) noexcept { return m ? a : b; }
+
+inline bool any(PackMask m) noexcept {
+  std::int64_t r = 0;
+  for (int i = 0; i < pack_width; ++i) r |= m.v[i];
+  return r != 0;
+}
+inline bool any(bool m) noexcept { return m; }
+
+inline Pack sqrt(Pack a) noexcept {
+  Pack r;
+  for (int i = 0; i < pack_width; ++i) r.v[i] = std::sqrt(a.v[i]);
+  return r;
+}
+inline Pack abs(Pack a) noexcept { return select(a < Pack(0.0), -a, a); }
+inline Pack min(Pack a, Pack b) noexcept { return select(a < b, a, b); }
+inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
+
+/// Sum of the lanes, always in the same order.
+inline double sum(Pack a) noexcept {
+  double r = 0;
+  for (int i = 0; i < pack_width; ++i) r += a.v[i];
+  return r;
+}
+
+}  // namespace perikit

@@ -1,0 +1,74 @@
+#pragma once
+/// Point laws: displacement gradient H = F - I -> stored energy psi, first Piola-Kirchhoff stress P = dpsi/dF, tangent A = dP/dF.
+
+#include <cstddef>
+#include <functional>
+#include <string_view>
+
+#include "perikit/core/space.hpp"
+
+namespace perikit {
+
+struct MaterialTraits {
+  int constants = 0;          ///< doubles per point that `evaluate` reads
+  int state = 0;              ///< doubles of history per evaluation point
+  bool constant_tangent = false;
+  bool objective = true;      ///< false for small-strain laws
+  bool isotropic = true;
+  bool hyperelastic = true;   ///< psi exists; false for rate laws, which run explicitly only
+};
+
+/// Lame constants of the law at F = I [Pa].
+struct Moduli {
+  double lambda = 0, mu = 0;
+  double bulk() const noexcept { return lambda + 2.0 * mu / 3.0; }
+  double youngs() const noexcept { return mu * (3 * lambda + 2 * mu) / (lambda + mu); }
+  double poisson() const noexcept { return lambda / (2 * (lambda + mu)); }
+};
+
+/// n evaluation points. Arrays are component-major: component c at point p is x[c * stride + p]; components as in Space.
+/// stride is a multiple of `padding`; arrays are 64-byte aligned. Points n ... padded(n) - 1 exist: they hold H = 0 on entry
+/// and may be written. A null output is not wanted.
+struct MaterialBatch {
+  int n = 0;
+  std::size_t stride = 0;
+  double time_step = 0;             ///< of rate laws [s]
+  const double* H = nullptr;        ///< displacement gradient [-]
+  const double* dH = nullptr;       ///< direction of dP (or increment of H over the step, for rate laws) [-]
+  const double* constants = nullptr;        ///< constant k of point p: constants[k * constant_stride + p * (constant_stride != 0)]
+  std::size_t constant_stride = 0;          ///< 0: the same constants at all points, constants[k]
+  const double* state_old = nullptr;
+  double* state_new = nullptr;
+  double* psi = nullptr;            ///< [J/m^3]
+  double* P = nullptr;              ///< [Pa]
+  double* dP = nullptr;             ///< A : dH [Pa]
+  double* A = nullptr;              ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
+};
+
+/// ok, or the first point of the batch whose F is inadmissible (det F <= 0 or not finite).
+struct Status {
+  int inadmissible = -1;
+  bool ok() const noexcept { return inadmissible < 0; }
+};
+
+/// Reads a material parameter at one point: value("shear_modulus"); has("shear_modulus").
+struct MaterialInput {
+  std::function<bool(std::string_view)> has;
+  std::function<double(std::string_view)> value;
+};
+
+class Material {
+ public:
+  virtual ~Material() = default;
+  virtual MaterialTraits traits() const noexcept = 0;
+  /// The law's constants [traits().constants] from the parameters at one point. Throws std::domain_error naming what is wrong
+  /// (nu >= 1/2, negative modulus).
+  virtual void constants(const MaterialInput& input, double* out) const = 0;
+  virtual Moduli small_strain(const double* constants) const noexcept = 0;
+  /// Fresh history at one point [traits().state].
+  virtual void initial_state(const double* /*constants*/, double* /*state*/) const noexcept {}
+  /// Overwrites every wanted output for all n points. P(0) is exactly zero.
+  virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;
+};
+
+}  // namespace perikit

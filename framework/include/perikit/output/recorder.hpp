@@ -1,0 +1,74 @@
+#pragma once
+/// Result files (layout: README, "Results"): results.h5, reference.h5, frames/<8 digits>.h5, results.xdmf, history.csv.
+/// Every file appears by write to a temporary name, fsync and rename, so that a killed run leaves every finished frame readable.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace perikit {
+
+/// A point field in input order, float64: rows of 3 for vectors, 9 (row-major) for tensors, flat for scalars.
+struct OutputField {
+  std::string name;
+  int width = 1;                       ///< 1, 3 or 9
+  std::vector<double> data;            ///< width * points
+};
+
+struct ReferenceData {
+  std::vector<double> position;        ///< rows of 3 [m]
+  std::vector<double> volume;          ///< [m^3]
+  std::vector<std::int64_t> id, material_id;
+  std::map<std::string, std::vector<std::int64_t>> sets;   ///< indices of points
+};
+
+struct RunAttributes {
+  std::string perikit_version, title, scene;
+};
+
+/// Writes the frames of one run into one folder. Throws RunError naming the file and the system's reason (disk full, no permission);
+/// nothing written earlier is lost.
+class FrameWriter {
+ public:
+  /// Creates folder and frames/, writes reference.h5 and an empty results.h5. `first_frame` > 0 continues an earlier run: frames
+  /// before it stay listed, later ones are removed.
+  FrameWriter(std::filesystem::path folder, const ReferenceData&, RunAttributes, std::int64_t first_frame = 0);
+  ~FrameWriter();
+  /// Writes frames/<next index>.h5, then results.h5, then results.xdmf.
+  void write(double time, std::int64_t step, std::span<const OutputField> fields);
+  std::int64_t frames() const noexcept;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// history.csv: a header line with names, then one row per sample; flushed row by row, 17 significant digits.
+class HistoryWriter {
+ public:
+  /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows.
+  HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows = -1);
+  ~HistoryWriter();
+  void row(std::span<const double> values);
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// Writes text to `file` by temporary name, fsync and rename. Throws RunError.
+void write_file_atomically(const std::filesystem::path& file, const std::string& text);
+
+/// Last frame of an earlier run: point fields in input order. Throws InputError when it cannot be read or the number of points differs.
+struct LoadedFrame {
+  double time = 0;
+  std::int64_t step = 0;
+  std::map<std::string, OutputField> fields;
+};
+LoadedFrame read_last_frame(const std::filesystem::path& results_h5, std::size_t points);
+
+}  // namespace perikit

@@ -1,0 +1,50 @@
+#pragma once
+/// The C symbols that every perikit library exports. They are read and compared before any C++ object crosses the boundary.
+///
+///   int         perikit_abi_version()     equals PERIKIT_ABI_VERSION
+///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width: see PERIKIT_BUILD_ID
+///   void        perikit_register(void*)   called with a perikit::Registrar*
+///
+/// PERIKIT_PLUGIN(registrar) { registrar.material({...}, ...); } writes all three.
+
+#include "perikit/core/simd.hpp"
+#include "perikit/plugin/part.hpp"
+
+/// Raised whenever a public class changes its layout or its virtual functions.
+#define PERIKIT_ABI_VERSION 1
+
+#define PERIKIT_STRINGIFY_(x) #x
+#define PERIKIT_STRINGIFY(x) PERIKIT_STRINGIFY_(x)
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+#define PERIKIT_SIMD_ID "simd512"
+#elif defined(__AVX__)
+#define PERIKIT_SIMD_ID "simd256"
+#else
+#define PERIKIT_SIMD_ID "simd128"
+#endif
+
+#if defined(__GLIBCXX__)
+#define PERIKIT_STDLIB_ID "libstdc++-cxx11abi" PERIKIT_STRINGIFY(_GLIBCXX_USE_CXX11_ABI)
+#else
+#define PERIKIT_STDLIB_ID "other-stdlib"
+#endif
+
+#if defined(__clang__)
+#define PERIKIT_COMPILER_ID "clang" PERIKIT_STRINGIFY(__clang_major__)
+#else
+#define PERIKIT_COMPILER_ID "gcc" PERIKIT_STRINGIFY(__GNUC__)
+#endif
+
+#define PERIKIT_BUILD_ID PERIKIT_COMPILER_ID " " PERIKIT_STDLIB_ID " " PERIKIT_SIMD_ID
+
+#define PERIKIT_EXPORT extern "C" __attribute__((visibility("default")))
+
+#define PERIKIT_PLUGIN(registrar)                                                                             \
+  static void perikit_register_parts(::perikit::Registrar& registrar);                                       \
+  PERIKIT_EXPORT int perikit_abi_version() { return PERIKIT_ABI_VERSION; }                                    \
+  PERIKIT_EXPORT const char* perikit_build_id() { return PERIKIT_BUILD_ID; }                                  \
+  PERIKIT_EXPORT void perikit_register(void* opaque) {                                                        \
+    perikit_register_parts(*static_cast<::perikit::Registrar*>(opaque));                                      \
+  }                                                                                                           \
+  static void perikit_register_parts(::perikit::Registrar& registrar)

@@ -1,0 +1,58 @@
+#pragma once
+/// What a shared library says about the parts it brings, and how it hands them over.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "perikit/plugin/parameters.hpp"
+
+namespace perikit {
+
+class Kinematics;
+class Stabilization;
+class Material;
+class Damage;
+class InfluenceFunction;
+class Integrator;
+
+/// Creates the nested parts of a part (the base of `selective`, the influence function of a family).
+class PartFactory {
+ public:
+  virtual ~PartFactory() = default;
+  virtual std::unique_ptr<Kinematics> kinematics(const PartValues&) const = 0;
+  virtual std::unique_ptr<Stabilization> stabilization(const PartValues&) const = 0;
+  virtual std::unique_ptr<Material> material(const PartValues&) const = 0;
+  virtual std::unique_ptr<Damage> damage(const PartValues&) const = 0;
+  virtual std::unique_ptr<InfluenceFunction> influence(const PartValues&) const = 0;
+  virtual std::unique_ptr<Integrator> integrator(const PartValues&) const = 0;
+};
+
+/// Everything about a part but its code.
+struct PartDescription {
+  std::string name;                      ///< snake_case, unique within its kind
+  std::string summary;                   ///< one line
+  ParameterTable parameters;
+  std::vector<std::string> examples;     ///< TOML tables without `type`, at least one: "order = 1"; "" when nothing is required
+  std::string equations;                 ///< a few lines of plain text
+  std::string source;                    ///< citation
+  std::string limits;                    ///< where it must not be used
+};
+
+template <class Interface>
+using Factory = std::function<std::unique_ptr<Interface>(const ParameterValues&, const PartFactory&)>;
+
+/// Handed to a library's registration function. Throws std::invalid_argument for a bad or duplicate description.
+class Registrar {
+ public:
+  virtual ~Registrar() = default;
+  virtual void kinematics(PartDescription, Factory<Kinematics>) = 0;
+  virtual void stabilization(PartDescription, Factory<Stabilization>) = 0;
+  virtual void material(PartDescription, Factory<Material>) = 0;
+  virtual void damage(PartDescription, Factory<Damage>) = 0;
+  virtual void influence(PartDescription, Factory<InfluenceFunction>) = 0;
+  virtual void integrator(PartDescription, Factory<Integrator>) = 0;
+};
+
+}  // namespace perikit

@@ -1,0 +1,63 @@
+#pragma once
+/// Finds parts by kind and name in shared libraries. Opens a library only when one of its parts is asked for.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "perikit/plugin/part.hpp"
+
+namespace perikit {
+
+/// A file that was refused, and why: "not a shared library (ELF magic missing)", "ABI version 7, this program has 1", ...
+struct RefusedLibrary {
+  std::filesystem::path file;
+  std::string reason;
+};
+
+class Registry : public PartFactory {
+ public:
+  Registry();
+  ~Registry() override;
+  Registry(const Registry&) = delete;
+  Registry& operator=(const Registry&) = delete;
+
+  /// A registry with the standard search path: `first` (from --plugin-path), then PERIKIT_PLUGIN_PATH (colon-separated), then
+  /// the plugins of the build or install tree that holds this library.
+  static std::vector<std::filesystem::path> standard_search_path(const std::vector<std::filesystem::path>& first);
+
+  /// Adds every *.so below `folder` (not recursive) as a candidate: reads the manifest beside it (X.so -> X.parts) where there is
+  /// one, so that names are known without opening; opens the library at once where there is none.
+  void add_folder(const std::filesystem::path& folder);
+  /// Opens and registers one library now. Throws InputError with file and reason when it is refused.
+  void open(const std::filesystem::path& library);
+
+  /// Parts in hand: registered, or named by a manifest. Sorted.
+  std::vector<std::string> names(Kind kind) const;
+  /// Opens the library that has it if need be. Throws InputError "unknown material 'x'; did you mean 'y'? known: ..." - with
+  /// the refused libraries appended when one of them might have held it.
+  const PartDescription& describe(Kind kind, std::string_view name);
+  /// The library that brings this part.
+  std::filesystem::path library_of(Kind kind, std::string_view name) const;
+  bool known(Kind kind, std::string_view name) const;
+
+  const std::vector<RefusedLibrary>& refused() const noexcept;
+  /// Libraries opened so far, in order.
+  std::vector<std::filesystem::path> opened() const;
+  /// What one opened library registered.
+  std::vector<std::pair<Kind, std::string>> parts_of(const std::filesystem::path& library) const;
+
+  std::unique_ptr<Kinematics> kinematics(const PartValues&) const override;
+  std::unique_ptr<Stabilization> stabilization(const PartValues&) const override;
+  std::unique_ptr<Material> material(const PartValues&) const override;
+  std::unique_ptr<Damage> damage(const PartValues&) const override;
+  std::unique_ptr<InfluenceFunction> influence(const PartValues&) const override;
+  std::unique_ptr<Integrator> integrator(const PartValues&) const override;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,128 @@
+#pragma once
+/// A scene file, read and checked: every value typed, in range, with its place in the file. Nothing is built yet.
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "perikit/core/space.hpp"
+#include "perikit/plugin/parameters.hpp"
+#include "perikit/plugin/registry.hpp"
+#include "perikit/scene/expression.hpp"
+
+namespace perikit {
+
+struct LatticeDescription {
+  double spacing = 0;                       ///< [m]
+  std::array<double, 3> lower{}, upper{};   ///< [m]; unused axes 0
+  std::optional<Expression> inside;         ///< kept where nonzero
+  double jitter = 0;                        ///< fraction of the spacing
+  std::int64_t seed = 1;
+};
+
+struct BodyDescription {
+  int dimension = 3;
+  Space space = Space::solid;
+  double section = 1.0;                     ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
+  std::optional<LatticeDescription> lattice;
+  std::optional<std::filesystem::path> points_file;
+  SourcePosition position;
+};
+
+/// Exactly one of expression, nearest, points.
+struct SetDescription {
+  std::string name;
+  std::optional<Expression> expression;
+  std::optional<std::array<double, 3>> nearest;
+  std::vector<std::int64_t> points;
+  SourcePosition position;
+};
+
+struct RegionDescription {
+  std::string set;
+  std::shared_ptr<const PartValues> material;
+  SourcePosition position;
+};
+
+struct CrackDescription {                    ///< 2 vertices: segment; more: polygon
+  std::vector<std::array<double, 3>> vertices;
+  SourcePosition position;
+};
+
+/// One component of a prescribed motion: nullopt where "free". A plain number ramps linearly in quasi-static runs.
+struct BoundaryDescription {
+  std::string set;
+  bool velocity = false;                     ///< else displacement
+  std::vector<std::optional<Expression>> components;
+  SourcePosition position;
+};
+
+struct LoadDescription {
+  enum class Type { force, body_force, traction } type = Type::force;
+  std::string set;
+  std::vector<Expression> components;
+  std::string face;                          ///< "+x" ... "-z" for traction
+  SourcePosition position;
+};
+
+struct HistoryDescription {
+  std::string name, set, quantity, component, reduce;
+  SourcePosition position;
+};
+
+struct OutputDescription {
+  std::optional<std::int64_t> frames, every;
+  std::vector<double> times;
+  std::int64_t history_every = 0;            ///< 0: default (every step for statics, about 1000 samples for explicit runs)
+  std::int64_t checkpoint_every = 0;         ///< 0: none
+  std::vector<std::string> fields;           ///< empty: default
+  std::vector<HistoryDescription> history;
+};
+
+struct Scene {
+  std::filesystem::path file;
+  std::string text;                          ///< the file as read
+  std::string resolved;                      ///< TOML with overrides applied and every default written out
+  std::string title;
+  Constants constants;
+  BodyDescription body;
+  std::vector<SetDescription> sets;
+  double horizon = 0;                        ///< [m]; 0: horizon_ratio given
+  double horizon_ratio = 0;                  ///< to the lattice spacing (or mean spacing of a cloud)
+  std::shared_ptr<const PartValues> influence, kinematics, stabilization, material, damage, integrator;   ///< may be null: stabilization, damage
+  std::vector<RegionDescription> regions;
+  std::vector<CrackDescription> cracks;
+  std::vector<std::string> no_fail;          ///< [damage] no_fail
+  std::vector<std::optional<Expression>> initial_displacement, initial_velocity;   ///< empty or `dimension` long
+  std::optional<std::filesystem::path> initial_from;
+  std::vector<BoundaryDescription> boundaries;
+  std::vector<LoadDescription> loads;
+  OutputDescription output;
+  bool skip = true;
+  std::optional<int> threads;
+  std::int64_t seed = 1;
+};
+
+struct SceneOptions {
+  std::vector<std::string> overrides;        ///< "integrator.steps=20": values are TOML, or else taken as strings
+  bool trust = false;                        ///< open the libraries that the scene lists
+};
+
+/// Reads and checks a scene. Opens (through the registry) the libraries of the parts it names and no others.
+/// Throws InputErrors with every error found, each with file, line, column, key, what was found and what is allowed.
+Scene read_scene(const std::filesystem::path& file, Registry& registry, const SceneOptions& options = {});
+/// The same from memory; `file` is only used in messages and for relative paths.
+Scene parse_scene(const std::string& text, const std::filesystem::path& file, Registry& registry, const SceneOptions& options = {});
+
+/// Checked values of one part from TOML text of its table without `type` - for contract suites and tests.
+/// Throws InputErrors.
+std::shared_ptr<const PartValues> parse_part(Kind kind, const std::string& type, const std::string& toml, Registry& registry);
+
+/// The keys of the scene's own sections ("body", "body.lattice", "family", "output", ...), for `describe` and the reference page.
+const std::vector<std::pair<std::string, ParameterTable>>& scene_sections();
+
+}  // namespace perikit

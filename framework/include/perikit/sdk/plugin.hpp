@@ -1,0 +1,7 @@
+#pragma once
+/// Everything that a plugin needs.
+#include "perikit/body/influence.hpp"
+#include "perikit/model/kinematics.hpp"
+#include "perikit/model/material.hpp"
+#include "perikit/plugin/abi.hpp"
+#include "perikit/problem/integrator.hpp"

@@ -1,0 +1,37 @@
+#include "perikit/core/parallel.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace perikit {
+
+namespace {
+int threads = std::max(1, omp_get_max_threads());
+}
+
+int thread_count() noexcept { return threads; }
+void set_thread_count(int n) noexcept { threads = std::max(1, n); }
+int thread_index() noexcept { return omp_get_thread_num(); }
+
+namespace detail {
+void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
+  if (threads == 1 || n < 2) {
+    for (std::size_t i = 0; i < n; ++i) body(context, i);
+    return;
+  }
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+  for (std::size_t i = 0; i < n; ++i) body(context, i);
+}
+}  // namespace detail
+
+double ordered_sum(std::size_t blocks, const std::function<double(std::size_t)>& term) {
+  std::vector<double> parts(blocks);
+  parallel_for(blocks, [&](std::size_t b) { parts[b] = term(b); });
+  double total = 0;
+  for (const double part : parts) total += part;
+  return total;
+}
+
+}  // namespace perikit
