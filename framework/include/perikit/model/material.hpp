@@ -42,6 +42,7 @@ struct MaterialBatch {
   double* psi = nullptr;            ///< [J/m^3]
   double* P = nullptr;              ///< [Pa]
   double* dP = nullptr;             ///< A : dH [Pa]
+  double* lateral = nullptr;        ///< H33 that plane stress (or H22 = H33 that line stress) found [-]; one component
   double* A = nullptr;              ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
 };
 

@@ -1,0 +1,67 @@
+#pragma once
+/// Kinematics x materials on a body: energies, forces, tangent actions, sampled point fields.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "perikit/body/body.hpp"
+#include "perikit/body/influence.hpp"
+#include "perikit/engine/laws.hpp"
+#include "perikit/model/kinematics.hpp"
+#include "perikit/problem/integrator.hpp"
+
+namespace perikit {
+
+/// Averages of evaluation-point quantities at points, weighted with W_q over the q that each point owns. Component-major over
+/// the body's stride; tensors with the components of the space (cauchy: 9, row-major).
+struct PointSamples {
+  Field strain_energy_density;   ///< sum W psi / V [J/m^3]
+  Field H;                       ///< F - I [-]; H33 included in plane and line spaces
+  Field P;                       ///< [Pa]
+  Field cauchy;                  ///< [Pa]
+  Field von_mises;               ///< [Pa]
+};
+
+/// One decision of the set-up: what was left out, why, and what that saves.
+struct SkipNote {
+  std::string what, why, saves;
+};
+
+struct ModelReport {
+  std::size_t bytes = 0;                      ///< of families, references and work fields
+  std::size_t bonds = 0;                      ///< directed, intact
+  std::size_t evaluation_points = 0;
+  std::size_t broken_bonds = 0;               ///< cut by pre-cracks
+  std::size_t singular_families = 0;          ///< points without a gradient of their own: H = 0
+  std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family
+  std::vector<SkipNote> skips;
+};
+
+class Model {
+ public:
+  virtual ~Model() = default;
+  /// force <- -dPi/du [N], fully overwritten; strain energy Pi -> *energy where wanted.
+  virtual EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) = 0;
+  /// Kw <- d2Pi/du2 w [N], fully overwritten.
+  virtual EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  virtual EvaluationStatus sample(ConstFieldView u, PointSamples& samples) = 0;
+  /// Condition number of each point's shape tensor (one component; infinite where singular).
+  virtual Field shape_tensor_condition() = 0;
+  /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
+  virtual Field damage() = 0;
+  virtual ModelReport report() const = 0;
+};
+
+struct ModelParts {
+  const Body* body = nullptr;
+  std::shared_ptr<const Kinematics> kinematics;
+  std::shared_ptr<const InfluenceFunction> influence;
+  const Laws* laws = nullptr;
+  bool skip = true;                           ///< false: no savings by symmetry or uniformity
+};
+
+std::unique_ptr<Model> make_model(const ModelParts& parts);
+
+}  // namespace perikit

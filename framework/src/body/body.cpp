@@ -1,0 +1,172 @@
+#include "perikit/body/body.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "perikit/body/point_file.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr double most_points = 2.0e9;   // indices are 32 bit
+
+/// Uniform in [-1, 1), the same on every platform.
+double centred(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0; }
+
+}  // namespace
+
+Body::Body(const Scene& scene) : dimension_(scene.body.dimension), space_(scene.body.space), section_(scene.body.section) {
+  for (const CrackDescription& crack : scene.cracks) cracks_.emplace_back(crack.vertices);
+  if (scene.body.lattice) {
+    spacing_ = scene.body.lattice->spacing;
+    horizon_ = scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing_;
+    place_lattice(scene);
+  } else {
+    PointCloud cloud = read_points(*scene.body.points_file, dimension_);
+    double total = 0;
+    for (double& v : cloud.volume) total += v;
+    spacing_ = std::pow(total / section_ / static_cast<double>(cloud.volume.size()), 1.0 / dimension_);
+    horizon_ = scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing_;
+    place_cloud(std::move(cloud.position), std::move(cloud.volume));
+  }
+  if (internal_.empty()) throw InputError(scene.body.position, "body", "no point is left; `inside` or the box keeps none");
+  collect_sets(scene);
+}
+
+void Body::place_lattice(const Scene& scene) {
+  const LatticeDescription& description = *scene.body.lattice;
+  double estimate = 1;
+  for (int a = 0; a < dimension_; ++a) estimate *= std::max(1.0, (description.upper[a] - description.lower[a]) / spacing_ + 1);
+  if (estimate > most_points) {
+    throw InputError(scene.body.position, "body.lattice", fmt::format("about {:.3g} points; at most {:.3g} are possible", estimate, most_points));
+  }
+  Lattice lattice = make_lattice(dimension_, spacing_, description.lower, description.upper, horizon_);
+  std::array<std::int64_t, 3> cells{1, 1, 1}, along{};
+  for (int k = 0; k < 3; ++k) {
+    cells[static_cast<std::size_t>(lattice.axis[k])] = lattice.extent[k];
+    along[static_cast<std::size_t>(lattice.axis[k])] = k;
+  }
+  for (int a = 0; a < dimension_; ++a) {
+    if (cells[static_cast<std::size_t>(a)] < 1) {
+      throw InputError(scene.body.position, "body.lattice", fmt::format("no point fits between lower and upper along {}", "xyz"[a]));
+    }
+  }
+  internal_.reserve(static_cast<std::size_t>(cells[0] * cells[1] * cells[2]));
+  std::array<std::int64_t, 3> k{};
+  for (k[2] = 0; k[2] < cells[2]; ++k[2])
+    for (k[1] = 0; k[1] < cells[1]; ++k[1])
+      for (k[0] = 0; k[0] < cells[0]; ++k[0]) {   // input order: x fastest
+        std::array<std::int64_t, 3> inner{};
+        for (std::size_t a = 0; a < 3; ++a) inner[static_cast<std::size_t>(along[a])] = k[a];
+        const std::int64_t index = lattice.index(inner[0], inner[1], inner[2]);
+        if (description.inside && (*description.inside)(lattice.position(index)) == 0.0) continue;
+        internal_.push_back(static_cast<std::int32_t>(index));
+      }
+  const double volume = std::pow(spacing_, dimension_) * section_;
+  // Jitter needs a cloud; so does a body that fills so little of its box that dead cells would dominate.
+  const bool sparse = static_cast<double>(internal_.size()) < 0.08 * static_cast<double>(cells[0] * cells[1] * cells[2]);
+  if (description.jitter > 0 || (sparse && !internal_.empty())) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
+    std::vector<Point> positions;
+    positions.reserve(internal_.size());
+    for (const std::int32_t index : internal_) {
+      Point x = lattice.position(index);
+      for (int a = 0; a < dimension_ && description.jitter > 0; ++a) x[static_cast<std::size_t>(a)] += description.jitter * spacing_ * centred(random);
+      positions.push_back(x);
+    }
+    std::vector<double> volumes(positions.size(), volume);
+    place_cloud(std::move(positions), std::move(volumes));
+    return;
+  }
+  stride_ = static_cast<std::size_t>(lattice.cells);
+  margin_ = padding;
+  uniform_volume_ = volume;
+  lattice_ = lattice;
+  input_.assign(stride_, -1);
+  alive_.assign(stride_ / 8, 0);
+  for (std::size_t p = 0; p < internal_.size(); ++p) {
+    const auto index = static_cast<std::size_t>(internal_[p]);
+    input_[index] = static_cast<std::int32_t>(p);
+    alive_[index / 8] |= static_cast<std::uint8_t>(1u << (index % 8));
+  }
+}
+
+void Body::place_cloud(std::vector<Point> positions, std::vector<double> volumes) {
+  const std::vector<std::int32_t> order = morton_order(positions, horizon_);
+  const std::size_t n = positions.size();
+  stride_ = padded(n);
+  margin_ = padding;
+  internal_.resize(n);
+  input_.assign(stride_, -1);
+  alive_.assign(stride_ / 8, 0);
+  positions_.assign(4 * stride_, 0.0);
+  for (std::size_t p = 0; p < n; ++p) {
+    const auto from = static_cast<std::size_t>(order[p]);
+    internal_[from] = static_cast<std::int32_t>(p);
+    input_[p] = order[p];
+    alive_[p / 8] |= static_cast<std::uint8_t>(1u << (p % 8));
+    for (std::size_t c = 0; c < 3; ++c) positions_[4 * p + c] = positions[from][c];
+    positions_[4 * p + 3] = volumes[from];
+  }
+}
+
+std::int32_t Body::input_of(std::size_t internal_index) const noexcept { return input_[internal_index]; }
+
+Point Body::position(std::size_t p) const noexcept {
+  if (lattice_) return lattice_->position(static_cast<std::int64_t>(p));
+  return {positions_[4 * p], positions_[4 * p + 1], positions_[4 * p + 2]};
+}
+
+bool Body::cut(const Point& a, const Point& b) const noexcept {
+  return std::any_of(cracks_.begin(), cracks_.end(), [&](const Crack& crack) { return crack.cuts(a, b); });
+}
+
+void Body::collect_sets(const Scene& scene) {
+  sets_["all"] = internal_;
+  for (const SetDescription& description : scene.sets) {
+    std::vector<std::int32_t>& members = sets_[description.name];
+    const std::string key = "sets." + description.name;
+    if (description.expression) {
+      for (const std::int32_t p : internal_) {
+        if ((*description.expression)(position(static_cast<std::size_t>(p))) != 0.0) members.push_back(p);
+      }
+    } else if (description.nearest) {
+      double best = std::numeric_limits<double>::infinity();
+      for (const std::int32_t p : internal_) {
+        const Point x = position(static_cast<std::size_t>(p));
+        double r2 = 0;
+        for (std::size_t c = 0; c < 3; ++c) r2 += (x[c] - (*description.nearest)[c]) * (x[c] - (*description.nearest)[c]);
+        // Ties within rounding go to the first point.
+        if (r2 < best * (1 - 1e-12)) {
+          best = r2;
+          members.assign(1, p);
+        }
+      }
+    } else {
+      for (const std::int64_t p : description.points) {
+        if (p < 0 || static_cast<std::size_t>(p) >= internal_.size()) {
+          throw InputError(description.position, key, fmt::format("point {} does not exist; allowed: 0 ... {}", p, internal_.size() - 1));
+        }
+        members.push_back(internal_[static_cast<std::size_t>(p)]);
+      }
+    }
+    if (members.empty()) throw InputError(description.position, key, "the set has no points");
+  }
+  if (scene.regions.empty()) return;
+  material_ids_.assign(stride_, 0);
+  for (std::size_t r = 0; r < scene.regions.size(); ++r) {
+    for (const std::int32_t p : set(scene.regions[r].set)) material_ids_[static_cast<std::size_t>(p)] = static_cast<std::uint16_t>(r + 1);
+  }
+}
+
+std::size_t Body::bytes() const noexcept {
+  return (internal_.size() + input_.size()) * sizeof(std::int32_t) + positions_.size() * sizeof(double) +
+         alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
+}
+
+}  // namespace perikit

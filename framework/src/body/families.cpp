@@ -1,0 +1,136 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+#include "perikit/body/body.hpp"
+#include "perikit/core/parallel.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Boxes of at least one horizon a side over the points, with the points sorted by box.
+struct CellList {
+  Point lower{};
+  double size = 0;
+  std::array<std::int64_t, 3> count{1, 1, 1};
+  std::vector<std::int32_t> first;   ///< by box
+  std::vector<std::int32_t> points;
+
+  CellList(std::span<const double> rows, std::size_t n, int dimension, double horizon) {
+    Point upper{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      lower[c] = upper[c] = rows[c];
+      for (std::size_t p = 0; p < n; ++p) {
+        lower[c] = std::min(lower[c], rows[4 * p + c]);
+        upper[c] = std::max(upper[c], rows[4 * p + c]);
+      }
+    }
+    // Sparse bodies: larger boxes, so that their number stays below that of the points.
+    size = horizon * (1 + 1e-9);
+    for (;; size *= 2) {
+      double boxes = 1;
+      for (int c = 0; c < dimension; ++c) boxes *= std::floor((upper[c] - lower[c]) / size) + 1;
+      if (boxes <= 2.0 * static_cast<double>(n) + 64) break;
+    }
+    for (int c = 0; c < dimension; ++c) count[c] = static_cast<std::int64_t>((upper[c] - lower[c]) / size) + 1;
+    std::vector<std::int32_t> box(n);
+    first.assign(static_cast<std::size_t>(count[0] * count[1] * count[2] + 1), 0);
+    for (std::size_t p = 0; p < n; ++p) {
+      box[p] = static_cast<std::int32_t>(flat(of(&rows[4 * p])));
+      ++first[static_cast<std::size_t>(box[p]) + 1];
+    }
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    points.resize(n);
+    std::vector<std::int32_t> next(first.begin(), first.end() - 1);
+    for (std::size_t p = 0; p < n; ++p) points[static_cast<std::size_t>(next[static_cast<std::size_t>(box[p])]++)] = static_cast<std::int32_t>(p);
+  }
+
+  std::array<std::int64_t, 3> of(const double* x) const {
+    std::array<std::int64_t, 3> k{};
+    for (std::size_t c = 0; c < 3; ++c) k[c] = std::clamp<std::int64_t>(static_cast<std::int64_t>((x[c] - lower[c]) / size), 0, count[c] - 1);
+    return k;
+  }
+  std::int64_t flat(const std::array<std::int64_t, 3>& k) const { return k[0] + count[0] * (k[1] + count[1] * k[2]); }
+
+  template <class Visit>
+  void around(const double* x, Visit&& visit) const {
+    const auto k = of(x);
+    for (std::int64_t c = std::max<std::int64_t>(k[2] - 1, 0); c <= std::min(k[2] + 1, count[2] - 1); ++c)
+      for (std::int64_t b = std::max<std::int64_t>(k[1] - 1, 0); b <= std::min(k[1] + 1, count[1] - 1); ++b) {
+        const auto begin = static_cast<std::size_t>(flat({std::max<std::int64_t>(k[0] - 1, 0), b, c}));
+        const auto end = static_cast<std::size_t>(flat({std::min(k[0] + 1, count[0] - 1), b, c}));
+        for (std::int32_t i = first[begin]; i < first[end + 1]; ++i) visit(points[static_cast<std::size_t>(i)]);
+      }
+  }
+};
+
+}  // namespace
+
+FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon) {
+  const CellList cells(rows, points, dimension, horizon);
+  const double limit = horizon * (1 + 1e-10);
+  const auto distance2 = [&](std::size_t p, std::size_t q) {
+    double r2 = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double d = rows[4 * q + c] - rows[4 * p + c];
+      r2 += d * d;
+    }
+    return r2;
+  };
+  const auto in_family = [&](std::size_t p, std::int32_t q) {
+    return static_cast<std::size_t>(q) != p && distance2(p, static_cast<std::size_t>(q)) <= limit * limit;
+  };
+  constexpr std::size_t block = 1024;
+  const std::size_t blocks = (points + block - 1) / block;
+  FamilyLists lists;
+  lists.first.assign(points + 1, 0);
+  parallel_for(blocks, [&](std::size_t b) {
+    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p) {
+      cells.around(&rows[4 * p], [&](std::int32_t q) { lists.first[p + 1] += in_family(p, q); });
+    }
+  });
+  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
+  lists.neighbour.resize(static_cast<std::size_t>(lists.first.back()));
+  std::atomic<std::int64_t> coincident{-1};
+  parallel_for(blocks, [&](std::size_t b) {
+    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p) {
+      auto next = lists.neighbour.begin() + lists.first[p];
+      cells.around(&rows[4 * p], [&](std::int32_t q) {
+        if (!in_family(p, q)) return;
+        if (distance2(p, static_cast<std::size_t>(q)) <= 1e-24 * horizon * horizon) coincident = static_cast<std::int64_t>(p);
+        *next++ = q;
+      });
+      std::sort(lists.neighbour.begin() + lists.first[p], next);
+    }
+  });
+  if (const std::int64_t p = coincident; p >= 0) {
+    const auto at = static_cast<std::size_t>(4 * p);
+    throw InputError(fmt::format("body: two points coincide at ({:.6g}, {:.6g}, {:.6g})", rows[at], rows[at + 1], rows[at + 2]));
+  }
+  return lists;
+}
+
+std::vector<std::int32_t> morton_order(const std::vector<Point>& positions, double cell) {
+  Point lower = positions.front();
+  for (const Point& x : positions)
+    for (std::size_t c = 0; c < 3; ++c) lower[c] = std::min(lower[c], x[c]);
+  std::vector<std::pair<std::uint64_t, std::int32_t>> keys(positions.size());
+  for (std::size_t p = 0; p < positions.size(); ++p) {
+    std::uint64_t key = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto k = static_cast<std::uint64_t>(std::min((positions[p][c] - lower[c]) / cell, 2097151.0));
+      for (int bit = 0; bit < 21; ++bit) key |= (k >> bit & 1u) << (3 * bit + static_cast<int>(c));
+    }
+    keys[p] = {key, static_cast<std::int32_t>(p)};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::int32_t> order(positions.size());
+  std::transform(keys.begin(), keys.end(), order.begin(), [](const auto& k) { return k.second; });
+  return order;
+}
+
+}  // namespace perikit

@@ -1,0 +1,75 @@
+#include "perikit/body/lattice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+std::array<std::int64_t, 3> Lattice::cell(std::int64_t index) const noexcept {
+  const std::int64_t rest = index - base;
+  const std::int64_t row = pitch[0] > 0 ? rest / pitch[0] : 0;
+  return {rest - row * pitch[0], pitch[1] > 0 ? row % pitch[1] : row, pitch[1] > 0 ? row / pitch[1] : 0};
+}
+
+std::array<double, 3> Lattice::position(std::int64_t index) const noexcept {
+  const auto k = cell(index);
+  std::array<double, 3> x{};
+  for (int a = 0; a < dimension; ++a) {
+    x[static_cast<std::size_t>(axis[a])] = lower[static_cast<std::size_t>(axis[a])] + (static_cast<double>(k[a]) + 0.5) * spacing;
+  }
+  return x;
+}
+
+std::int64_t lattice_cells(double lower, double upper, double spacing) {
+  // The last point may lie on `upper` up to rounding.
+  return static_cast<std::int64_t>(std::floor((upper - lower) / spacing * (1 + 1e-12) + 0.5 + 1e-9));
+}
+
+Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>& lower, const std::array<double, 3>& upper,
+                     double horizon) {
+  Lattice lattice;
+  lattice.dimension = dimension;
+  lattice.spacing = spacing;
+  lattice.lower = lower;
+  std::array<std::int64_t, 3> cells{1, 1, 1};
+  for (int a = 0; a < dimension; ++a) cells[static_cast<std::size_t>(a)] = lattice_cells(lower[a], upper[a], spacing);
+  std::stable_sort(lattice.axis.begin(), lattice.axis.begin() + dimension,
+                   [&](int a, int b) { return cells[static_cast<std::size_t>(a)] > cells[static_cast<std::size_t>(b)]; });
+  std::array<std::int64_t, 3> reach{};
+  for (int k = 0; k < dimension; ++k) {
+    lattice.extent[k] = cells[static_cast<std::size_t>(lattice.axis[k])];
+    reach[k] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(horizon / spacing * (1 + 1e-10))), 0, lattice.extent[k] - 1);
+  }
+  lattice.pitch[0] = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.extent[0] + reach[0])));
+  lattice.pitch[1] = lattice.extent[1] + reach[1];
+  lattice.reach = reach[0] + lattice.pitch[0] * (reach[1] + lattice.pitch[1] * reach[2]);
+  lattice.base = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.reach)));
+  const std::int64_t last = lattice.index(lattice.extent[0] - 1, lattice.extent[1] - 1, lattice.extent[2] - 1);
+  lattice.cells = static_cast<std::int64_t>(padded(static_cast<std::size_t>(last + 1 + lattice.reach)));
+  return lattice;
+}
+
+std::vector<std::array<int, 3>> family_offsets(const Lattice& lattice, double horizon) {
+  const double m = horizon / lattice.spacing * (1 + 1e-10);
+  std::array<int, 3> reach{};
+  for (int k = 0; k < lattice.dimension; ++k) {
+    reach[k] = static_cast<int>(std::min<std::int64_t>(static_cast<std::int64_t>(std::floor(m)), lattice.extent[k] - 1));
+  }
+  std::vector<std::array<int, 3>> offsets;
+  for (int a = -reach[0]; a <= reach[0]; ++a) {
+    for (int c = 0; c <= reach[2]; ++c) {
+      for (int b = -reach[1]; b <= reach[1]; ++b) {
+        const bool first_of_pair = c > 0 || (c == 0 && (b > 0 || (b == 0 && a > 0)));
+        if (first_of_pair && std::sqrt(double(a) * a + double(b) * b + double(c) * c) <= m) offsets.push_back({a, b, c});
+      }
+    }
+  }
+  const std::size_t half = offsets.size();
+  for (std::size_t s = 0; s < half; ++s) offsets.push_back({-offsets[s][0], -offsets[s][1], -offsets[s][2]});
+  return offsets;
+}
+
+}  // namespace perikit

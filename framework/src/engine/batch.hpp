@@ -1,0 +1,98 @@
+#pragma once
+/// One batch of evaluation points on its way through the law: H -> W P (forces), H, dH -> -W A : dH (tangent), or sums of point
+/// averages (sample). Shared by every engine.
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "perikit/core/parallel.hpp"
+#include "perikit/engine/laws.hpp"
+
+namespace perikit {
+
+enum class Work { force, tangent, sample };
+
+/// Scratch of one thread. Arrays are [component][lane] with stride batch_points.
+struct BatchScratch {
+  alignas(64) double H[9 * batch_points];
+  alignas(64) double dH[9 * batch_points];
+  alignas(64) double P[9 * batch_points];        ///< result: weighted stress
+  alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
+  alignas(64) double psi[batch_points];
+  alignas(64) double lateral[batch_points];
+  alignas(64) double A[9 * batch_points];
+  alignas(64) double dA[9 * batch_points];
+  alignas(64) double du[3 * batch_points];
+  alignas(64) double dw[3 * batch_points];
+  alignas(64) double t[3 * batch_points];
+  alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
+  alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
+  alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
+  std::int32_t owner[batch_points];
+  std::int32_t far[batch_points];
+  LawScratch law;
+};
+
+/// Sums over lanes of sampled quantities go here, one row per owner.
+struct SampleSums {
+  double* weight;      ///< sum W
+  double* psi;         ///< sum W psi
+  double* H;           ///< tensor components x stride
+  double* P;
+  double* cauchy;      ///< 9 x stride
+  double* von_mises;
+  std::size_t stride;
+};
+
+/// One BatchScratch per thread.
+class ScratchPool {
+ public:
+  /// Before a parallel loop: memory for every thread, with room for the constants of the laws.
+  void prepare(const Laws& laws);
+  BatchScratch& mine() noexcept { return *scratch_[static_cast<std::size_t>(thread_index())]; }
+  std::size_t bytes() const noexcept { return scratch_.size() * sizeof(BatchScratch); }
+
+ private:
+  std::vector<std::unique_ptr<BatchScratch>> scratch_;
+};
+
+class BatchWork {
+ public:
+  BatchWork(const Laws& laws, Work work, bool energy) : laws_(laws), work_(work), energy_(energy) {}
+
+  Work work() const noexcept { return work_; }
+  bool tangent() const noexcept { return work_ == Work::tangent; }
+
+  /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
+  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
+  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
+  void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
+
+ private:
+  int pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept;
+
+  const Laws& laws_;
+  Work work_;
+  bool energy_;
+};
+
+/// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.
+struct Pass {
+  const BatchWork& work;
+  ConstFieldView u, w;
+  FieldView out;
+  const SampleSums* sums = nullptr;
+  double* energies = nullptr;     ///< by block
+  std::int64_t bad = -1;          ///< internal index
+  std::mutex guard;
+
+  void report(std::int64_t point) {
+    const std::lock_guard lock(guard);
+    if (bad < 0 || point < bad) bad = point;
+  }
+};
+
+}  // namespace perikit

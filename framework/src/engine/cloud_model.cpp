@@ -1,0 +1,380 @@
+#include "cloud_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "samples.hpp"
+#include "shape_tensor.hpp"
+
+namespace perikit {
+
+template <int D>
+CloudModel<D>::CloudModel(const ModelParts& parts)
+    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.skip),
+      position_(reinterpret_cast<const Row*>(body_.rows().data())),
+      families_(find_families(body_.rows(), body_.points(), D, body_.horizon())), condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
+  build_families(*parts.influence);
+  const std::size_t n = body_.points();
+  u_.resize(n);
+  flux_.resize(D * n);
+  if (traits_.at == EvaluationPoints::bonds) {
+    gradient_.resize(D * n);
+    force_.resize(n);
+    build_colouring();
+  }
+}
+
+template <int D>
+void CloudModel<D>::build_families(const InfluenceFunction& influence) {
+  const std::size_t n = body_.points();
+  omega_.resize(families_.neighbour.size());
+  inverse_.assign(6 * n, 0.0);
+  weight_.assign(n, 0.0);
+  scale_.assign(n, 0.0);
+  upper_.assign(n, 0);
+  std::vector<double> r, omega;
+  std::vector<std::int64_t> first(n + 1, 0);
+  std::int64_t kept = 0;
+  for (std::size_t p = 0; p < n; ++p) {
+    const std::int64_t begin = families_.first[p], end = families_.first[p + 1];
+    const Point x = body_.position(p);
+    r.clear();
+    for (std::int64_t k = begin; k < end; ++k) {
+      const Row xi = position_[families_.neighbour[static_cast<std::size_t>(k)]] - position_[p];
+      r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body_.horizon()));
+    }
+    omega.resize(r.size());
+    influence.evaluate(r, omega);
+    const bool near_crack = std::any_of(body_.cracks().begin(), body_.cracks().end(), [&](const Crack& c) { return c.near(x, body_.horizon()); });
+    double K[6] = {}, whole_omega = 0, intact_omega = 0, normaliser = 0;
+    first[p] = kept;
+    upper_[p] = -1;
+    for (std::int64_t k = begin; k < end; ++k) {
+      const std::int32_t j = families_.neighbour[static_cast<std::size_t>(k)];
+      const double w = omega[static_cast<std::size_t>(k - begin)], volume = position_[j][3];
+      whole_omega += w * volume;
+      normaliser += traits_.weight == BondWeight::kernel ? w * volume : volume;
+      if (near_crack && body_.cut(x, body_.position(static_cast<std::size_t>(j)))) {
+        ++broken_;
+        continue;
+      }
+      intact_omega += w * volume;
+      const Row xi = position_[j] - position_[p];
+      for (int a = 0; a < D; ++a)
+        for (int b = a; b < D; ++b) K[symmetric_index(D, a, b)] += w * volume * xi[a] * xi[b];
+      if (upper_[p] < 0 && static_cast<std::size_t>(j) > p) upper_[p] = kept;
+      // Lists shrink in place where bonds are cut.
+      families_.neighbour[static_cast<std::size_t>(kept)] = j;
+      omega_[static_cast<std::size_t>(kept)] = w;
+      ++kept;
+    }
+    if (upper_[p] < 0) upper_[p] = kept;
+    const double share = whole_omega > 0 ? intact_omega / whole_omega : 0.0;
+    if (!invert_shape<D>(K, &inverse_[6 * p], condition_.data() + p)) ++singular_;
+    weight_[p] = position_[p][3] * share;
+    damage_.data()[p] = whole_omega > 0 ? 1 - share : 0.0;
+    scale_[p] = normaliser > 0 ? position_[p][3] / normaliser : 0.0;
+  }
+  first[n] = kept;
+  families_.first = std::move(first);
+  families_.neighbour.resize(static_cast<std::size_t>(kept));
+  omega_.resize(static_cast<std::size_t>(kept));
+}
+
+template <int D>
+void CloudModel<D>::build_colouring() {
+  std::vector<std::vector<std::int32_t>> touches(blocks());
+  for (std::size_t b = 0; b < blocks(); ++b) {
+    std::vector<std::int32_t>& units = touches[b];
+    units.push_back(static_cast<std::int32_t>(b));
+    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+      for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]) / block_points);
+        if (unit != units.back()) units.push_back(unit);
+      }
+    }
+    std::sort(units.begin(), units.end());
+    units.erase(std::unique(units.begin(), units.end()), units.end());
+  }
+  colouring_ = Colouring(touches, blocks());
+}
+
+template <int D>
+void CloudModel<D>::mirror(ConstFieldView u, AlignedVector<Row>& rows) const {
+  rows.resize(body_.points());
+  parallel_for(blocks(), [&](std::size_t b) {
+    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+      Row row{};
+      for (int c = 0; c < D; ++c) row[c] = u.component(c)[p];
+      rows[p] = row;
+    }
+  });
+}
+
+template <int D>
+void CloudModel<D>::moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept {
+  const Row x = position_[p], own = u[p];
+  for (int e = 0; e < D; ++e) S[e] = Row{};
+  for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
+    const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]);
+    const Row xi = position_[j] - x;
+    const Row du = (omega_[static_cast<std::size_t>(k)] * position_[j][3]) * (u[j] - own);
+    for (int e = 0; e < D; ++e) S[e] += xi[e] * du;
+  }
+}
+
+template <int D>
+void CloudModel<D>::flux_row(std::size_t p, const Row* S, Row* Q) const noexcept {
+  const double* inverse = &inverse_[6 * p];
+  Row out[D];
+  for (int e = 0; e < D; ++e) {
+    out[e] = Row{};
+    for (int k = 0; k < D; ++k) out[e] += inverse[symmetric_index(D, k, e)] * S[k];
+  }
+  for (int e = 0; e < D; ++e) Q[e] = out[e];
+}
+
+template <int D>
+void CloudModel<D>::gradient_lane(std::size_t p, const AlignedVector<Row>& u, double* H, int lane) const noexcept {
+  Row S[D], h[D];
+  moments(p, u, S);
+  flux_row(p, S, h);
+  for (int c = 0; c < D; ++c)
+    for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points + lane] = h[e][c];
+}
+
+template <int D>
+void CloudModel<D>::gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept {
+  Row S[D];
+  moments(p, u, S);
+  flux_row(p, S, &H[D * p]);
+}
+
+template <int D>
+void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
+  BatchScratch& s = scratch_.mine();
+  const std::size_t end = std::min(body_.points(), (b + 1) * block_points);
+  double energy = 0;
+  for (std::size_t first = b * block_points; first < end; first += batch_points) {
+    const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
+    const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+    for (int l = 0; l < lanes; ++l) {
+      const std::size_t p = first + static_cast<std::size_t>(l);
+      if (l >= n) {
+        for (int c = 0; c < D * D; ++c) s.H[c * batch_points + l] = s.dH[c * batch_points + l] = 0.0;
+        s.weight[l] = 0;
+        s.owner[l] = static_cast<std::int32_t>(first);
+        continue;
+      }
+      gradient_lane(p, u_, s.H, l);
+      if (pass.work.tangent()) gradient_lane(p, w_, s.dH, l);
+      s.weight[l] = weight_[p];
+      s.owner[l] = static_cast<std::int32_t>(p);
+    }
+    const int bad = pass.work.evaluate(n, s, false, &energy);
+    if (bad >= 0) {
+      pass.report(static_cast<std::int64_t>(first) + bad);
+      return;
+    }
+    if (pass.work.work() == Work::sample) {
+      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);   // a lone point shows its own values
+      pass.work.add_samples(n, s, *pass.sums);
+      continue;
+    }
+    for (int l = 0; l < n; ++l) {
+      Row S[D];
+      for (int e = 0; e < D; ++e) {
+        S[e] = Row{};
+        for (int c = 0; c < D; ++c) S[e][c] = s.P[(c * D + e) * batch_points + l];
+      }
+      flux_row(first + static_cast<std::size_t>(l), S, &flux_[D * (first + static_cast<std::size_t>(l))]);
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy) {
+  const bool sample = pass.work.work() == Work::sample, tangent = pass.work.tangent(), mean = traits_.base == BondBase::mean;
+  const bool half = pairs_ && !sample;
+  double* xi = s.bond[0];
+  double* g = s.bond[1];
+  double* length = s.bond[2];
+  double* omega = s.bond[2] + batch_points;
+  double* volume = s.bond[2] + 2 * batch_points;
+  const Row x = position_[p];
+  const auto gather = [&](const AlignedVector<Row>& u, const AlignedVector<Row>& H, std::int64_t begin, int n, double* du, double* A) {
+    for (int l = 0; l < n; ++l) {
+      const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(begin + l)]);
+      const Row d = u[j] - u[p];
+      for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
+      for (int e = 0; e < D; ++e) {
+        const Row h = mean ? 0.5 * (H[D * p + static_cast<std::size_t>(e)] + H[D * j + static_cast<std::size_t>(e)]) : H[D * p + static_cast<std::size_t>(e)];
+        for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
+      }
+    }
+  };
+  for (std::int64_t begin = half ? upper_[p] : families_.first[p]; begin < families_.first[p + 1]; begin += batch_points) {
+    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, families_.first[p + 1] - begin));
+    const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+    for (int l = 0; l < lanes; ++l) {
+      const bool real = l < n;
+      const auto k = static_cast<std::size_t>(begin + (real ? l : 0));
+      const auto j = static_cast<std::size_t>(families_.neighbour[k]);
+      const Row bond = position_[j] - x;
+      for (int c = 0; c < D; ++c) xi[c * batch_points + l] = bond[c];
+      length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
+      omega[l] = real ? omega_[k] : 0.0;
+      volume[l] = real ? position_[j][3] : 0.0;
+      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? omega_[k] : 1.0;
+      s.weight[l] = scale_[p] * position_[j][3] * factor;
+      s.far_weight[l] = scale_[j] * x[3] * factor;
+      s.owner[l] = static_cast<std::int32_t>(p);
+      s.far[l] = static_cast<std::int32_t>(j);
+    }
+    gather(u_, gradient_, begin, n, s.du, s.A);
+    if (tangent) gather(w_, direction_, begin, n, s.dw, s.dA);
+    for (int l = n; l < lanes; ++l) {
+      for (int c = 0; c < D; ++c) s.du[c * batch_points + l] = s.dw[c * batch_points + l] = 0.0;
+      for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
+    }
+    const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &inverse_[6 * p], 0};
+    kinematics_->correction(view, g, batch_points);
+    const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
+    bond_gradient<D, false>(lanes, vectors, s.A, s.du, s.H);
+    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, s.dH);
+    const int bad = pass.work.evaluate(n, s, half, energy);
+    if (bad >= 0) return bad;
+    if (sample) {
+      pass.work.add_samples(n, s, *pass.sums);
+      continue;
+    }
+    bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
+    Row own{}, own_stress[D] = {};
+    const double share = mean ? 0.5 : 1.0;
+    for (int l = 0; l < n; ++l) {
+      const auto j = static_cast<std::size_t>(s.far[l]);
+      Row t{};
+      for (int c = 0; c < D; ++c) t[c] = s.t[c * batch_points + l];
+      own += t;
+      force_[j] -= t;
+      for (int e = 0; e < D; ++e) {
+        Row stress{};
+        for (int c = 0; c < D; ++c) stress[c] = share * s.P[(c * D + e) * batch_points + l];
+        own_stress[e] += stress;
+        if (mean) flux_[D * j + static_cast<std::size_t>(e)] += stress;
+      }
+    }
+    force_[p] += own;
+    for (int e = 0; e < D; ++e) flux_[D * p + static_cast<std::size_t>(e)] += own_stress[e];
+  }
+  return -1;
+}
+
+template <int D>
+void CloudModel<D>::bonds_block(std::size_t b, Pass& pass) {
+  BatchScratch& s = scratch_.mine();
+  double energy = 0;
+  for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+    if (bonds_of_point(p, s, pass, &energy) >= 0) {
+      pass.report(static_cast<std::int64_t>(p));
+      return;
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void CloudModel<D>::divergence(std::size_t p, FieldView out) const noexcept {
+  const Row x = position_[p];
+  Row f = force_.empty() ? Row{} : force_[p];
+  const Row* own = &flux_[D * p];
+  for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
+    const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]);
+    const Row far = position_[j], xi = far - x;
+    const double w = omega_[static_cast<std::size_t>(k)], to_own = w * far[3], to_far = w * x[3];
+    for (int e = 0; e < D; ++e) f += xi[e] * (to_own * own[e] + to_far * flux_[D * j + static_cast<std::size_t>(e)]);
+  }
+  for (int c = 0; c < D; ++c) out.component(c)[p] = f[c];
+}
+
+template <int D>
+EvaluationStatus CloudModel<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  mirror(pass.u, u_);
+  if (pass.work.tangent()) mirror(pass.w, w_);
+  const bool sample = pass.work.work() == Work::sample;
+  const auto over_points = [&](auto&& body) {
+    parallel_for(blocks(), [&](std::size_t b) {
+      for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) body(p);
+    });
+  };
+  if (traits_.at == EvaluationPoints::points) {
+    parallel_for(blocks(), [&](std::size_t b) { points_block(b, pass); });
+  } else {
+    if (pass.work.tangent()) direction_.resize(D * body_.points());
+    over_points([&](std::size_t p) {
+      gradient_rows(p, u_, gradient_);
+      if (pass.work.tangent()) gradient_rows(p, w_, direction_);
+      force_[p] = Row{};
+      for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
+    });
+    if (sample) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
+    else colouring_.for_each([&](std::size_t b) { bonds_block(b, pass); });
+    over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+  }
+  if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
+  over_points([&](std::size_t p) { divergence(p, pass.out); });
+  return {};
+}
+
+template <int D>
+EvaluationStatus CloudModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
+  return run_forces(laws_, blocks(), u, force, energy, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+EvaluationStatus CloudModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  const BatchWork work(laws_, Work::tangent, false);
+  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
+  return run(pass);
+}
+
+template <int D>
+EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) {
+  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+Field CloudModel<D>::damage() {
+  return damage_;
+}
+
+template <int D>
+ModelReport CloudModel<D>::report() const {
+  ModelReport report;
+  report.bonds = families_.neighbour.size();
+  report.broken_bonds = broken_;
+  report.singular_families = singular_;
+  const bool bonds = traits_.at == EvaluationPoints::bonds;
+  report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
+  report.bytes = families_.neighbour.size() * (sizeof(std::int32_t) + sizeof(double)) + families_.first.size() * 16 +
+                 (inverse_.size() + weight_.size() + scale_.size()) * sizeof(double) +
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) +
+                 condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
+  if (pairs_) {
+    report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", report.bonds / 2, report.bonds)});
+  }
+  return report;
+}
+
+template class CloudModel<1>;
+template class CloudModel<2>;
+template class CloudModel<3>;
+
+}  // namespace perikit

@@ -1,0 +1,68 @@
+#pragma once
+#include <memory>
+
+#include "batch.hpp"
+#include "blocks.hpp"
+#include "bond_kernel.hpp"
+#include "perikit/engine/model.hpp"
+
+namespace perikit {
+
+/// Four doubles: a point-major row, so that one neighbour costs one cache line.
+typedef double Row __attribute__((vector_size(32)));
+
+/// Any point or bond kinematics on an irregular cloud: one point at a time over sorted neighbour lists; gathered quantities are
+/// mirrored point-major.
+template <int D>
+class CloudModel final : public Model {
+ public:
+  explicit CloudModel(const ModelParts& parts);
+
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) override;
+  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus sample(ConstFieldView u, PointSamples& samples) override;
+  Field shape_tensor_condition() override { return condition_; }
+  Field damage() override;
+  ModelReport report() const override;
+
+ private:
+  static constexpr std::size_t block_points = 256;
+
+  void build_families(const InfluenceFunction& influence);
+  void build_colouring();
+  EvaluationStatus run(Pass& pass);
+  void mirror(ConstFieldView u, AlignedVector<Row>& rows) const;
+  /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
+  void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
+  void gradient_lane(std::size_t p, const AlignedVector<Row>& u, double* H, int lane) const noexcept;
+  void gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept;
+  void points_block(std::size_t b, Pass& pass);
+  void bonds_block(std::size_t b, Pass& pass);
+  int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy);
+  /// Rows of Q = S K^-1 from rows of S.
+  void flux_row(std::size_t p, const Row* S, Row* Q) const noexcept;
+  void divergence(std::size_t p, FieldView out) const noexcept;
+  std::size_t blocks() const noexcept { return (body_.points() + block_points - 1) / block_points; }
+
+  const Body& body_;
+  const Laws& laws_;
+  std::shared_ptr<const Kinematics> kinematics_;
+  KinematicsTraits traits_;
+  bool pairs_;
+  const Row* position_;                        ///< {x, y, z, V}
+  FamilyLists families_;                       ///< intact bonds
+  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
+  AlignedVector<double> omega_;                ///< by bond
+  AlignedVector<double> inverse_;              ///< K^-1 by point, rows of 6
+  AlignedVector<double> weight_, scale_;       ///< W_i and V_i / N_i
+  Field condition_, damage_;
+  std::size_t broken_ = 0, singular_ = 0;
+  Colouring colouring_;
+  AlignedVector<Row> u_, w_;                   ///< mirrors
+  AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point
+  AlignedVector<Row> flux_;                    ///< S, then Q; likewise
+  AlignedVector<Row> force_;                   ///< scattered bond forces
+  ScratchPool scratch_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,201 @@
+#include "lattice_families.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+#include "shape_tensor.hpp"
+
+namespace perikit {
+
+LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influence, BondWeight weight)
+    : body(b), lattice(*b.lattice()), spacing(lattice.spacing), volume(b.uniform_volume()), offsets(family_offsets(lattice, b.horizon())) {
+  half = offsets.size() / 2;
+  std::vector<double> r;
+  for (const auto& d : offsets) {
+    shifts.push_back(lattice.shift(d));
+    const double length = std::sqrt(double(d[0]) * d[0] + double(d[1]) * d[1] + double(d[2]) * d[2]) * spacing;
+    r.push_back(std::min(1.0, length / body.horizon()));
+  }
+  omega.resize(r.size());
+  influence.evaluate(r, omega);
+  // Results never depend on a factor of omega; this one keeps its sums near 1.
+  const double top = omega.empty() ? 1.0 : *std::max_element(omega.begin(), omega.end());
+  if (top > 0) {
+    for (double& w : omega) w /= top;
+  }
+  collect_rows();
+  make_blocks();
+  make_patterns(weight);
+}
+
+void LatticeFamilies::collect_rows() {
+  std::map<std::pair<int, int>, std::map<int, double>> by_row;
+  for (std::size_t s = 0; s < offsets.size(); ++s) by_row[{offsets[s][2], offsets[s][1]}][std::abs(offsets[s][0])] = omega[s];
+  std::map<int, int> profile_of;
+  for (const auto& [row, weights] : by_row) {
+    const int d2 = row.first, d1 = row.second, key = d1 * d1 + d2 * d2;
+    RowProfile profile;
+    profile.reach = weights.rbegin()->first;
+    profile.omega.assign(static_cast<std::size_t>(profile.reach) + 1, 0.0);
+    profile.omega_d0 = profile.omega;
+    for (const auto& [d0, w] : weights) {
+      profile.omega[static_cast<std::size_t>(d0)] = w;
+      profile.omega_d0[static_cast<std::size_t>(d0)] = w * d0;
+    }
+    row_reach = std::max(row_reach, profile.reach);
+    const auto [entry, fresh] = profile_of.try_emplace(key, static_cast<int>(profiles.size()));
+    if (fresh) profiles.push_back(profile);
+    if (key == 0) own_row = entry->second;
+    if (d2 > 0 || (d2 == 0 && d1 > 0)) row_pairs.push_back({lattice.shift({0, d1, d2}), d1, d2, profile.reach, entry->second});
+  }
+  std::stable_sort(row_pairs.begin(), row_pairs.end(), [](const RowPair& a, const RowPair& b) { return a.profile < b.profile; });
+}
+
+void LatticeFamilies::make_blocks() {
+  // Tiles of rows times segments along the rows, small enough for the second-level cache and to share out among threads.
+  constexpr std::int64_t segment = 32;   // chunks
+  const auto& n = lattice.extent;
+  const std::int64_t row_chunks = (n[0] + chunk_points - 1) / chunk_points, segments = (row_chunks + segment - 1) / segment;
+  const std::int64_t points = n[0] * n[1] * n[2];
+  std::int64_t tile1 = 8, tile2 = 4;
+  while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * chunk_points)) < 16 && tile1 * tile2 > 1) {
+    (tile1 > tile2 ? tile1 : tile2) /= 2;
+  }
+  const std::int64_t length = segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, row_chunks / 16);
+  struct Box {
+    std::int64_t low[3], high[3];   // chunk along the row, then rows
+  };
+  std::vector<Box> boxes;
+  const auto alive = body.alive_bits();
+  for (std::int64_t b2 = 0; b2 < n[2]; b2 += tile2)
+    for (std::int64_t b1 = 0; b1 < n[1]; b1 += tile1)
+      for (std::int64_t b0 = 0; b0 < row_chunks; b0 += length) {
+        LatticeBlock block{chunks.size(), 0, rows.size(), 0};
+        const Box box{{b0, b1, b2}, {std::min(b0 + length, row_chunks) - 1, std::min(b1 + tile1, n[1]) - 1, std::min(b2 + tile2, n[2]) - 1}};
+        for (std::int64_t k2 = b2; k2 <= box.high[2]; ++k2)
+          for (std::int64_t k1 = b1; k1 <= box.high[1]; ++k1) {
+            const std::int64_t first = lattice.index(b0 * chunk_points, k1, k2);
+            rows.push_back({static_cast<std::int32_t>(first), static_cast<std::int32_t>(box.high[0] - b0 + 1), static_cast<std::int32_t>(k1), static_cast<std::int32_t>(k2)});
+            for (std::int64_t c = 0; c <= box.high[0] - b0; ++c) {
+              const std::int64_t index = first + c * chunk_points;
+              if (alive[static_cast<std::size_t>(index / chunk_points)]) chunks.push_back({static_cast<std::int32_t>(index), -1});
+            }
+          }
+        block.chunk_end = chunks.size();
+        block.row_end = rows.size();
+        blocks.push_back(block);
+        boxes.push_back(box);
+      }
+  // Units for colouring: tiles themselves. A block touches every tile that its box, grown by the reach, meets.
+  std::array<std::int64_t, 3> reach{};
+  for (const auto& d : offsets)
+    for (std::size_t a = 0; a < 3; ++a) reach[a] = std::max<std::int64_t>(reach[a], std::abs(d[a]));
+  reach[0] = (reach[0] + chunk_points - 1) / chunk_points;
+  const std::int64_t size[3] = {length, tile1, tile2};
+  const std::int64_t count[3] = {(row_chunks + length - 1) / length, (n[1] + tile1 - 1) / tile1, (n[2] + tile2 - 1) / tile2};
+  std::vector<std::vector<std::int32_t>> touches(boxes.size());
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    std::int64_t low[3], high[3];
+    for (int a = 0; a < 3; ++a) {
+      low[a] = std::max<std::int64_t>(0, boxes[b].low[a] - reach[a]) / size[a];
+      high[a] = std::min(count[a] - 1, (boxes[b].high[a] + reach[a]) / size[a]);
+    }
+    for (std::int64_t c = low[2]; c <= high[2]; ++c)
+      for (std::int64_t d = low[1]; d <= high[1]; ++d)
+        for (std::int64_t e = low[0]; e <= high[0]; ++e) touches[b].push_back(static_cast<std::int32_t>(e + count[0] * (d + count[1] * c)));
+  }
+  colouring = Colouring(touches, static_cast<std::size_t>(count[0] * count[1] * count[2]));
+}
+
+void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, BondWeight weight) const {
+  const int d = lattice.dimension;
+  for (int l = 0; l < chunk_points; ++l) {
+    double K[6] = {}, moment[3] = {}, live_omega = 0, intact_omega = 0, normaliser = 0, inverse[6] = {}, condition = 0;
+    for (std::size_t s = 0; s < offsets.size(); ++s) {
+      if (!(live_mask[s] >> l & 1)) continue;
+      live_omega += omega[s];
+      normaliser += weight == BondWeight::kernel ? omega[s] * volume : volume;
+      if (!intact(p, s, l)) continue;
+      intact_omega += omega[s];
+      for (int a = 0; a < d; ++a) {
+        moment[a] += omega[s] * offsets[s][static_cast<std::size_t>(a)];
+        for (int b = a; b < d; ++b) K[symmetric_index(d, a, b)] += omega[s] * offsets[s][static_cast<std::size_t>(a)] * offsets[s][static_cast<std::size_t>(b)];
+      }
+    }
+    const bool regular = d == 3 ? invert_shape<3>(K, inverse, &condition)
+                       : d == 2 ? invert_shape<2>(K, inverse, &condition) : invert_shape<1>(K, inverse, &condition);
+    const bool live = p.live >> l & 1;
+    if (live && !regular) p.singular |= static_cast<std::uint8_t>(1u << l);
+    for (int c = 0; c < 6; ++c) p.inverse[c][l] = live ? inverse[c] : 0.0;
+    for (int c = 0; c < 3; ++c) p.moment[c][l] = live ? moment[c] : 0.0;
+    const double share = live_omega > 0 ? intact_omega / live_omega : 0.0;
+    p.damage[l] = live && live_omega > 0 ? 1 - share : 0.0;
+    p.weight[l] = live ? volume * share : 0.0;
+    p.scale[l] = live && normaliser > 0 ? volume / normaliser : 0.0;
+    p.condition[l] = live ? condition : 0.0;
+  }
+}
+
+void LatticeFamilies::make_patterns(BondWeight weight) {
+  const auto alive = body.alive_bits();
+  const std::size_t slots = offsets.size();
+  whole.mask.assign(slots, 0xff);
+  finish_pattern(whole, whole.mask, weight);
+  for (int l = 0; l < chunk_points; ++l) {
+    for (auto& moment : whole.moment) moment[l] = 0.0;   // exactly, not to rounding
+  }
+  const auto live_bits = [&](std::int64_t index) {      // of cells index ... index + 7
+    const auto byte = static_cast<std::size_t>(index / 8);
+    const int shift = static_cast<int>(index % 8);
+    const unsigned pair = alive[byte] | (byte + 1 < alive.size() ? alive[byte + 1] << 8 : 0u);
+    return static_cast<std::uint8_t>(pair >> shift);
+  };
+  const bool cracked = !body.cracks().empty();
+  std::unordered_map<std::string, std::int32_t> known;
+  std::vector<std::uint8_t> live_mask(slots), mask(slots);
+  for (LatticeChunk& chunk : chunks) {
+    const std::uint8_t live = live_bits(chunk.first);
+    bool full = live == 0xff;
+    for (std::size_t s = 0; s < slots; ++s) {
+      live_mask[s] = live & live_bits(chunk.first + shifts[s]);
+      full = full && live_mask[s] == 0xff;
+    }
+    mask = live_mask;
+    std::uint8_t irregular = 0;
+    for (int l = 0; cracked && l < chunk_points; ++l) {
+      if (!(live >> l & 1)) continue;
+      const Point x = body.position(static_cast<std::size_t>(chunk.first + l));
+      const bool candidate = std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
+      for (std::size_t s = 0; candidate && s < slots; ++s) {
+        if (!(mask[s] >> l & 1) || !body.cut(x, body.position(static_cast<std::size_t>(chunk.first + l + shifts[s])))) continue;
+        mask[s] &= static_cast<std::uint8_t>(~(1u << l));
+        irregular |= static_cast<std::uint8_t>(1u << l);
+        ++broken;
+      }
+    }
+    for (std::size_t s = 0; s < slots; ++s) bonds += static_cast<std::size_t>(__builtin_popcount(mask[s]));
+    if (full && irregular == 0) continue;
+    std::string key(mask.begin(), mask.end());
+    key.append(live_mask.begin(), live_mask.end());
+    key.push_back(static_cast<char>(live));
+    const auto [entry, fresh] = known.try_emplace(std::move(key), static_cast<std::int32_t>(patterns.size()));
+    if (fresh) {
+      LatticePattern& pattern = patterns.emplace_back();
+      pattern.mask = mask;
+      pattern.live = live;
+      pattern.irregular = irregular;
+      finish_pattern(pattern, live_mask, weight);
+    }
+    chunk.pattern = entry->second;
+    singular += static_cast<std::size_t>(__builtin_popcount(patterns[static_cast<std::size_t>(entry->second)].singular));
+  }
+}
+
+std::size_t LatticeFamilies::bytes() const noexcept {
+  return chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
+         patterns.size() * (sizeof(LatticePattern) + offsets.size());
+}
+
+}  // namespace perikit

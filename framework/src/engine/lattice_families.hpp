@@ -1,0 +1,98 @@
+#pragma once
+/// Families on a lattice: one list of offsets for all, and patterns (bond masks and what follows from them) only for chunks of
+/// eight points that are not whole. Chunks with the same masks share one pattern.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "blocks.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/body/influence.hpp"
+#include "perikit/model/kinematics.hpp"
+
+namespace perikit {
+
+inline constexpr int chunk_points = static_cast<int>(padding);
+
+struct LatticePattern {
+  std::vector<std::uint8_t> mask;              ///< [slot]: bit l: the bond of lane l is intact
+  alignas(64) double inverse[6][chunk_points]; ///< of K = sum omega d (x) d over intact bonds, d in cells; 0 where singular
+  alignas(64) double moment[3][chunk_points];  ///< sum omega d over intact bonds
+  alignas(64) double weight[chunk_points];     ///< W_i = V_i (1 - D_i) of the point shape
+  alignas(64) double scale[chunk_points];      ///< V_i / N_i of the bond weights, N_i over the intact family
+  alignas(64) double damage[chunk_points];     ///< D_i
+  alignas(64) double condition[chunk_points];  ///< of K
+  std::uint8_t live = 0xff;
+  std::uint8_t irregular = 0;                  ///< lanes with broken bonds
+  std::uint8_t singular = 0;                   ///< live lanes without a regular K
+};
+
+struct LatticeChunk {
+  std::int32_t first;                          ///< internal index, a multiple of chunk_points
+  std::int32_t pattern;                        ///< -1: whole
+};
+
+/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence.
+struct LatticeRow {
+  std::int32_t first;
+  std::int32_t chunks;
+  std::int32_t k1, k2;
+};
+
+struct LatticeBlock {
+  std::size_t chunk_begin, chunk_end;          ///< into chunks
+  std::size_t row_begin, row_end;              ///< into rows
+};
+
+/// Rows of offsets (d1, d2) with |d0| <= reach and their weights by |d0|: the first of each mirrored pair.
+struct RowPair {
+  std::int64_t shift;
+  int d1, d2, reach;
+  int profile;                                 ///< rows with the same d1^2 + d2^2 share their weights
+};
+
+struct RowProfile {
+  int reach;
+  std::vector<double> omega;                   ///< by |d0|, 0 ... reach
+  std::vector<double> omega_d0;                ///< omega times |d0|
+};
+
+class LatticeFamilies {
+ public:
+  LatticeFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight);
+
+  const Body& body;
+  const Lattice& lattice;
+  double spacing, volume;
+  std::vector<std::array<int, 3>> offsets;     ///< by slot; the second half mirrors the first
+  std::vector<std::int64_t> shifts;            ///< by slot
+  std::vector<double> omega;                   ///< by slot
+  std::size_t half = 0;                        ///< slots of one of each pair
+  std::vector<RowPair> row_pairs;              ///< without the row (0, 0)
+  std::vector<RowProfile> profiles;
+  int own_row = -1;                            ///< profile of the row (0, 0); -1: no bond lies in it
+  int row_reach = 0;                           ///< largest |d0|
+  LatticePattern whole;
+  std::vector<LatticePattern> patterns;
+  std::vector<LatticeChunk> chunks;            ///< live ones, block by block, along rows
+  std::vector<LatticeRow> rows;
+  std::vector<LatticeBlock> blocks;
+  Colouring colouring;
+  std::size_t bonds = 0, broken = 0, singular = 0;
+
+  const LatticePattern& pattern(const LatticeChunk& chunk) const noexcept {
+    return chunk.pattern < 0 ? whole : patterns[static_cast<std::size_t>(chunk.pattern)];
+  }
+  /// Intact bonds of lane l by slot.
+  static bool intact(const LatticePattern& p, std::size_t slot, int lane) noexcept { return p.mask[slot] >> lane & 1; }
+  std::size_t bytes() const noexcept;
+
+ private:
+  void collect_rows();
+  void make_blocks();
+  void make_patterns(BondWeight weight);
+  void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, BondWeight weight) const;
+};
+
+}  // namespace perikit

@@ -1,0 +1,268 @@
+#pragma once
+/// Point gradient (order 1) and its adjoint, the divergence, on a lattice. Neighbours along a row are contiguous: packs of
+/// points are processed at once, and offsets +d, -d together, so that the owner's own value cancels in whole families.
+///
+///   S_i  = sum_s omega_s (u_{i+s} - u_i) (x) d_s          H_i = S_i K_i^-1 / spacing
+///   f_k  = sum_s omega_s Q_{k+s} d_s + Q_k m_k            Q_i = W_i P_i K_i^-1 / spacing,  m_k = sum_s omega_s d_s
+///
+/// (s runs over intact bonds; dead cells hold u = 0 and Q = 0, so that free surfaces need no masks but the first moment m.)
+
+#include "lattice_families.hpp"
+#include "perikit/core/simd.hpp"
+#include "shape_tensor.hpp"
+
+namespace perikit {
+
+template <int D>
+class LatticeOperator {
+ public:
+  explicit LatticeOperator(const LatticeFamilies& families) : f_(families) {}
+
+  /// H of `count` chunks that follow each other from chunk c on: H[(a * D + b) * stride + lane], lanes from 0.
+  void gradient(const LatticeChunk* chunks, int count, ConstFieldView u, double* H, std::size_t stride) const noexcept {
+    for (int c = 0; c < count;) {
+      if (count - c >= 4) {
+        run<4>(chunks + c, u, H + c * chunk_points, stride);
+        c += 4;
+      } else if (count - c >= 2) {
+        run<2>(chunks + c, u, H + c * chunk_points, stride);
+        c += 2;
+      } else {
+        run<1>(chunks + c, u, H + c * chunk_points, stride);
+        c += 1;
+      }
+    }
+  }
+
+  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at p = chunk.first + lane. Also f = Q m.
+  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, FieldView f) const noexcept {
+    const LatticePattern& pattern = f_.pattern(chunk);
+    const Pack scale(1.0 / f_.spacing);
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack inverse[6];
+      for (int k = 0; k < symmetric_components(D); ++k) inverse[k] = Pack::load(pattern.inverse[k] + l) * scale;
+      for (int c = 0; c < D; ++c) {
+        Pack s[D];
+        for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + e) * s_stride + l);
+        Pack own(0.0);
+        for (int e = 0; e < D; ++e) {
+          Pack q(0.0);
+          for (int k = 0; k < D; ++k) q += s[k] * inverse[symmetric_index(D, k, e)];
+          q.store(Q.component(c * D + e) + chunk.first + l);
+          own += q * Pack::load(pattern.moment[e] + l);
+        }
+        if (chunk.pattern >= 0) (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
+      }
+    }
+  }
+
+  /// f += div Q for the target rows that the sources in `row` reach; sources are read along the row at will.
+  void divergence(const LatticeRow& row, ConstFieldView Q, FieldView f) const noexcept {
+    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter(row, p, Q, f);
+  }
+
+  /// Takes the broken bonds of irregular lanes back out of the divergence.
+  void remove_broken(const LatticeChunk& chunk, ConstFieldView Q, FieldView f) const noexcept {
+    const LatticePattern& pattern = f_.pattern(chunk);
+    for (int l = 0; l < chunk_points; ++l) {
+      if (!(pattern.irregular >> l & 1)) continue;
+      const std::int64_t p = chunk.first + l;
+      for (std::size_t s = 0; s < f_.offsets.size(); ++s) {
+        if (LatticeFamilies::intact(pattern, s, l)) continue;   // dead ends hold Q = 0
+        for (int c = 0; c < D; ++c)
+          for (int e = 0; e < D; ++e) {
+            f.component(c)[p] -= f_.omega[s] * f_.offsets[s][static_cast<std::size_t>(e)] * Q.component(c * D + e)[p + f_.shifts[s]];
+          }
+      }
+    }
+  }
+
+ private:
+  template <int chunks_at_once>
+  void run(const LatticeChunk* chunks, ConstFieldView u, double* H, std::size_t stride) const noexcept {
+    constexpr int V = chunks_at_once * chunk_points / pack_width;
+    const std::int64_t p = chunks[0].first;
+    const Pack scale(1.0 / f_.spacing);
+    for (int c = 0; c < D; ++c) {
+      const double* base = u.component(c) + p;
+      Pack s[3][V];
+      if (f_.own_row >= 0) {
+        const RowProfile& profile = f_.profiles[static_cast<std::size_t>(f_.own_row)];
+        for (int k = 1; k <= profile.reach; ++k) {
+          const Pack w(profile.omega_d0[static_cast<std::size_t>(k)]);
+          for (int v = 0; v < V; ++v) s[0][v] += w * (Pack::load(base + v * pack_width + k) - Pack::load(base + v * pack_width - k));
+        }
+      }
+      if constexpr (D > 1) {
+        for (const RowPair& row : f_.row_pairs) {
+          Pack total[V];
+          const RowProfile& profile = f_.profiles[static_cast<std::size_t>(row.profile)];
+          const double* w = profile.omega.data();
+          const double* wk = profile.omega_d0.data();
+          switch (profile.reach) {
+            case 0: row_sums<V, 0>(base, row.shift, 0, w, wk, s[0], total); break;
+            case 1: row_sums<V, 1>(base, row.shift, 1, w, wk, s[0], total); break;
+            case 2: row_sums<V, 2>(base, row.shift, 2, w, wk, s[0], total); break;
+            default: row_sums<V, -1>(base, row.shift, profile.reach, w, wk, s[0], total);
+          }
+          for (int v = 0; v < V; ++v) {
+            s[1][v] += Pack(row.d1) * total[v];
+            if constexpr (D > 2) s[2][v] += Pack(row.d2) * total[v];
+          }
+        }
+      }
+      for (int v = 0; v < V; ++v) {
+        const int lane = v * pack_width % chunk_points;
+        const LatticeChunk& chunk = chunks[v * pack_width / chunk_points];
+        const LatticePattern& pattern = f_.pattern(chunk);
+        if (chunk.pattern >= 0) {
+          const Pack own = Pack::load(base + v * pack_width);
+          for (int e = 0; e < D; ++e) s[e][v] -= own * Pack::load(pattern.moment[e] + lane);
+          if (pattern.irregular) replace_irregular(chunk, pattern, lane, u.component(c), s, v);
+        }
+        for (int e = 0; e < D; ++e) {
+          Pack h(0.0);
+          for (int k = 0; k < D; ++k) h += s[k][v] * Pack::load(pattern.inverse[symmetric_index(D, k, e)] + lane);
+          (h * scale).store(H + static_cast<std::size_t>(c * D + e) * stride + v * pack_width);
+        }
+      }
+    }
+  }
+
+  /// Sums over one mirrored pair of rows: along += sum omega d0 (u+ - u-), total = sum omega (u+ - u-).
+  template <int V, int fixed_reach>
+  static void row_sums(const double* base, std::int64_t shift, int reach, const double* w, const double* wk, Pack* along, Pack* total) noexcept {
+    const double* plus = base + shift;
+    const double* minus = base - shift;
+    for (int v = 0; v < V; ++v) total[v] = Pack(w[0]) * (Pack::load(plus + v * pack_width) - Pack::load(minus + v * pack_width));
+    const int last = fixed_reach >= 0 ? fixed_reach : reach;
+    for (int k = 1; k <= last; ++k) {
+      const Pack omega(w[k]), omega_k(wk[k]);
+      for (int v = 0; v < V; ++v) {
+        const Pack ahead = Pack::load(plus + v * pack_width + k) - Pack::load(minus + v * pack_width - k);
+        const Pack behind = Pack::load(plus + v * pack_width - k) - Pack::load(minus + v * pack_width + k);
+        along[v] += omega_k * (ahead - behind);
+        total[v] += omega * (ahead + behind);
+      }
+    }
+  }
+
+  /// Lanes with broken bonds: the sum over their intact bonds, one by one.
+  template <int V>
+  void replace_irregular(const LatticeChunk& chunk, const LatticePattern& pattern, int lane, const double* u, Pack (&s)[3][V], int v) const noexcept {
+    for (int l = lane; l < lane + pack_width; ++l) {
+      if (!(pattern.irregular >> l & 1)) continue;
+      const std::int64_t p = chunk.first + l;
+      double direct[3] = {};
+      for (std::size_t k = 0; k < f_.offsets.size(); ++k) {
+        if (!LatticeFamilies::intact(pattern, k, l)) continue;
+        const double w = f_.omega[k] * (u[p + f_.shifts[k]] - u[p]);
+        for (int e = 0; e < D; ++e) direct[e] += w * f_.offsets[k][static_cast<std::size_t>(e)];
+      }
+      for (int e = 0; e < D; ++e) s[e][v].v[l - lane] = direct[e];
+    }
+  }
+
+  void scatter(const LatticeRow& row, std::int64_t p, ConstFieldView Q, FieldView f) const noexcept {
+    // Sums and differences of mirrored neighbours along the row, used by every profile.
+    constexpr int most = 16;
+    if (f_.row_reach > most) {
+      scatter_far(row, p, Q, f);
+      return;
+    }
+    Pack difference[most + 1][D], sum1[most + 1][D], sum2[most + 1][D];
+    for (int c = 0; c < D; ++c) {
+      const double* q0 = Q.component(c * D) + p;
+      for (int k = 1; k <= f_.row_reach; ++k) difference[k][c] = Pack::load(q0 + k) - Pack::load(q0 - k);
+      if constexpr (D > 1) {
+        const double* q1 = Q.component(c * D + 1) + p;
+        sum1[0][c] = Pack::load(q1);
+        for (int k = 1; k <= f_.row_reach; ++k) sum1[k][c] = Pack::load(q1 + k) + Pack::load(q1 - k);
+      }
+      if constexpr (D > 2) {
+        const double* q2 = Q.component(c * D + 2) + p;
+        sum2[0][c] = Pack::load(q2);
+        for (int k = 1; k <= f_.row_reach; ++k) sum2[k][c] = Pack::load(q2 + k) + Pack::load(q2 - k);
+      }
+    }
+    if (f_.own_row >= 0) {
+      const RowProfile& profile = f_.profiles[static_cast<std::size_t>(f_.own_row)];
+      for (int c = 0; c < D; ++c) {
+        Pack a = Pack::load(f.component(c) + p);
+        for (int k = 1; k <= profile.reach; ++k) a += Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * difference[k][c];
+        a.store(f.component(c) + p);
+      }
+    }
+    if constexpr (D > 1) {
+      int current = -1;
+      Pack a[D], b[D], g[D];
+      for (const RowPair& pair : f_.row_pairs) {
+        if (pair.profile != current) {
+          current = pair.profile;
+          const RowProfile& profile = f_.profiles[static_cast<std::size_t>(current)];
+          const double* w = profile.omega.data();
+          const double* wk = profile.omega_d0.data();
+          for (int c = 0; c < D; ++c) {
+            a[c] = Pack(0.0);
+            b[c] = Pack(w[0]) * sum1[0][c];
+            if constexpr (D > 2) g[c] = Pack(w[0]) * sum2[0][c];
+          }
+          for (int k = 1; k <= profile.reach; ++k) {
+            for (int c = 0; c < D; ++c) {
+              a[c] += Pack(wk[k]) * difference[k][c];
+              b[c] += Pack(w[k]) * sum1[k][c];
+              if constexpr (D > 2) g[c] += Pack(w[k]) * sum2[k][c];
+            }
+          }
+        }
+        const bool below = inside(row.k1 - pair.d1, row.k2 - pair.d2), above = inside(row.k1 + pair.d1, row.k2 + pair.d2);
+        for (int c = 0; c < D; ++c) {
+          Pack across = Pack(pair.d1) * b[c];
+          if constexpr (D > 2) across += Pack(pair.d2) * g[c];
+          double* target = f.component(c) + p;
+          if (below) (Pack::load(target - pair.shift) + (a[c] + across)).store(target - pair.shift);
+          if (above) (Pack::load(target + pair.shift) + (a[c] - across)).store(target + pair.shift);
+        }
+      }
+    }
+  }
+
+  /// Horizons of many cells: no buffers.
+  void scatter_far(const LatticeRow& row, std::int64_t p, ConstFieldView Q, FieldView f) const noexcept {
+    const auto sums = [&](int profile_index, int c, Pack (&out)[3]) {
+      const RowProfile& profile = f_.profiles[static_cast<std::size_t>(profile_index)];
+      for (int e = 0; e < D; ++e) {
+        const double* q = Q.component(c * D + e) + p;
+        out[e] = e == 0 ? Pack(0.0) : Pack(profile.omega[0]) * Pack::load(q);
+        for (int k = 1; k <= profile.reach; ++k) {
+          out[e] += e == 0 ? Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * (Pack::load(q + k) - Pack::load(q - k))
+                           : Pack(profile.omega[static_cast<std::size_t>(k)]) * (Pack::load(q + k) + Pack::load(q - k));
+        }
+      }
+    };
+    for (int c = 0; c < D; ++c) {
+      Pack s[3];
+      double* target = f.component(c) + p;
+      if (f_.own_row >= 0) {
+        sums(f_.own_row, c, s);
+        (Pack::load(target) + s[0]).store(target);
+      }
+      int current = -1;
+      for (const RowPair& pair : f_.row_pairs) {
+        if (pair.profile != current) sums(current = pair.profile, c, s);
+        Pack across = D > 1 ? Pack(pair.d1) * s[1] : Pack(0.0);
+        if (D > 2) across += Pack(pair.d2) * s[2];
+        if (inside(row.k1 - pair.d1, row.k2 - pair.d2)) (Pack::load(target - pair.shift) + (s[0] + across)).store(target - pair.shift);
+        if (inside(row.k1 + pair.d1, row.k2 + pair.d2)) (Pack::load(target + pair.shift) + (s[0] - across)).store(target + pair.shift);
+      }
+    }
+  }
+
+  bool inside(std::int64_t k1, std::int64_t k2) const noexcept {
+    return k1 >= 0 && k1 < f_.lattice.extent[1] && k2 >= 0 && k2 < f_.lattice.extent[2];
+  }
+
+  const LatticeFamilies& f_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,418 @@
+#include "lattice_model.hpp"
+#include "samples.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace perikit {
+
+namespace {
+
+/// Slots of a bond batch: batch_points lanes, chunk_points of them a slot.
+constexpr int slots_at_once = batch_points / chunk_points;
+
+/// Lanes of a chunk whose bond at a slot exists, as factors.
+struct LaneFactors {
+  alignas(64) double value[256][chunk_points];
+  LaneFactors() {
+    for (int m = 0; m < 256; ++m)
+      for (int l = 0; l < chunk_points; ++l) value[m][l] = (m >> l & 1) ? 1.0 : 0.0;
+  }
+};
+const LaneFactors& lane_factors() {
+  static const LaneFactors factors;
+  return factors;
+}
+
+}  // namespace
+
+template <int D>
+LatticeModel<D>::LatticeModel(const ModelParts& parts)
+    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && skip_),
+      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
+  const auto alive = body_.alive_bits();
+  for (const LatticeRow& row : families_.rows)
+    for (int c = 0; c < row.chunks; ++c) {
+      const std::int32_t first = row.first + c * chunk_points;
+      const std::uint8_t live = alive[static_cast<std::size_t>(first / chunk_points)];
+      if (live != 0xff) partly_dead_.emplace_back(first, live);
+    }
+  if (traits_.at != EvaluationPoints::bonds) return;
+  gradient_ = body_.make_field(D * D);
+  scale_ = body_.make_field(1);
+  for (const LatticeChunk& chunk : families_.chunks) {
+    std::memcpy(scale_.data() + chunk.first, families_.pattern(chunk).scale, sizeof families_.whole.scale);
+  }
+  // Bonds of whole families: one vector per slot, from one call on the whole family.
+  const std::size_t slots = families_.offsets.size(), size = padded(slots);
+  std::vector<double> length(size, 1.0), volume(size, 0.0), omega(size, 0.0), g(size * D);
+  for (int c = 0; c < D; ++c) slot_xi_[c].assign(size, 1.0);
+  for (std::size_t s = 0; s < slots; ++s) {
+    double r2 = 0;
+    for (int c = 0; c < D; ++c) {
+      slot_xi_[c][s] = families_.offsets[s][static_cast<std::size_t>(c)] * families_.spacing;
+      r2 += slot_xi_[c][s] * slot_xi_[c][s];
+    }
+    length[s] = std::sqrt(r2);
+    volume[s] = families_.volume;
+    omega[s] = families_.omega[s];
+    slot_weight_.push_back(families_.volume * (traits_.weight == BondWeight::kernel ? omega[s] : 1.0));
+  }
+  FamilyView view{D, static_cast<int>(slots), body_.horizon(), {slot_xi_[0].data(), slot_xi_[1].data(), slot_xi_[2].data()},
+                  length.data(), volume.data(), omega.data(), nullptr, 0};
+  double inverse[6];
+  for (int k = 0; k < symmetric_components(D); ++k) {
+    inverse[k] = families_.whole.inverse[k][0] / (families_.spacing * families_.spacing * families_.volume);
+  }
+  view.inverse_shape = inverse;
+  kinematics_->correction(view, g.data(), size);
+  for (int c = 0; c < D; ++c) slot_g_[c].assign(g.begin() + static_cast<std::ptrdiff_t>(c * size), g.begin() + static_cast<std::ptrdiff_t>((c + 1) * size));
+}
+
+template <int D>
+void LatticeModel<D>::zero_rows(const LatticeBlock& block, FieldView out) const noexcept {
+  for (std::size_t r = block.row_begin; r < block.row_end; ++r) {
+    const LatticeRow& row = families_.rows[r];
+    for (int c = 0; c < out.components; ++c) {
+      std::memset(out.component(c) + row.first, 0, sizeof(double) * static_cast<std::size_t>(row.chunks) * chunk_points);
+    }
+  }
+}
+
+/// Length of the run of adjacent chunks that starts at c, at most `most`.
+static int run_length(const std::vector<LatticeChunk>& chunks, std::size_t c, std::size_t end, int most) noexcept {
+  int n = 1;
+  while (n < most && c + static_cast<std::size_t>(n) < end && chunks[c + static_cast<std::size_t>(n)].first == chunks[c].first + n * chunk_points) ++n;
+  return n;
+}
+
+template <int D>
+void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = families_.blocks[b];
+  BatchScratch& s = scratch_.mine();
+  const bool sample = pass.work.work() == Work::sample;
+  if (!sample) zero_rows(block, pass.out);
+  double energy = 0;
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
+    // Several short runs share one batch.
+    int lanes = 0;
+    const std::size_t first = c;
+    while (c < block.chunk_end && lanes < batch_points) {
+      const int n = run_length(families_.chunks, c, block.chunk_end, slots_at_once - lanes / chunk_points);
+      operator_.gradient(&families_.chunks[c], n, pass.u, s.H + lanes, batch_points);
+      if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, s.dH + lanes, batch_points);
+      c += static_cast<std::size_t>(n);
+      lanes += n * chunk_points;
+    }
+    for (std::size_t i = first; i < c; ++i) {
+      const LatticeChunk& chunk = families_.chunks[i];
+      const int lane = static_cast<int>(i - first) * chunk_points;
+      std::memcpy(s.weight + lane, families_.pattern(chunk).weight, sizeof families_.whole.weight);
+      if (!laws_.single() || sample) {
+        for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk.first + l;
+      }
+    }
+    const int bad = pass.work.evaluate(lanes, s, false, &energy);
+    if (bad >= 0) {
+      pass.report(families_.chunks[first + static_cast<std::size_t>(bad / chunk_points)].first + bad % chunk_points);
+      return;
+    }
+    if (sample) {
+      // The average over one evaluation point is its value, whatever its weight.
+      for (int l = 0; l < lanes; ++l) {
+        const LatticePattern& pattern = families_.pattern(families_.chunks[first + static_cast<std::size_t>(l / chunk_points)]);
+        if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
+      }
+      pass.work.add_samples(lanes, s, *pass.sums);
+      continue;
+    }
+    for (std::size_t i = first; i < c; ++i) {
+      operator_.stress_to_flux(families_.chunks[i], s.P + static_cast<int>(i - first) * chunk_points, batch_points, flux_, pass.out);
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = families_.blocks[b];
+  if (pass.work.work() != Work::sample) {
+    zero_rows(block, pass.out);
+    zero_rows(block, flux_);
+  }
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
+    const int n = run_length(families_.chunks, c, block.chunk_end, 4);
+    const std::int64_t p = families_.chunks[c].first;
+    operator_.gradient(&families_.chunks[c], n, pass.u, gradient_.data() + p, gradient_.stride());
+    if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, direction_.data() + p, direction_.stride());
+    c += static_cast<std::size_t>(n);
+  }
+}
+
+template <int D>
+void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const {
+  if (chunk.pattern < 0 || traits_.g_from_xi_only) {
+    vectors.per_slot = true;
+    for (int c = 0; c < D; ++c) {
+      vectors.xi[c] = slot_xi_[c].data() + slot;
+      vectors.g[c] = slot_g_[c].data() + slot;
+    }
+    return;
+  }
+  // The correction depends on the family: ask for each lane.
+  const LatticePattern& pattern = families_.pattern(chunk);
+  double* xi = s.bond[0];
+  double* g = s.bond[1];
+  double* length = s.bond[2];
+  double* omega = s.bond[2] + batch_points;
+  double* volume = s.bond[2] + 2 * batch_points;
+  alignas(64) double inverse[6 * batch_points];
+  const int lanes = slots * chunk_points;
+  for (int l = 0; l < lanes; ++l) {
+    const std::size_t k = slot + static_cast<std::size_t>(l / chunk_points);
+    double r2 = 0;
+    for (int c = 0; c < D; ++c) {
+      xi[c * batch_points + l] = slot_xi_[c][k];
+      r2 += slot_xi_[c][k] * slot_xi_[c][k];
+    }
+    length[l] = std::sqrt(r2);
+    const bool intact = LatticeFamilies::intact(pattern, k, l % chunk_points);
+    omega[l] = intact ? families_.omega[k] : 0.0;
+    volume[l] = intact ? families_.volume : 0.0;
+    for (int e = 0; e < symmetric_components(D); ++e) {
+      inverse[e * batch_points + l] = pattern.inverse[e][l % chunk_points] / (families_.spacing * families_.spacing * families_.volume);
+    }
+  }
+  const FamilyView view{D, lanes, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, inverse, batch_points};
+  kinematics_->correction(view, g, batch_points);
+  vectors.per_slot = false;
+  for (int c = 0; c < D; ++c) {
+    vectors.xi[c] = xi + c * batch_points;
+    vectors.g[c] = g + c * batch_points;
+  }
+}
+
+template <int D>
+int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy) {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  const LaneFactors& factors = lane_factors();
+  const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const std::int64_t p = chunk.first;
+  const auto gather = [&](ConstFieldView u, ConstFieldView H, double* du, double* A) {
+    for (int k = 0; k < slots; ++k) {
+      const std::int64_t shift = families_.shifts[slot + static_cast<std::size_t>(k)];
+      for (int l = 0; l < chunk_points; l += pack_width) {
+        const int lane = k * chunk_points + l;
+        for (int c = 0; c < D; ++c) {
+          (Pack::load(u.component(c) + p + shift + l) - Pack::load(u.component(c) + p + l)).store(du + c * batch_points + lane);
+        }
+        for (int c = 0; c < D * D; ++c) {
+          const Pack own = Pack::load(H.component(c) + p + l);
+          (mean ? Pack(0.5) * (own + Pack::load(H.component(c) + p + shift + l)) : own).store(A + c * batch_points + lane);
+        }
+      }
+    }
+  };
+  gather(pass.u, gradient_, s.du, s.A);
+  if (tangent) gather(pass.w, direction_, s.dw, s.dA);
+  BondVectors vectors;
+  bond_vectors(chunk, slot, slots, s, vectors);
+  const int lanes = slots * chunk_points;
+  if (vectors.per_slot) {
+    bond_gradient<D, true>(lanes, vectors, s.A, s.du, s.H);
+    if (tangent) bond_gradient<D, true>(lanes, vectors, s.dA, s.dw, s.dH);
+  } else {
+    bond_gradient<D, false>(lanes, vectors, s.A, s.du, s.H);
+    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, s.dH);
+  }
+  for (int k = 0; k < slots; ++k) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    const std::int64_t shift = families_.shifts[at];
+    const std::uint8_t mask = pattern.mask[at];
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      const int lane = k * chunk_points + l;
+      const Pack exists = Pack::load(factors.value[mask] + l) * Pack(slot_weight_[at]);
+      (exists * Pack::load(pattern.scale + l)).store(s.weight + lane);
+      if (pairs_ && !sample) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
+      if (mask == 0xff) continue;
+      const Pack keep = Pack::load(factors.value[mask] + l);
+      for (int c = 0; c < D * D; ++c) {
+        (keep * Pack::load(s.H + c * batch_points + lane)).store(s.H + c * batch_points + lane);
+        if (tangent) (keep * Pack::load(s.dH + c * batch_points + lane)).store(s.dH + c * batch_points + lane);
+      }
+    }
+    if (!laws_.single() || sample) {
+      for (int l = 0; l < chunk_points; ++l) {
+        s.owner[k * chunk_points + l] = chunk.first + l;
+        s.far[k * chunk_points + l] = static_cast<std::int32_t>((mask >> l & 1) ? p + shift + l : p + l);
+      }
+    }
+  }
+  const int bad = pass.work.evaluate(lanes, s, pairs_ && !sample, energy);
+  if (bad >= 0) return bad;
+  if (sample) {
+    pass.work.add_samples(lanes, s, *pass.sums);
+    return -1;
+  }
+  if (vectors.per_slot) bond_adjoint<D, true>(lanes, vectors, s.P, s.t, s.P);
+  else bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
+  // Far ends: scattered slot by slot. Own ends: summed in registers.
+  const Pack share(mean ? 0.5 : 1.0);
+  for (int l = 0; l < chunk_points; l += pack_width) {
+    for (int c = 0; c < D; ++c) {
+      Pack own(0.0);
+      for (int k = 0; k < slots; ++k) {
+        const Pack t = Pack::load(s.t + c * batch_points + k * chunk_points + l);
+        own += t;
+        double* far = pass.out.component(c) + p + families_.shifts[slot + static_cast<std::size_t>(k)] + l;
+        (Pack::load(far) - t).store(far);
+      }
+      double* mine = pass.out.component(c) + p + l;
+      (Pack::load(mine) + own).store(mine);
+    }
+    for (int c = 0; c < D * D; ++c) {
+      Pack own(0.0);
+      for (int k = 0; k < slots; ++k) {
+        const Pack stress = share * Pack::load(s.P + c * batch_points + k * chunk_points + l);
+        own += stress;
+        if (mean) {
+          double* far = flux_.component(c) + p + families_.shifts[slot + static_cast<std::size_t>(k)] + l;
+          (Pack::load(far) + stress).store(far);
+        }
+      }
+      double* mine = flux_.component(c) + p + l;
+      (Pack::load(mine) + own).store(mine);
+    }
+  }
+  return -1;
+}
+
+template <int D>
+void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = families_.blocks[b];
+  BatchScratch& s = scratch_.mine();
+  const std::size_t slots = pairs_ && pass.work.work() != Work::sample ? families_.half : families_.offsets.size();
+  double energy = 0;
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+    const LatticeChunk& chunk = families_.chunks[c];
+    for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
+      const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
+      const int bad = bonds_of_chunk(chunk, slot, n, s, pass, &energy);
+      if (bad >= 0) {
+        pass.report(chunk.first + bad % chunk_points);
+        return;
+      }
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void LatticeModel<D>::clean(FieldView out) const noexcept {
+  for (const auto& [first, live] : partly_dead_)
+    for (int c = 0; c < out.components; ++c)
+      for (int l = 0; l < chunk_points; ++l)
+        if (!(live >> l & 1)) out.component(c)[first + l] = 0.0;
+}
+
+template <int D>
+EvaluationStatus LatticeModel<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  const std::size_t blocks = families_.blocks.size();
+  const bool sample = pass.work.work() == Work::sample;
+  if (traits_.at == EvaluationPoints::points) {
+    parallel_for(blocks, [&](std::size_t b) { points_block(b, pass); });
+  } else {
+    parallel_for(blocks, [&](std::size_t b) { gradient_block(b, pass); });
+    if (sample) {
+      parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
+    } else {
+      families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
+      parallel_for(blocks, [&](std::size_t b) {
+        for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
+          const LatticeChunk& chunk = families_.chunks[c];
+          operator_.stress_to_flux(chunk, flux_.data() + chunk.first, flux_.stride(), flux_, pass.out);
+        }
+      });
+    }
+  }
+  if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
+  families_.colouring.for_each([&](std::size_t b) {
+    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
+  });
+  if (families_.broken > 0) {
+    parallel_for(blocks, [&](std::size_t b) {
+      for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
+        const LatticeChunk& chunk = families_.chunks[c];
+        if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
+      }
+    });
+  }
+  clean(pass.out);
+  return {};
+}
+
+template <int D>
+EvaluationStatus LatticeModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
+  return run_forces(laws_, families_.blocks.size(), u, force, energy, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+EvaluationStatus LatticeModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  if (traits_.at == EvaluationPoints::bonds && direction_.size() == 0) direction_ = body_.make_field(D * D);
+  const BatchWork work(laws_, Work::tangent, false);
+  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
+  return run(pass);
+}
+
+template <int D>
+EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples) {
+  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+Field LatticeModel<D>::shape_tensor_condition() {
+  Field out = body_.make_field(1);
+  for (const LatticeChunk& chunk : families_.chunks) std::copy_n(families_.pattern(chunk).condition, chunk_points, out.data() + chunk.first);
+  return out;
+}
+
+template <int D>
+Field LatticeModel<D>::damage() {
+  Field out = body_.make_field(1);
+  for (const LatticeChunk& chunk : families_.chunks) std::copy_n(families_.pattern(chunk).damage, chunk_points, out.data() + chunk.first);
+  return out;
+}
+
+template <int D>
+ModelReport LatticeModel<D>::report() const {
+  ModelReport report;
+  report.bonds = families_.bonds;
+  report.broken_bonds = families_.broken;
+  report.singular_families = families_.singular;
+  report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes();
+  const bool bonds = traits_.at == EvaluationPoints::bonds;
+  report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
+  const double per_bond = static_cast<double>(families_.bonds);
+  report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
+                          fmt::format("{:.3g} MB", per_bond * (4 + 8 * (D + 1)) / 1e6)});
+  std::size_t whole = 0;
+  for (const LatticeChunk& chunk : families_.chunks) whole += chunk.pattern < 0;
+  report.skips.push_back({"shape tensors of whole families", fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, families_.chunks.size(), families_.patterns.size()),
+                          fmt::format("{:.3g} MB", (static_cast<double>(families_.chunks.size()) - static_cast<double>(families_.patterns.size())) * sizeof(LatticePattern) / 1e6)});
+  if (pairs_) {
+    report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", families_.bonds / 2, families_.bonds)});
+  }
+  if (D < 3) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", D), fmt::format("{} of 9 gradient components", 9 - D * D)});
+  return report;
+}
+
+template class LatticeModel<1>;
+template class LatticeModel<2>;
+template class LatticeModel<3>;
+
+}  // namespace perikit

@@ -1,0 +1,55 @@
+#pragma once
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "batch.hpp"
+#include "bond_kernel.hpp"
+#include "lattice_families.hpp"
+#include "lattice_kernels.hpp"
+#include "perikit/engine/model.hpp"
+
+namespace perikit {
+
+/// Any point or bond kinematics on a lattice. One evaluation runs through fixed blocks:
+///   points: gradient -> law -> flux                              | divergence
+///   bonds:  gradient of points | bonds by colour: law, scatter   | flux | divergence
+template <int D>
+class LatticeModel final : public Model {
+ public:
+  explicit LatticeModel(const ModelParts& parts);
+
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) override;
+  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus sample(ConstFieldView u, PointSamples& samples) override;
+  Field shape_tensor_condition() override;
+  Field damage() override;
+  ModelReport report() const override;
+
+ private:
+  EvaluationStatus run(Pass& pass);
+  void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;
+  void points_block(std::size_t b, Pass& pass);
+  void gradient_block(std::size_t b, Pass& pass);
+  void bonds_block(std::size_t b, Pass& pass);
+  int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
+  void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
+  void clean(FieldView out) const noexcept;
+
+  const Body& body_;
+  const Laws& laws_;
+  std::shared_ptr<const Kinematics> kinematics_;
+  KinematicsTraits traits_;
+  bool skip_;
+  bool pairs_;                       ///< each bond evaluated once for both ends
+  LatticeFamilies families_;
+  LatticeOperator<D> operator_;
+  Field flux_;                       ///< Q; for bonds also the stress on Hbar
+  Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
+  Field scale_;                      ///< V_i / N_i of bond weights
+  std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
+  std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
+  ScratchPool scratch_;
+};
+
+}  // namespace perikit

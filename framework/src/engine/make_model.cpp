@@ -1,0 +1,26 @@
+#include "cloud_model.hpp"
+#include "lattice_model.hpp"
+#include "weighted_model.hpp"
+
+namespace perikit {
+
+namespace {
+
+template <int D>
+std::unique_ptr<Model> make(const ModelParts& parts) {
+  if (parts.kinematics->traits().at == EvaluationPoints::weighted) return std::make_unique<WeightedModel<D>>(parts);
+  if (parts.body->lattice()) return std::make_unique<LatticeModel<D>>(parts);
+  return std::make_unique<CloudModel<D>>(parts);
+}
+
+}  // namespace
+
+std::unique_ptr<Model> make_model(const ModelParts& parts) {
+  switch (parts.body->dimension()) {
+    case 1: return make<1>(parts);
+    case 2: return make<2>(parts);
+    default: return make<3>(parts);
+  }
+}
+
+}  // namespace perikit

@@ -1,0 +1,20 @@
+#pragma once
+#include <functional>
+
+#include "batch.hpp"
+#include "perikit/engine/model.hpp"
+
+namespace perikit {
+
+/// Input index and position of an internal point, for messages; ok for -1.
+EvaluationStatus status_at(const Body& body, std::int64_t bad);
+
+/// Forces and energy: the sum over blocks in their order.
+EvaluationStatus run_forces(const Laws& laws, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
+                            const std::function<EvaluationStatus(Pass&)>& run);
+
+/// Point averages with the evaluation weights; strain energy density is per point volume.
+EvaluationStatus run_samples(const Body& body, const Laws& laws, ConstFieldView u, PointSamples& samples,
+                             const std::function<EvaluationStatus(Pass&)>& run);
+
+}  // namespace perikit

@@ -1,0 +1,354 @@
+#include "weighted_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "samples.hpp"
+#include "shape_tensor.hpp"
+#include "weighted_kernel.hpp"
+
+namespace perikit {
+
+template <int D>
+WeightedModel<D>::WeightedModel(const ModelParts& parts)
+    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
+      condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
+  normaliser_.assign(body_.stride(), 0.0);
+  if (body_.lattice()) prepare_lattice(*parts.influence);
+  else prepare_cloud(*parts.influence);
+}
+
+template <int D>
+void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
+  const LatticeFamilies& f = lattice_.emplace(body_, influence, traits_.weight);
+  bonds_ = f.bonds;
+  broken_ = f.broken;
+  singular_ = f.singular;
+  const std::size_t slots = f.offsets.size();
+  // A class is a set of intact slots together with its normaliser; class 0 is the whole family.
+  std::map<std::pair<std::vector<std::uint16_t>, double>, std::int32_t> classes;
+  std::vector<std::uint16_t> all(slots);
+  for (std::size_t s = 0; s < slots; ++s) all[s] = static_cast<std::uint16_t>(s);
+  lattice_bonds_.push_back(all);
+  classes[{all, f.whole.scale[0]}] = 0;
+  std::vector<std::vector<std::int32_t>> lane_class(f.patterns.size());
+  for (std::size_t k = 0; k < f.patterns.size(); ++k) {
+    const LatticePattern& pattern = f.patterns[k];
+    for (int l = 0; l < chunk_points; ++l) {
+      if (!(pattern.live >> l & 1)) {
+        lane_class[k].push_back(-1);
+        continue;
+      }
+      std::vector<std::uint16_t> bonds;
+      for (std::size_t s = 0; s < slots; ++s)
+        if (LatticeFamilies::intact(pattern, s, l)) bonds.push_back(static_cast<std::uint16_t>(s));
+      const auto [entry, fresh] = classes.try_emplace({bonds, pattern.scale[l]}, static_cast<std::int32_t>(lattice_bonds_.size()));
+      if (fresh) lattice_bonds_.push_back(std::move(bonds));
+      lane_class[k].push_back(entry->second);
+    }
+  }
+  for (const LatticeBlock& block : f.blocks) {
+    block_first_.push_back(groups_.size());
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+      const LatticeChunk& chunk = f.chunks[c];
+      const LatticePattern& pattern = f.pattern(chunk);
+      for (int l = 0; l < chunk_points; ++l) {
+        normaliser_[static_cast<std::size_t>(chunk.first + l)] = pattern.scale[l] > 0 ? f.volume / pattern.scale[l] : 0.0;
+        condition_.data()[chunk.first + l] = pattern.condition[l];
+        damage_.data()[chunk.first + l] = pattern.damage[l];
+      }
+      if (chunk.pattern < 0) {
+        groups_.push_back({chunk.first, 0, 0, true});
+        continue;
+      }
+      for (int l = 0; l < chunk_points; ++l) {
+        const std::int32_t family = lane_class[static_cast<std::size_t>(chunk.pattern)][static_cast<std::size_t>(l)];
+        if (family >= 0) groups_.push_back({chunk.first + l, family, family, false});
+      }
+    }
+  }
+  block_first_.push_back(groups_.size());
+  // Stencils of the classes, the most common ones first, up to the cap.
+  std::vector<std::size_t> members(lattice_bonds_.size(), 0);
+  std::vector<std::int32_t> example(lattice_bonds_.size(), -1);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const auto family = static_cast<std::size_t>(groups_[g].family);
+    members[family] += groups_[g].whole ? chunk_points : 1;
+    example[family] = static_cast<std::int32_t>(g);
+  }
+  std::vector<std::int32_t> order(lattice_bonds_.size()), stored(lattice_bonds_.size(), -1);
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<std::int32_t>(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return members[static_cast<std::size_t>(a)] > members[static_cast<std::size_t>(b)]; });
+  std::size_t bytes = 0;
+  Memory m;
+  for (const std::int32_t k : order) {
+    const auto family = static_cast<std::size_t>(k);
+    if (members[family] == 0 || bytes > stencil_bytes) break;
+    Group group = groups_[static_cast<std::size_t>(example[family])];
+    group.family = -1;
+    load_family(group, m);
+    fallbacks_ += static_cast<std::size_t>(m.stencil.fallbacks) * members[family];
+    bytes += m.stencil.bytes();
+    stored[family] = static_cast<std::int32_t>(stencils_.size());
+    stencils_.push_back(m.stencil);
+  }
+  for (Group& group : groups_) group.family = stored[static_cast<std::size_t>(group.family)];
+}
+
+template <int D>
+void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
+  cloud_ = find_families(body_.rows(), body_.points(), D, body_.horizon());
+  omega_.resize(cloud_.neighbour.size());
+  std::vector<double> r, omega;
+  std::vector<std::int64_t> first(body_.points() + 1, 0);
+  std::int64_t kept = 0;
+  for (std::size_t p = 0; p < body_.points(); ++p) {
+    const Point x = body_.position(p);
+    const std::int64_t begin = cloud_.first[p], end = cloud_.first[p + 1];
+    r.clear();
+    for (std::int64_t k = begin; k < end; ++k) {
+      const Point y = body_.position(static_cast<std::size_t>(cloud_.neighbour[static_cast<std::size_t>(k)]));
+      r.push_back(std::min(1.0, std::sqrt((y[0] - x[0]) * (y[0] - x[0]) + (y[1] - x[1]) * (y[1] - x[1]) + (y[2] - x[2]) * (y[2] - x[2])) / body_.horizon()));
+    }
+    omega.resize(r.size());
+    influence.evaluate(r, omega);
+    first[p] = kept;
+    double K[6] = {}, inverse[6], whole = 0, intact = 0, normaliser = 0;
+    for (std::int64_t k = begin; k < end; ++k) {
+      const std::int32_t j = cloud_.neighbour[static_cast<std::size_t>(k)];
+      const double w = omega[static_cast<std::size_t>(k - begin)], volume = body_.volume(static_cast<std::size_t>(j));
+      const Point y = body_.position(static_cast<std::size_t>(j));
+      whole += w * volume;
+      normaliser += traits_.weight == BondWeight::kernel ? w * volume : volume;
+      if (body_.cut(x, y)) {
+        ++broken_;
+        continue;
+      }
+      intact += w * volume;
+      for (std::size_t a = 0; a < D; ++a)
+        for (std::size_t b = a; b < D; ++b) K[symmetric_index(D, static_cast<int>(a), static_cast<int>(b))] += w * volume * (y[a] - x[a]) * (y[b] - x[b]);
+      cloud_.neighbour[static_cast<std::size_t>(kept)] = j;
+      omega_[static_cast<std::size_t>(kept++)] = w;
+    }
+    if (!invert_shape<D>(K, inverse, condition_.data() + p)) ++singular_;
+    normaliser_[p] = normaliser;
+    damage_.data()[p] = whole > 0 ? 1 - intact / whole : 0.0;
+    groups_.push_back({static_cast<std::int32_t>(p), -1, -1, false});
+  }
+  first[body_.points()] = kept;
+  cloud_.first = std::move(first);
+  cloud_.neighbour.resize(static_cast<std::size_t>(kept));
+  bonds_ = static_cast<std::size_t>(kept);
+  for (std::size_t p = 0; p < body_.points(); p += cloud_block) block_first_.push_back(p);
+  block_first_.push_back(body_.points());
+  const std::size_t blocks = block_first_.size() - 1;
+  std::vector<std::vector<std::int32_t>> touches(blocks);
+  for (std::size_t b = 0; b < blocks; ++b) {
+    touches[b].push_back(static_cast<std::int32_t>(b));
+    for (std::size_t p = block_first_[b]; p < block_first_[b + 1]; ++p)
+      for (std::int64_t k = cloud_.first[p]; k < cloud_.first[p + 1]; ++k)
+        touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(cloud_.neighbour[static_cast<std::size_t>(k)]) / cloud_block));
+    std::sort(touches[b].begin(), touches[b].end());
+    touches[b].erase(std::unique(touches[b].begin(), touches[b].end()), touches[b].end());
+  }
+  cloud_colouring_ = Colouring(touches, blocks);
+}
+
+template <int D>
+void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
+  const auto p = static_cast<std::size_t>(group.first);
+  m.index.clear();
+  if (lattice_) {
+    for (const std::uint16_t s : lattice_bonds_[static_cast<std::size_t>(group.bonds)]) m.index.push_back(static_cast<std::int32_t>(group.first + lattice_->shifts[s]));
+  } else {
+    m.index.assign(cloud_.neighbour.begin() + cloud_.first[p], cloud_.neighbour.begin() + cloud_.first[p + 1]);
+  }
+  if (group.family >= 0) return;
+  m.family.resize(D, static_cast<int>(m.index.size()));
+  m.share.assign(m.family.size, 0.0);
+  const Point x = body_.position(p);
+  for (std::size_t k = 0; k < m.index.size(); ++k) {
+    double xi[3] = {};
+    double omega = 0;
+    if (lattice_) {
+      const std::uint16_t s = lattice_bonds_[static_cast<std::size_t>(group.bonds)][k];
+      for (std::size_t c = 0; c < D; ++c) xi[c] = lattice_->offsets[s][c] * lattice_->spacing;
+      omega = lattice_->omega[s];
+    } else {
+      const Point y = body_.position(static_cast<std::size_t>(m.index[k]));
+      for (std::size_t c = 0; c < D; ++c) xi[c] = y[c] - x[c];
+      omega = omega_[static_cast<std::size_t>(cloud_.first[p]) + k];
+    }
+    for (std::size_t c = 0; c < D; ++c) m.family.xi[c][k] = xi[c];
+    m.family.length[k] = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+    m.family.omega[k] = omega;
+    m.family.volume[k] = body_.volume(static_cast<std::size_t>(m.index[k]));
+    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? omega : 1.0) / normaliser_[p];
+  }
+  build_stencil(*kinematics_, traits_, m.family, body_.horizon(), m.share.data(), m.stencil, m.weights);
+  if (traits_.parts > 0) {
+    for (double& share : m.stencil.share) share *= 1 - damage_.data()[p];
+  }
+}
+
+template <int D>
+void WeightedModel<D>::gather(const Group& g, const LocalStencil& stencil, ConstFieldView u, const Memory& m, AlignedVector<double>& out) const {
+  const auto bonds = static_cast<std::size_t>(stencil.bonds);
+  out.resize(bonds * D * 8);
+  for (std::size_t k = 0; k < bonds; ++k) {
+    for (std::size_t c = 0; c < D; ++c) {
+      const double* value = u.component(static_cast<int>(c));
+      if (!g.whole) {
+        out[k * D + c] = value[m.index[k]] - value[g.first];
+        continue;
+      }
+      for (int l = 0; l < 8; l += pack_width) (Pack::load(value + m.index[k] + l) - Pack::load(value + g.first + l)).store(out.data() + (k * D + c) * 8 + static_cast<std::size_t>(l));
+    }
+  }
+}
+
+template <int D>
+void WeightedModel<D>::scatter(const Group& g, const LocalStencil& stencil, const Memory& m, FieldView out) const {
+  for (int c = 0; c < D; ++c) {
+    double* f = out.component(c);
+    for (int l = 0; l < 8; l += pack_width) {
+      Pack own(0.0);
+      double single = 0;
+      for (int k = 0; k < stencil.bonds; ++k) {
+        const double* t = m.t.data() + (k * D + c) * 8;
+        if (g.whole) {
+          const Pack v = Pack::load(t + l);
+          own += v;
+          double* far = f + m.index[static_cast<std::size_t>(k)] + l;
+          (Pack::load(far) - v).store(far);
+        } else if (l == 0) {
+          double v = 0;
+          for (int i = 0; i < 8; ++i) v += t[i];
+          single += v;
+          f[m.index[static_cast<std::size_t>(k)]] -= v;
+        }
+      }
+      if (g.whole) (Pack::load(f + g.first + l) + own).store(f + g.first + l);
+      else if (l == 0) f[g.first] += single;
+    }
+  }
+}
+
+template <int D>
+int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
+  load_family(g, m);
+  if (m.index.empty()) return -1;
+  const LocalStencil& stencil = g.family >= 0 ? stencils_[static_cast<std::size_t>(g.family)] : m.stencil;
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  gather(g, stencil, pass.u, m, m.u);
+  if (tangent) gather(g, stencil, pass.w, m, m.w);
+  m.t.assign(static_cast<std::size_t>(stencil.bonds) * D * 8, 0.0);
+  const int lanes_per_tile = g.whole ? 64 : 8, tiles_at_once = batch_points / lanes_per_tile;
+  for (int tile = 0; tile < stencil.tiles; tile += tiles_at_once) {
+    const int tiles = std::min(tiles_at_once, stencil.tiles - tile);
+    for (int i = 0; i < tiles; ++i) {
+      const int lane = i * lanes_per_tile;
+      if (g.whole) {
+        tile_gradient<D>(stencil, tile + i, m.u.data(), s.H + lane);
+        if (tangent) tile_gradient<D>(stencil, tile + i, m.w.data(), s.dH + lane);
+      } else {
+        single_gradient<D>(stencil, tile + i, m.u.data(), s.H + lane);
+        if (tangent) single_gradient<D>(stencil, tile + i, m.w.data(), s.dH + lane);
+      }
+      for (int l = 0; l < lanes_per_tile; ++l) {
+        const int q = g.whole ? l / 8 : l, point = g.whole ? l % 8 : 0;
+        s.owner[lane + l] = g.first + point;
+        s.weight[lane + l] = body_.volume(static_cast<std::size_t>(g.first)) * stencil.share[static_cast<std::size_t>((tile + i) * 8 + q)];
+      }
+    }
+    const int n = tiles * lanes_per_tile;
+    const int bad = pass.work.evaluate(n, s, false, energy);
+    if (bad >= 0) return g.whole ? bad % 8 : 0;
+    if (sample) {
+      pass.work.add_samples(n, s, *pass.sums);
+      continue;
+    }
+    for (int i = 0; i < tiles; ++i) {
+      if (g.whole) tile_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
+      else single_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
+    }
+  }
+  if (!sample) scatter(g, stencil, m, pass.out);
+  return -1;
+}
+
+template <int D>
+void WeightedModel<D>::block(std::size_t b, Pass& pass) {
+  BatchScratch& s = scratch_.mine();
+  Memory& m = *memory_[static_cast<std::size_t>(thread_index())];
+  double energy = 0;
+  for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
+    const int bad = group(groups_[g], m, s, pass, &energy);
+    if (bad >= 0) {
+      pass.report(groups_[g].first + bad);
+      return;
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+EvaluationStatus WeightedModel<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  while (memory_.size() < static_cast<std::size_t>(thread_count())) memory_.push_back(std::make_unique<Memory>());
+  if (pass.work.work() == Work::sample) {
+    parallel_for(block_first_.size() - 1, [&](std::size_t b) { block(b, pass); });
+    return status_at(body_, pass.bad);
+  }
+  for (int c = 0; c < D; ++c) std::memset(pass.out.component(c), 0, pass.out.stride * sizeof(double));
+  (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) { block(b, pass); });
+  return status_at(body_, pass.bad);
+}
+
+template <int D>
+EvaluationStatus WeightedModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
+  return run_forces(laws_, block_first_.size() - 1, u, force, energy, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+EvaluationStatus WeightedModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  const BatchWork work(laws_, Work::tangent, false);
+  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
+  return run(pass);
+}
+
+template <int D>
+EvaluationStatus WeightedModel<D>::sample(ConstFieldView u, PointSamples& samples) {
+  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+ModelReport WeightedModel<D>::report() const {
+  ModelReport report;
+  report.bonds = bonds_;
+  report.broken_bonds = broken_;
+  report.singular_families = singular_;
+  report.fallbacks = fallbacks_;
+  report.evaluation_points = traits_.parts > 0 ? body_.points() * static_cast<std::size_t>(traits_.parts) : bonds_;
+  std::size_t stencils = 0;
+  for (const LocalStencil& s : stencils_) stencils += s.bytes();
+  report.bytes = (lattice_ ? lattice_->bytes() : 0) + stencils + groups_.size() * sizeof(Group) + cloud_.neighbour.size() * 4 +
+                 cloud_.first.size() * 8 + (omega_.size() + normaliser_.size()) * 8 + condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  if (lattice_) {
+    report.skips.push_back({"stencils of equal families", fmt::format("{} stored for {} points", stencils_.size(), body_.points()),
+                            fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6,
+                                        static_cast<double>(stencils_.empty() ? 0 : stencils_.front().bytes()) * static_cast<double>(body_.points()) / 1e6)});
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", fmt::format("{:.3g} MB", static_cast<double>(bonds_) * (4 + 8 * (D + 1)) / 1e6)});
+  }
+  return report;
+}
+
+template class WeightedModel<1>;
+template class WeightedModel<2>;
+template class WeightedModel<3>;
+
+}  // namespace perikit
