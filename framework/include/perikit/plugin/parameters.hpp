@@ -129,6 +129,8 @@ class ParameterValues {
   const std::vector<std::int64_t>& integers(std::string_view key) const;
   const std::vector<std::string>& texts(std::string_view key) const;
   const std::vector<std::vector<double>>& points(std::string_view key) const;
+  /// True where the value is a text that stands for an expression (never for choices and names).
+  bool is_expression(std::string_view key) const noexcept;
   /// number or expression text; also for type component ("free" is the text "free").
   std::variant<double, std::string> expression(std::string_view key) const;
   const std::vector<std::variant<double, std::string>>& expressions(std::string_view key) const;

@@ -1,6 +1,7 @@
 #pragma once
 /// Integrators run a Problem and report to an Observer.
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -64,11 +65,9 @@ class Problem {
 
   // State. Every run variable is one of these declared fields; extra ones are added by `declare`.
   virtual FieldView displacement() noexcept = 0;
-  virtual FieldView velocity() noexcept = 0;        ///< allocated on first use
-  virtual FieldView acceleration() noexcept = 0;    ///< allocated on first use
+  virtual FieldView velocity() noexcept = 0;        ///< allocated on first use; at full steps where a sample was asked for
   virtual FieldView internal_force() noexcept = 0;  ///< [N] on each point, of the last evaluation
-  virtual FieldView external_force() noexcept = 0;  ///< [N]
-  virtual FieldView reaction() noexcept = 0;        ///< [N] that the constraints exert; allocated on first use
+  virtual FieldView external_force() noexcept = 0;  ///< [N]; allocated on first use
   /// A further run variable of the integrator that snapshots must hold.
   virtual FieldView declare(const std::string& name, int components) = 0;
   virtual double& time() noexcept = 0;
@@ -80,6 +79,8 @@ class Problem {
 
   /// Mass of each point [kg], 0 at dead points, one component. Throws InputError where a density is missing.
   virtual std::span<const double> mass() = 0;
+  /// The mass that all points share, or 0 where they differ; lets a kernel skip reading them.
+  virtual double uniform_mass() = 0;
 
   // Forces. `u` must come from make_field.
   /// internal_force <- f(u) [N]; strain energy -> *energy where wanted. time_step: of rate laws.
@@ -88,12 +89,15 @@ class Problem {
   virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// Loads at time (or load parameter) t [N].
   virtual void evaluate_loads(double t, FieldView force) = 0;
+  virtual bool any_load() const noexcept = 0;
   virtual bool loads_depend_on_time() const noexcept = 0;
   /// After a converged step: history of rate laws, damage. Returns true when bonds changed.
   virtual bool advance_history(double time_step) = 0;
 
   // Constraints.
   virtual bool any_constraint() const noexcept = 0;
+  /// Prescribed degrees of freedom as c * stride + p, ascending.
+  virtual std::span<const std::int64_t> constrained() const noexcept = 0;
   /// 1 where component c of point p is free, 0 where prescribed or dead: mask[c * stride + p].
   virtual ConstFieldView free_mask() const noexcept = 0;
   /// Overwrites prescribed components of v. Prescribed displacements give (U(t_end) - u) / (t_end - t_begin), u the current displacement.
@@ -104,7 +108,8 @@ class Problem {
   virtual void prescribe_displacement(double t, FieldView u) = 0;
 
   // Time step.
-  /// Largest eigenvalue of M^-1 K at u [1/s^2] by Lanczos iteration on the exact tangent, with a safe upper margin.
+  /// Largest eigenvalue of M^-1 K at u [1/s^2]: Lanczos iteration on the exact tangent, plus its residual bound. Later calls start
+  /// from the last eigenvector.
   virtual double largest_eigenvalue(ConstFieldView u) = 0;
   /// The bond-based estimate P 3.58 of the stable step [s], for comparison.
   virtual double bond_based_time_step() const = 0;

@@ -1,0 +1,116 @@
+#pragma once
+/// The Problem of one body: model, loads, constraints and state.
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "perikit/engine/model.hpp"
+#include "perikit/problem/integrator.hpp"
+
+namespace perikit {
+
+class BodyProblem final : public Problem {
+ public:
+  /// Builds everything that the scene describes, by parts from `factory`. Throws InputError.
+  BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static);
+
+  int dimension() const noexcept override { return body_.dimension(); }
+  std::size_t stride() const noexcept override { return body_.stride(); }
+  std::size_t points() const noexcept override { return body_.points(); }
+  Field make_field(int components) const override { return body_.make_field(components); }
+
+  FieldView displacement() noexcept override { return displacement_; }
+  FieldView velocity() noexcept override { return declare("velocity", dimension()); }
+  FieldView internal_force() noexcept override { return internal_force_; }
+  FieldView external_force() noexcept override { return declare("external_force", dimension()); }
+  FieldView declare(const std::string& name, int components) override;
+  double& time() noexcept override { return time_; }
+  std::int64_t& step() noexcept override { return step_; }
+  Energies& energies() noexcept override { return energies_; }
+  std::vector<std::byte> snapshot() const override;
+  void restore(std::span<const std::byte> bytes) override;
+
+  std::span<const double> mass() override;
+  double uniform_mass() override;
+
+  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  void evaluate_loads(double t, FieldView force) override;
+  bool any_load() const noexcept override { return !loads_.empty(); }
+  bool loads_depend_on_time() const noexcept override;
+  bool advance_history(double) override { return false; }
+
+  bool any_constraint() const noexcept override { return !constrained_.empty(); }
+  std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
+  ConstFieldView free_mask() const noexcept override;
+  void prescribe_half_step_velocity(double t_begin, double t_end, FieldView v) override;
+  void prescribe_velocity(double t, FieldView v) override;
+  void prescribe_displacement(double t, FieldView u) override;
+
+  double largest_eigenvalue(ConstFieldView u) override;
+  double bond_based_time_step() const override;
+  bool constant_stiffness() const noexcept override { return laws_->constant_tangent(); }
+
+  const Body& body() const noexcept { return body_; }
+  Model& model() noexcept { return *model_; }
+  const Model& model() const noexcept { return *model_; }
+  const Laws& laws() const noexcept { return *laws_; }
+  const Scene& scene() const noexcept { return scene_; }
+  /// Kinetic energy of a velocity field [J].
+  double kinetic_energy(ConstFieldView velocity);
+  /// Acceleration at time t: (internal + external)/mass, prescribed components as prescribed [m/s^2].
+  Field acceleration(double t);
+  /// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs.
+  Field reaction(bool dynamic, double t);
+  /// Bytes held by body, model and state.
+  std::size_t bytes() const noexcept;
+
+ private:
+  /// One component of one [[boundary]] on the points that it governs.
+  struct Constraint {
+    bool velocity = false;
+    int component = 0;
+    Expression value;
+    bool ramp = false;                    ///< a plain number of a quasi-static run: scaled with t
+    std::vector<std::int32_t> points;
+    std::vector<double> fixed;            ///< values where they do not depend on t
+    double at(const Body& body, std::size_t k, double t) const;
+  };
+  struct Load {
+    int component = 0;
+    Expression value;
+    bool ramp = false;
+    std::vector<std::int32_t> points;
+    std::vector<double> share;            ///< force on the point per unit of the value [N / unit]
+  };
+
+  void read_materials(const PartFactory& factory);
+  void read_initial();
+  void read_constraints(bool quasi_static);
+  void read_loads(bool quasi_static);
+  std::vector<double> face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const;
+
+  Scene scene_;
+  Body body_;
+  std::shared_ptr<const InfluenceFunction> influence_;
+  std::shared_ptr<const Kinematics> kinematics_;
+  std::unique_ptr<Laws> laws_;
+  std::unique_ptr<Model> model_;
+  std::vector<Constraint> constraints_;
+  std::vector<Load> loads_;
+  std::vector<std::int64_t> constrained_;
+  mutable Field free_mask_;
+  Field displacement_, internal_force_;
+  std::map<std::string, Field> declared_;
+  Field eigenvector_;
+  AlignedVector<double> mass_;
+  double uniform_mass_ = -1;
+  double time_ = 0, last_step_ = 0;
+  std::int64_t step_ = 0;
+  Energies energies_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,195 @@
+#include "perikit/problem/body_problem.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "perikit/core/parallel.hpp"
+#include "perikit/output/recorder.hpp"
+
+namespace perikit {
+
+BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static) : scene_(scene), body_(scene) {
+  influence_ = factory.influence(*scene_.influence);
+  kinematics_ = factory.kinematics(*scene_.kinematics);
+  read_materials(factory);
+  displacement_ = body_.make_field(dimension());
+  internal_force_ = body_.make_field(dimension());
+  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), scene_.skip});
+  read_initial();
+  read_constraints(quasi_static);
+  read_loads(quasi_static);
+}
+
+FieldView BodyProblem::declare(const std::string& name, int components) {
+  const auto [entry, fresh] = declared_.try_emplace(name);
+  if (fresh) entry->second = body_.make_field(components);
+  return entry->second;
+}
+
+std::span<const double> BodyProblem::mass() {
+  if (!mass_.empty()) return mass_;
+  mass_.assign(stride(), 0.0);
+  for (const std::int32_t p : body_.internal()) {
+    const double density = laws_->density(static_cast<std::size_t>(p));
+    if (!(density > 0)) {
+      throw InputError(scene_.material->values.position("density"), "material.density", "missing; a dynamic run needs it [kg/m^3]");
+    }
+    mass_[static_cast<std::size_t>(p)] = density * body_.volume(static_cast<std::size_t>(p));
+  }
+  return mass_;
+}
+
+double BodyProblem::uniform_mass() {
+  if (uniform_mass_ < 0) {
+    const auto masses = mass();
+    uniform_mass_ = masses[static_cast<std::size_t>(body_.internal().front())];
+    for (const std::int32_t p : body_.internal()) {
+      if (masses[static_cast<std::size_t>(p)] != uniform_mass_) uniform_mass_ = 0;
+    }
+  }
+  return uniform_mass_;
+}
+
+EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double) {
+  EvaluationStatus status = model_->forces(u, force, energy);
+  if (!status.ok()) {
+    const auto p = static_cast<std::size_t>(body_.internal()[static_cast<std::size_t>(status.point)]);
+    const std::uint16_t id = body_.material_ids().empty() ? std::uint16_t{0} : body_.material_ids()[p];
+    const std::string& material = id == 0 ? scene_.material->type : scene_.regions[id - 1u].material->type;
+    status.description = fmt::format("inadmissible deformation (det F <= 0 or not finite) at {}, kinematics {}, material {}",
+                                     status.description, scene_.kinematics->type, material);
+  }
+  return status;
+}
+
+EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) { return model_->tangent(u, w, Kw); }
+
+double BodyProblem::kinetic_energy(ConstFieldView velocity) {
+  const auto masses = mass();
+  constexpr std::size_t block = 8192;
+  return ordered_sum((stride() + block - 1) / block, [&](std::size_t b) {
+    double sum = 0;
+    for (std::size_t p = b * block; p < std::min(stride(), (b + 1) * block); ++p) {
+      double v2 = 0;
+      for (int c = 0; c < dimension(); ++c) v2 += velocity.component(c)[p] * velocity.component(c)[p];
+      sum += 0.5 * masses[p] * v2;
+    }
+    return sum;
+  });
+}
+
+Field BodyProblem::acceleration(double t) {
+  Field a = body_.make_field(dimension());
+  const auto masses = mass();
+  const FieldView external = any_load() ? external_force() : FieldView{};
+  for (int c = 0; c < dimension(); ++c)
+    for (const std::int32_t index : body_.internal()) {
+      const auto p = static_cast<std::size_t>(index);
+      a.component(c)[p] = (internal_force_.component(c)[p] + (external.data ? external.component(c)[p] : 0.0)) / masses[p];
+    }
+  if (!any_constraint()) return a;
+  // Prescribed components: central difference of the prescribed velocity.
+  const double h = 1e-4 * std::max(last_step_, 1e-9 * std::abs(t));
+  Field before = body_.make_field(dimension()), after = body_.make_field(dimension());
+  prescribe_velocity(t - h, before);
+  prescribe_velocity(t + h, after);
+  for (const std::int64_t dof : constrained_) a.data()[dof] = h > 0 ? (after.data()[dof] - before.data()[dof]) / (2 * h) : 0.0;
+  return a;
+}
+
+Field BodyProblem::reaction(bool dynamic, double t) {
+  Field r = body_.make_field(dimension());
+  if (!any_constraint()) return r;
+  const FieldView external = any_load() ? external_force() : FieldView{};
+  const Field a = dynamic ? acceleration(t) : Field();
+  for (const std::int64_t dof : constrained_) {
+    r.data()[dof] = -internal_force_.data()[dof] - (external.data ? external.data[dof] : 0.0);
+    if (dynamic) r.data()[dof] += mass_[static_cast<std::size_t>(dof) % stride()] * a.data()[dof];
+  }
+  return r;
+}
+
+std::size_t BodyProblem::bytes() const noexcept {
+  std::size_t total = body_.bytes() + model_->report().bytes + displacement_.bytes() + internal_force_.bytes() + mass_.size() * 8;
+  for (const auto& [name, field] : declared_) total += field.bytes();
+  return total;
+}
+
+namespace {
+
+void append(std::vector<std::byte>& bytes, const void* data, std::size_t size) {
+  const auto* from = static_cast<const std::byte*>(data);
+  bytes.insert(bytes.end(), from, from + size);
+}
+
+class ByteReader {
+ public:
+  explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  void take(void* to, std::size_t size) {
+    if (size > bytes_.size()) throw InputError("the saved state is too short");
+    std::memcpy(to, bytes_.data(), size);
+    bytes_ = bytes_.subspan(size);
+  }
+  template <class T>
+  T value() {
+    T v;
+    take(&v, sizeof v);
+    return v;
+  }
+  bool done() const noexcept { return bytes_.empty(); }
+
+ private:
+  std::span<const std::byte> bytes_;
+};
+
+}  // namespace
+
+std::vector<std::byte> BodyProblem::snapshot() const {
+  std::vector<std::byte> bytes;
+  const auto scalar = [&](const auto& value) { append(bytes, &value, sizeof value); };
+  scalar(static_cast<std::uint64_t>(stride()));
+  scalar(time_);
+  scalar(last_step_);
+  scalar(step_);
+  scalar(energies_);
+  const auto field = [&](const std::string& name, const Field& f) {
+    scalar(static_cast<std::uint64_t>(name.size()));
+    append(bytes, name.data(), name.size());
+    scalar(static_cast<std::int64_t>(f.components()));
+    append(bytes, f.data(), f.size() * sizeof(double));
+  };
+  field("displacement", displacement_);
+  field("internal_force", internal_force_);
+  if (eigenvector_.size() > 0) field("eigenvector", eigenvector_);
+  for (const auto& [name, f] : declared_) field(name, f);
+  return bytes;
+}
+
+void BodyProblem::restore(std::span<const std::byte> bytes) {
+  ByteReader in(bytes);
+  if (in.value<std::uint64_t>() != stride()) throw InputError("the saved state belongs to another body");
+  time_ = in.value<double>();
+  last_step_ = in.value<double>();
+  step_ = in.value<std::int64_t>();
+  energies_ = in.value<Energies>();
+  eigenvector_ = Field();
+  while (!in.done()) {
+    const auto length = in.value<std::uint64_t>();
+    if (length > 256) throw InputError("the saved state is damaged");
+    std::string name(length, ' ');
+    in.take(name.data(), length);
+    const auto components = in.value<std::int64_t>();
+    if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
+    Field f = body_.make_field(static_cast<int>(components));
+    in.take(f.data(), f.size() * sizeof(double));
+    if (name == "displacement") displacement_ = std::move(f);
+    else if (name == "internal_force") internal_force_ = std::move(f);
+    else if (name == "eigenvector") eigenvector_ = std::move(f);
+    else std::copy_n(f.data(), f.size(), declare(name, static_cast<int>(components)).data);   // views stay valid
+  }
+}
+
+}  // namespace perikit
