@@ -43,7 +43,8 @@ measure() {
   fi
   echo "$output" | awk -v points=$points '/^Loop time of/ { printf "%.0f\n", 1e9 * $4 / ($9 * points) }' | sort -n |
     awk -v label="$label" '{ ns[NR] = $1 }
-      END { printf "%s %d ns per point and step (median %d, worst %d)\n", label, ns[1], ns[int((NR + 1) / 2)], ns[NR]
+      END { if (NR == 0) exit 1
+            printf "%s %d ns per point and step (median %d, worst %d)\n", label, ns[1], ns[int((NR + 1) / 2)], ns[NR]
             printf "LAMMPS %s %d\n", label, ns[1] }'
 }
 

@@ -24,7 +24,9 @@ Tensor square(const Components& v) {
   return T;
 }
 
-double dot(const Tensor& A, const Tensor& B) { return A.cwiseProduct(B).sum(); }
+double dot(const Tensor& A, const Tensor& B) {
+  return A.cwiseProduct(B).sum();
+}
 
 /// The stencils an evaluation point depends on: its own, and its owner's where the map of `selective` acts.
 std::vector<const Stencil*> stencils(const Operator& op, const EvaluationPoint& q) {
@@ -68,8 +70,7 @@ Selective selective(const Law& law, const Tensor& H_own, const Tensor& H_bar) {
     const Tensor dFh = a * (dFt + phi * Ft);
     const Tensor dPh = square(A * flat(dFh));
     const double dp = dot(dPh, Fh) + dot(Ph, dFh);
-    r.tangent.col(column).head(9) =
-        flat(a * (dPh + phi * Ph) - dp / 3 * Ftm + p / 3 * Ftm * dFt.transpose() * Ftm);
+    r.tangent.col(column).head(9) = flat(a * (dPh + phi * Ph) - dp / 3 * Ftm + p / 3 * Ftm * dFt.transpose() * Ftm);
     r.tangent.col(column).tail(9) = flat(dp / 3 * Fbm - p / 3 * Fbm * dFb.transpose() * Fbm);
   }
   return r;

@@ -12,7 +12,9 @@ namespace {
 
 using Accumulator = std::map<int, Vector>;
 
-Stencil finished(const Accumulator& a) { return {a.begin(), a.end()}; }
+Stencil finished(const Accumulator& a) {
+  return {a.begin(), a.end()};
+}
 
 void add(Accumulator& to, int k, const Vector& g) {
   const auto [entry, fresh] = to.try_emplace(k, g);
@@ -121,9 +123,8 @@ class Builder {
       double volume = 0;
       const auto in_part = [&](int k) { return share(cloud_.bond(i, k), cloud_.horizon, parts, part); };
       for (const int k : family_) volume += in_part(k) * cloud_.volume[k];
-      Stencil g = kernel_gradient(cloud_, i, 1, description_.singular, family_, [&](int k) {
-        return in_part(k) * cloud_.intact(i, k) * cloud_.omega(i, k);
-      });
+      Stencil g = kernel_gradient(cloud_, i, 1, description_.singular, family_,
+                                  [&](int k) { return in_part(k) * cloud_.intact(i, k) * cloud_.omega(i, k); });
       if (g.empty()) continue;
       const double weight = description_.part_volumes ? volume : 1.0;
       total += weight;
@@ -152,7 +153,8 @@ class Builder {
     if (description_.name == "non_spherical") {
       const double cosine = xi.dot(target) / (xi.norm() * target.norm());
       const double alignment = std::clamp(0.5 + 0.5 * cosine, 0.0, 1.0);
-      return std::exp(-description_.n1 * std::abs(xi.norm() - target.norm()) / cloud_.horizon) * std::pow(alignment, description_.n2);
+      return std::exp(-description_.n1 * std::abs(xi.norm() - target.norm()) / cloud_.horizon) *
+             std::pow(alignment, description_.n2);
     }
     throw std::invalid_argument("no kinematics '" + description_.name + "'");
   }

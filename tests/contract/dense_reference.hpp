@@ -21,11 +21,11 @@ using Tensor = Eigen::Matrix3d;
 
 struct Cloud {
   int dimension = 3;
-  std::vector<Vector> position;                   ///< [m], each of length d
-  std::vector<double> volume;                     ///< [m^3]
-  double horizon = 0;                             ///< delta [m]
-  std::function<double(double)> influence;        ///< omega(r), r = |xi| / delta
-  std::function<double(int, int)> integrity = {}; ///< b_ij in [0, 1], symmetric; empty: intact
+  std::vector<Vector> position;                    ///< [m], each of length d
+  std::vector<double> volume;                      ///< [m^3]
+  double horizon = 0;                              ///< delta [m]
+  std::function<double(double)> influence;         ///< omega(r), r = |xi| / delta
+  std::function<double(int, int)> integrity = {};  ///< b_ij in [0, 1], symmetric; empty: intact
 
   int points() const { return static_cast<int>(position.size()); }
   /// X_j - X_i [m].
@@ -41,13 +41,13 @@ enum class Weight { volume, kernel };
 /// A kinematics by name, with the options of its plugin.
 struct Description {
   std::string name = "conventional";
-  int order = 1;                          ///< conventional, baqp, projection: of the point gradient
-  int parts = 0;                          ///< sub_horizon: 0: 2^d; 1: the whole horizon; 4 in 1D: C's four-part split
-  bool part_volumes = false;              ///< sub_horizon: weights V_i V_alpha / V_H instead of V_i / parts
-  double bond_horizon_ratio = 1;          ///< bond_associated: radius of the ball around X_j over delta
-  double lambda = 10;                     ///< bond_augmented
-  double n1 = 1, n2 = 1;                  ///< non_spherical
-  std::optional<Weight> weight = {};      ///< bond-level; unset: kernel for baqp, volume for the others
+  int order = 1;                                      ///< conventional, baqp, projection: of the point gradient
+  int parts = 0;                                      ///< sub_horizon: 0: 2^d; 1: the whole horizon; 4 in 1D: C's four-part split
+  bool part_volumes = false;                          ///< sub_horizon: weights V_i V_alpha / V_H instead of V_i / parts
+  double bond_horizon_ratio = 1;                      ///< bond_associated: radius of the ball around X_j over delta
+  double lambda = 10;                                 ///< bond_augmented
+  double n1 = 1, n2 = 1;                              ///< non_spherical
+  std::optional<Weight> weight = {};                  ///< bond-level; unset: kernel for baqp, volume for the others
   std::shared_ptr<const Description> base = nullptr;  ///< selective
   /// A moment (of xi / delta) whose smallest eigenvalue is below this fraction of its largest is singular.
   double singular = 1e-10;
@@ -96,7 +96,7 @@ Matrix stiffness(const Operator&, const Law&, const Vector& u);
 
 /// `selective` at one evaluation point: Fhat = (Jbar / Jt)^(1/3) Ft, its psi, and psi's derivatives by (Ft, Fbar).
 struct Selective {
-  Tensor H;             ///< Fhat - I
+  Tensor H;  ///< Fhat - I
   double psi = 0;
   Tensor S_own, S_bar;  ///< dpsi/dFt, dpsi/dFbar
   Matrix tangent;       ///< 18 x 18, rows and columns (Ft, Fbar)

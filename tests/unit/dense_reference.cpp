@@ -13,9 +13,15 @@ using namespace perikit::reference;
 
 namespace {
 
-double constant(double) { return 1; }
-double gaussian(double r) { return std::exp(-r * r); }
-double cubic_spline(double r) { return r <= 0.5 ? 1 - 6 * r * r + 6 * r * r * r : r <= 1 ? 2 * std::pow(1 - r, 3) : 0; }
+double constant(double) {
+  return 1;
+}
+double gaussian(double r) {
+  return std::exp(-r * r);
+}
+double cubic_spline(double r) {
+  return r <= 0.5 ? 1 - 6 * r * r + 6 * r * r * r : r <= 1 ? 2 * std::pow(1 - r, 3) : 0;
+}
 
 /// Saint Venant-Kirchhoff: S = lambda tr(E) I + 2 mu E.
 Law saint_venant_kirchhoff(double lambda, double mu) {
@@ -46,7 +52,9 @@ auto slope(const Function& f, double step) {
   return Value((8 * (f(step) - f(-step)) - (f(2 * step) - f(-2 * step))) / (12 * step));
 }
 
-double relative(double a, double b) { return std::abs(a - b) / std::abs(b); }
+double relative(double a, double b) {
+  return std::abs(a - b) / std::abs(b);
+}
 
 /// A cubic grid of side `side`, jittered by up to `jitter` spacings, with volumes that vary by as much.
 Cloud grid(int d, int side, double ratio, double jitter, double (*influence)(double), unsigned seed = 7) {
@@ -65,8 +73,9 @@ Cloud grid(int d, int side, double ratio, double jitter, double (*influence)(dou
   return cloud;
 }
 
-Cloud jittered(int d) { return d == 1 ? grid(1, 12, 3.015, 0.2, gaussian) : d == 2 ? grid(2, 6, 2.015, 0.2, gaussian)
-                                                                                   : grid(3, 4, 1.8, 0.2, gaussian); }
+Cloud jittered(int d) {
+  return d == 1 ? grid(1, 12, 3.015, 0.2, gaussian) : d == 2 ? grid(2, 6, 2.015, 0.2, gaussian) : grid(3, 4, 1.8, 0.2, gaussian);
+}
 
 /// A smooth field of a few per cent strain plus noise; small enough for the near-singular quadrants of jittered surfaces, which
 /// magnify it.
@@ -105,7 +114,9 @@ std::vector<Description> all_kinematics() {
   return all;
 }
 
-std::string label(const Description& k) { return k.name + (k.base ? "/" + k.base->name : "") + " order " + std::to_string(k.order); }
+std::string label(const Description& k) {
+  return k.name + (k.base ? "/" + k.base->name : "") + " order " + std::to_string(k.order);
+}
 
 /// Sum of forces and sum of moments (all component pairs) about the origin in the deformed body.
 std::pair<Vector, Matrix> resultants(const Cloud& cloud, const Vector& u, const Vector& f) {
@@ -205,7 +216,8 @@ TEST_CASE("reference: special cases of one kinematics are another") {
     cloud.influence = constant;
     CHECK(difference(build(cloud, {.name = "non_spherical", .n1 = 0, .n2 = 0}), every_bond_conventional()) < 1e-12);
     // a dominant bond is the projection: its own stretch exactly, the average across
-    CHECK(difference(build(cloud, {.name = "bond_augmented", .lambda = 1e8}), build(cloud, {.name = "bond_augmented", .lambda = 1})) > 1e-2);
+    CHECK(difference(build(cloud, {.name = "bond_augmented", .lambda = 1e8}),
+                     build(cloud, {.name = "bond_augmented", .lambda = 1})) > 1e-2);
   }
 }
 
@@ -251,9 +263,7 @@ TEST_CASE("reference: the four-part split of a line gives every bond to exactly 
 }
 
 TEST_CASE("reference: selective splits an additive law into its volumetric part of Jbar and its deviatoric part of Ft") {
-  const auto deviatoric = [](const Tensor& F) {
-    return 0.4 * (std::pow(F.determinant(), -2.0 / 3) * F.squaredNorm() - 3);
-  };
+  const auto deviatoric = [](const Tensor& F) { return 0.4 * (std::pow(F.determinant(), -2.0 / 3) * F.squaredNorm() - 3); };
   const auto volumetric = [](const Tensor& F) { return 50 * std::pow(F.determinant() - 1, 2); };
   const Law neo_hookean{[&](const Tensor& H) {
                           const Tensor F = H + Tensor::Identity();
@@ -353,8 +363,10 @@ TEST_CASE("reference: energy of the checkerboard at an interior point") {
       return energy(build(block, row.kinematics, {centre}), steel, u) / block.volume[centre];
     };
     const auto agrees = [&](double expected, double found) {
-      if (expected == 0) CHECK(std::abs(found) < 1e-16);
-      else CHECK(relative(found, expected) < 1e-6);
+      if (expected == 0)
+        CHECK(std::abs(found) < 1e-16);
+      else
+        CHECK(relative(found, expected) < 1e-6);
     };
     agrees(row.constant, density(constant));
     agrees(row.cubic_spline, density(cubic_spline));
