@@ -1,5 +1,5 @@
 #pragma once
-/// Point clouds from files.
+/// Points of a body from a file: CSV with a header line (x,y,z,volume), or HDF5 with datasets of these names.
 
 #include <array>
 #include <filesystem>
@@ -8,12 +8,14 @@
 namespace perikit {
 
 struct PointCloud {
-  std::vector<std::array<double, 3>> position;   ///< [m]; unused axes 0
-  std::vector<double> volume;                    ///< [m^3]
+  std::vector<std::array<double, 3>> position;  ///< [m]; components beyond the dimension are 0
+  std::vector<double> volume;                   ///< [m^3], > 0
 };
 
-/// CSV with a header line naming x, y, z, volume (axes beyond `dimension` optional), or .h5 with datasets of these names.
-/// Throws InputError with file, line, column and what was found.
+/// Reads `file` (.h5 and .hdf5: HDF5, anything else: CSV). Columns may stand in any order; y and z may be missing in lower dimensions.
+/// In CSV, '#' starts a comment and blank lines are skipped.
+/// Throws InputError with file, line, column and what was found: not a number, nan or infinity, a volume that is not > 0, a component
+/// beyond the dimension that is not 0, a missing, unknown or repeated column, a wrong number of cells, no points.
 PointCloud read_points(const std::filesystem::path& file, int dimension);
 
 }  // namespace perikit

@@ -1,0 +1,222 @@
+#include "perikit/body/point_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "output/hdf5_file.hpp"
+#include "perikit/core/errors.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// x, y, z, volume: the order in which a row of values is kept.
+const std::vector<std::string> column_names{"x", "y", "z", "volume"};
+constexpr int volume_column = 3;
+using Row = std::array<double, 4>;
+
+/// Empty where the row is a valid point; else the first wrong column and what is wrong with it.
+struct Fault {
+  int column = 0;
+  std::string message;
+};
+std::optional<Fault> fault_of(const Row& row, int dimension) {
+  for (int c = 0; c < 4; ++c) {
+    const double value = row[static_cast<std::size_t>(c)];
+    if (!std::isfinite(value)) return Fault{c, fmt::format("found {}; must be finite", value)};
+    if (c == volume_column && value <= 0) return Fault{c, fmt::format("found {}; must be > 0", value)};
+    if (c < volume_column && c >= dimension && value != 0) {
+      return Fault{c, fmt::format("found {}; must be 0 (or no column at all) in a body of dimension {}", value, dimension)};
+    }
+  }
+  return {};
+}
+
+void add(PointCloud& cloud, const Row& row) {
+  cloud.position.push_back({row[0], row[1], row[2]});
+  cloud.volume.push_back(row[volume_column]);
+}
+
+bool required(int column, int dimension) { return column == volume_column || column < dimension; }
+
+std::string wanted_columns(int dimension) {
+  std::vector<std::string> names;
+  for (int c = 0; c < 4; ++c) {
+    if (required(c, dimension)) names.push_back(column_names[static_cast<std::size_t>(c)]);
+  }
+  return fmt::format("{}", fmt::join(names, ","));
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return text.substr(0, 0);
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+class CsvReader {
+ public:
+  CsvReader(const std::filesystem::path& file, int dimension) : file_(file), dimension_(dimension) {
+    std::ifstream stream(file, std::ios::binary);
+    if (!stream || std::filesystem::is_directory(file)) {
+      const int code = stream ? EISDIR : errno;
+      throw InputError({file.string(), 0, 0}, "", "cannot be read: " + std::generic_category().message(code));
+    }
+    text_.resize(std::filesystem::file_size(file));
+    stream.read(text_.data(), static_cast<std::streamsize>(text_.size()));
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.erase(0, 3);
+  }
+
+  PointCloud read() {
+    if (!next_line()) refuse(line_start(), "", fmt::format("found no header line; must be {}", wanted_columns(dimension_)), 0);
+    read_header();
+    PointCloud cloud;
+    while (next_line()) add(cloud, read_row());
+    if (cloud.volume.empty()) refuse(line_start(), "", "found no points behind the header line", 0);
+    return cloud;
+  }
+
+ private:
+  [[noreturn]] void refuse(const char* where, std::string_view key, const std::string& message, int line) const {
+    throw InputError({file_.string(), line, static_cast<int>(where - line_start()) + 1}, key, message);
+  }
+  const char* line_start() const { return text_.data() + start_; }
+
+  /// Goes to the next line that holds more than blanks and comments; false at the end of the file.
+  bool next_line() {
+    while (next_ < text_.size()) {
+      start_ = next_;
+      const std::size_t end = std::min(text_.find('\n', start_), text_.size());
+      next_ = end + 1;
+      ++line_;
+      content_ = std::string_view(text_).substr(start_, end - start_);
+      content_ = content_.substr(0, content_.find('#'));
+      if (content_.ends_with('\r')) content_.remove_suffix(1);
+      if (!trimmed(content_).empty()) return true;
+    }
+    return false;
+  }
+
+  /// Cuts the next cell off `rest`; `more` tells whether another one follows.
+  static std::string_view next_cell(std::string_view& rest, bool& more) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view cell = rest.substr(0, comma);
+    more = comma != std::string_view::npos;
+    rest.remove_prefix(more ? comma + 1 : rest.size());
+    return trimmed(cell);
+  }
+
+  void read_header() {
+    std::string_view rest = content_;
+    for (bool more = true; more;) {
+      std::string_view cell = next_cell(rest, more);
+      const char* where = cell.data();
+      if (cell.size() > 1 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
+      const auto known = std::find(column_names.begin(), column_names.end(), cell);
+      if (known == column_names.end()) {
+        refuse(where, "", fmt::format("found column '{}'; allowed are x,y,z,volume{}", cell, did_you_mean(cell, column_names)), line_);
+      }
+      const int column = static_cast<int>(known - column_names.begin());
+      if (std::find(order_.begin(), order_.end(), column) != order_.end()) {
+        refuse(where, "", fmt::format("column '{}' appears twice", cell), line_);
+      }
+      order_.push_back(column);
+    }
+    for (int c = 0; c < 4; ++c) {
+      if (required(c, dimension_) && std::find(order_.begin(), order_.end(), c) == order_.end()) {
+        refuse(line_start(), "", fmt::format("no column '{}' in '{}'; must be {}", column_names[static_cast<std::size_t>(c)],
+                                             trimmed(content_), wanted_columns(dimension_)), line_);
+      }
+    }
+  }
+
+  Row read_row() const {
+    Row row{};
+    std::array<const char*, 4> where{};
+    std::string_view rest = content_;
+    std::size_t cells = 0;
+    for (bool more = true; more; ++cells) {
+      const std::string_view cell = next_cell(rest, more);
+      if (cells >= order_.size()) continue;
+      const auto column = static_cast<std::size_t>(order_[cells]);
+      where[column] = cell.data();
+      row[column] = number(cell, column_names[column]);
+    }
+    if (cells != order_.size()) {
+      refuse(line_start(), "", fmt::format("found {} cells; the header has {} columns", cells, order_.size()), line_);
+    }
+    if (const std::optional<Fault> fault = fault_of(row, dimension_)) {
+      const auto column = static_cast<std::size_t>(fault->column);
+      refuse(where[column], column_names[column], fault->message, line_);
+    }
+    return row;
+  }
+
+  double number(std::string_view cell, const std::string& column) const {
+    std::string_view digits = cell;
+    if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-') digits.remove_prefix(1);
+    double value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::result_out_of_range) refuse(cell.data(), column, fmt::format("found {}; beyond double precision", cell), line_);
+    if (error != std::errc() || end != digits.data() + digits.size()) {
+      refuse(cell.data(), column, fmt::format("found '{}'; must be a number", cell), line_);
+    }
+    return value;
+  }
+
+  std::filesystem::path file_;
+  int dimension_;
+  std::string text_;
+  std::size_t start_ = 0, next_ = 0;
+  int line_ = 0;
+  std::string_view content_;
+  std::vector<int> order_;  ///< column of each cell
+};
+
+PointCloud read_hdf5(const std::filesystem::path& file, int dimension) {
+  const hdf5::Source source(file);
+  const auto refuse = [&](int column, const std::string& message) {
+    throw InputError({file.string(), 0, 0}, column_names[static_cast<std::size_t>(column)], message);
+  };
+  std::array<std::vector<double>, 4> columns;
+  const std::vector<double>& volume = columns[volume_column];
+  for (const int c : {volume_column, 0, 1, 2}) {
+    const std::string& name = column_names[static_cast<std::size_t>(c)];
+    std::vector<double>& column = columns[static_cast<std::size_t>(c)];
+    if (source.contains(name)) {
+      column = source.read(name).data;
+    } else if (required(c, dimension)) {
+      refuse(c, fmt::format("no such dataset; must be {}", wanted_columns(dimension)));
+    } else {
+      column.assign(volume.size(), 0.0);
+    }
+    if (column.size() != volume.size()) refuse(c, fmt::format("found {} values; volume has {}", column.size(), volume.size()));
+  }
+  if (volume.empty()) refuse(volume_column, "found no points");
+  PointCloud cloud;
+  for (std::size_t i = 0; i < volume.size(); ++i) {
+    const Row row{columns[0][i], columns[1][i], columns[2][i], volume[i]};
+    if (const std::optional<Fault> fault = fault_of(row, dimension)) refuse(fault->column, fmt::format("point {}: {}", i, fault->message));
+    add(cloud, row);
+  }
+  return cloud;
+}
+
+}  // namespace
+
+PointCloud read_points(const std::filesystem::path& file, int dimension) {
+  const std::filesystem::path extension = file.extension();
+  if (extension == ".h5" || extension == ".hdf5") return read_hdf5(file, dimension);
+  return CsvReader(file, dimension).read();
+}
+
+}  // namespace perikit

@@ -1,0 +1,38 @@
+#pragma once
+/// Files that are either whole or not there: write to a temporary name in the same folder, fsync, rename, fsync the folder.
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace perikit {
+
+/// Replaces `file` by `bytes`. Throws RunError with the file's name and the system's reason; an earlier `file` is then untouched.
+void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes);
+
+/// The name under which `file` is written before it is renamed.
+std::filesystem::path temporary_name(const std::filesystem::path& file);
+
+/// RunError "FILE: ACTION: reason of the system's error code".
+[[noreturn]] void throw_system_error(const std::filesystem::path& file, const std::string& action, int code);
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int value = -1) noexcept : value_(value) {}
+  Descriptor(Descriptor&& other) noexcept : value_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  ~Descriptor();
+  int get() const noexcept { return value_; }
+  explicit operator bool() const noexcept { return value_ >= 0; }
+  int release() noexcept;
+
+ private:
+  int value_;
+};
+
+/// write(2) until all bytes are out; 0 or the system's error code.
+int write_all(int descriptor, std::span<const std::byte> bytes) noexcept;
+
+}  // namespace perikit

@@ -1,0 +1,158 @@
+#include <fmt/format.h>
+
+#include <numeric>
+#include <system_error>
+
+#include "output/atomic_file.hpp"
+#include "output/hdf5_file.hpp"
+#include "output/result_file.hpp"
+#include "output/xdmf.hpp"
+#include "perikit/core/errors.hpp"
+#include "perikit/output/recorder.hpp"
+
+namespace perikit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error && !fs::is_directory(folder)) error = std::make_error_code(std::errc::not_a_directory);
+  if (error) throw_system_error(folder, "cannot create the folder", error.value());
+}
+
+void remove_file(const fs::path& file) {
+  std::error_code error;
+  fs::remove(file, error);
+  if (error) throw_system_error(file, "cannot remove", error.value());
+}
+
+/// Frames from `first_frame` on, and temporaries that a killed run left behind.
+void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
+  std::vector<fs::path> stale;
+  for (const fs::directory_entry& entry : fs::directory_iterator(frames)) {
+    const std::string name = entry.path().filename().string();
+    const bool frame = entry.path().extension() == ".h5" && frame_index(entry.path().stem().string()) >= first_frame;
+    if (frame || (name.starts_with('.') && name.ends_with(".h5.part"))) stale.push_back(entry.path());
+  }
+  for (const fs::path& file : stale) remove_file(file);
+}
+
+void write_run_attributes(hdf5::Image& image, const RunAttributes& run) {
+  image.attribute("perikit_version", run.perikit_version);
+  image.attribute("title", run.title);
+  image.attribute("scene", run.scene);
+}
+
+hdf5::Image reference_image(const ReferenceData& reference, const RunAttributes& run) {
+  hdf5::Image image;
+  write_run_attributes(image, run);
+  image.dataset("position", reference.position, 3);
+  image.dataset("volume", reference.volume);
+  image.dataset("id", reference.id);
+  image.dataset("material_id", reference.material_id);
+  for (const auto& [name, indices] : reference.sets) image.dataset("set_" + name, indices);
+  std::vector<std::int64_t> connectivity(reference.volume.size());
+  std::iota(connectivity.begin(), connectivity.end(), std::int64_t{0});
+  image.dataset("connectivity", connectivity);
+  return image;
+}
+
+}  // namespace
+
+struct FrameWriter::Implementation {
+  fs::path folder;
+  RunAttributes run;
+  std::size_t points = 0;
+  std::int64_t frames = 0;         ///< complete and listed
+  hdf5::Image results;             ///< grows by one link per frame
+  std::vector<std::string> grids;  ///< of the sidecar, one per frame
+
+  std::string frame_path(std::int64_t index) const { return fmt::format("frames/{}.h5", frame_name(index)); }
+
+  /// Lists a frame whose file is complete.
+  void list(std::int64_t index, double time, std::span<const XdmfField> fields) {
+    const std::string link = "/frames/" + frame_name(index);
+    if (!results.contains(link)) results.external_link(link, frame_path(index));
+    grids.resize(static_cast<std::size_t>(index));
+    grids.push_back(xdmf_grid(frame_path(index), time, points, fields));
+  }
+
+  /// A frame that an earlier run wrote.
+  void list_existing(std::int64_t index) {
+    const hdf5::Source frame(folder / frame_path(index));
+    std::vector<XdmfField> fields;
+    for (const std::string& name : frame.names("/", true)) {
+      const std::vector<std::size_t> shape = frame.shape(name);
+      if (shape[0] != points) {
+        throw InputError({(folder / frame_path(index)).string(), 0, 0}, name,
+                         fmt::format("found {} points; this body has {}", shape[0], points));
+      }
+      fields.push_back({name, shape.size() > 1 ? static_cast<int>(shape[1]) : 1});
+    }
+    list(index, frame.real("/", "time"), fields);
+  }
+
+  void store_results() { store_atomically(folder / "results.h5", results.bytes()); }
+
+  /// Last of all, because ParaView gives up on a sidecar that names a missing file.
+  void store_sidecar() {
+    const fs::path file = folder / "results.xdmf";
+    if (grids.empty()) return remove_file(file);
+    write_file_atomically(file, xdmf_document(run.title, run.perikit_version, grids));
+  }
+};
+
+FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAttributes run, std::int64_t first_frame)
+    : implementation_(std::make_unique<Implementation>()) {
+  Implementation& self = *implementation_;
+  self.folder = std::move(folder);
+  self.run = std::move(run);
+  self.points = reference.volume.size();
+  make_folder(self.folder);
+  make_folder(self.folder / "frames");
+  for (const char* name : {"results.h5", "reference.h5", "results.xdmf"}) remove_file(temporary_name(self.folder / name));
+
+  write_run_attributes(self.results, self.run);
+  self.results.external_link("/reference", "reference.h5");
+  self.results.group("/frames");
+  for (; self.frames < first_frame; ++self.frames) self.list_existing(self.frames);
+  // The lists lose the later frames before the files go, so that nothing ever names a missing file.
+  self.store_sidecar();
+  store_atomically(self.folder / "reference.h5", reference_image(reference, self.run).bytes());
+  self.store_results();
+  remove_later_frames(self.folder / "frames", first_frame);
+}
+
+FrameWriter::~FrameWriter() = default;
+
+void FrameWriter::write(double time, std::int64_t step, std::span<const OutputField> fields) {
+  Implementation& self = *implementation_;
+  const std::int64_t index = frames();
+  const fs::path file = self.folder / self.frame_path(index);
+  std::vector<XdmfField> listed;
+  {
+    hdf5::Image image;
+    image.attribute("time", time);
+    image.attribute("step", step);
+    for (const OutputField& field : fields) {
+      if (field.data.size() != self.points * static_cast<std::size_t>(field.width)) {
+        throw RunError(fmt::format("{}: field '{}' has {} values; {} points of width {} need {}", file.string(), field.name,
+                                   field.data.size(), self.points, field.width, self.points * static_cast<std::size_t>(field.width)));
+      }
+      image.dataset(field.name, field.data, field.width);
+      listed.push_back({field.name, field.width});
+    }
+    store_atomically(file, image.bytes());
+  }
+  self.list(index, time, listed);
+  self.store_results();
+  self.store_sidecar();
+  ++self.frames;
+}
+
+std::int64_t FrameWriter::frames() const noexcept { return implementation_->frames; }
+
+}  // namespace perikit

@@ -1,0 +1,86 @@
+#pragma once
+/// The little of HDF5 that perikit needs: files built in memory, files read from disk.
+
+#include <hdf5.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace perikit::hdf5 {
+
+/// An HDF5 identifier that closes itself.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle() noexcept = default;
+  Handle(hid_t id, Close close) noexcept : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept;
+  Handle& operator=(Handle&& other) noexcept;
+  ~Handle();
+  hid_t get() const noexcept { return id_; }
+  explicit operator bool() const noexcept { return id_ >= 0; }
+
+ private:
+  hid_t id_ = H5I_INVALID_HID;
+  Close close_ = nullptr;
+};
+
+/// A new file that lives in memory until `bytes` is stored by the caller: so every file takes the same way to the disk, errors of the
+/// disk come with the system's reason, and HDF5 is never left with a file that it cannot flush.
+/// Methods throw RunError (out of memory, or a name that is already there).
+class Image {
+ public:
+  Image();
+  /// `values` as a dataset of shape (n) for width 1, else (n, width).
+  void dataset(const std::string& path, std::span<const double> values, int width = 1);
+  void dataset(const std::string& path, std::span<const std::int64_t> values);
+  void group(const std::string& path);
+  /// Attributes of the root group; text is stored as UTF-8 of variable length, which has no 64 kB limit.
+  void attribute(const std::string& name, double value);
+  void attribute(const std::string& name, std::int64_t value);
+  void attribute(const std::string& name, const std::string& text);
+  /// `path` in this file shows the root group of `file` (relative to the folder that this file lies in).
+  void external_link(const std::string& path, const std::string& file);
+  bool contains(const std::string& path) const;
+  /// The whole file; valid until the next change.
+  std::span<const std::byte> bytes();
+
+ private:
+  Handle access_, file_;
+};
+
+/// A file on disk, read only. Errors are InputError and name the file.
+class Source {
+ public:
+  struct Array {
+    std::vector<std::size_t> shape;
+    std::vector<double> data;
+    std::size_t rows() const noexcept { return shape.empty() ? 1 : shape[0]; }
+    int width() const noexcept { return shape.size() > 1 ? static_cast<int>(shape[1]) : 1; }
+  };
+
+  explicit Source(const std::filesystem::path& file);
+  /// Names in a group, sorted. Datasets only, or every link (also those whose file is missing).
+  std::vector<std::string> names(const std::string& group, bool datasets_only = false) const;
+  bool contains(const std::string& path) const;
+  /// Any numeric dataset of one or two dimensions, converted to double.
+  Array read(const std::string& path) const;
+  std::vector<std::size_t> shape(const std::string& path) const;
+  double real(const std::string& group, const std::string& attribute) const;
+  std::int64_t integer(const std::string& group, const std::string& attribute) const;
+  std::string text(const std::string& group, const std::string& attribute) const;
+
+ private:
+  [[noreturn]] void refuse(const std::string& what, const std::string& message) const;
+  Handle dataset(const std::string& path) const;
+  Handle attribute(const std::string& group, const std::string& name) const;
+
+  std::filesystem::path path_;
+  Handle file_;
+};
+
+}  // namespace perikit::hdf5
