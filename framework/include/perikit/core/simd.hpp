@@ -93,7 +93,7 @@ inline bool any(bool m) noexcept { return m; }
 
 inline Pack sqrt(Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-  return {reinterpret_cast<detail::Lanes>(_mm512_sqrt_pd(reinterpret_cast<__m512d>(a.v)))};
+  return {reinterpret_cast<detail::Lanes>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
 #elif defined(__AVX__)
   return {reinterpret_cast<detail::Lanes>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(a.v)))};
 #else

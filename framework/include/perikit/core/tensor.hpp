@@ -2,6 +2,9 @@
 /// Second-order tensors of a space: all nine components, or only those that can differ from zero in plane and line problems.
 /// A plane tensor never computes an xz component.
 
+#include <cstddef>
+#include <utility>
+
 #include "perikit/core/dual.hpp"
 #include "perikit/core/space.hpp"
 
@@ -22,12 +25,17 @@ constexpr int component(int i, int j) noexcept {
   else return i == j ? i : -1;
 }
 
+template <class S>
+constexpr int row(int k) noexcept { return S::dimension == 3 ? k / 3 : S::dimension == 2 ? k / 2 : k; }
+template <class S>
+constexpr int column(int k) noexcept { return S::dimension == 3 ? k % 3 : S::dimension == 2 ? (k == 4 ? 2 : k % 2) : k; }
+
 template <class T, class S>
 struct Tensor {
   using Scalar = T;
   using TensorSpace = S;
   static constexpr int size = S::components;
-  T c[size]{};
+  T c[size];
 
   T& operator[](int k) noexcept { return c[k]; }
   const T& operator[](int k) const noexcept { return c[k]; }
@@ -41,35 +49,24 @@ struct Tensor {
     return map([&](int k) { return s * a[k]; });
   }
 
+  /// Components f(k). (Not a loop over a default-constructed tensor: that one would be cleared in memory first.)
   template <class F>
   static Tensor map(F&& f) noexcept {
-    Tensor r;
-    PERIKIT_UNROLL for (int k = 0; k < size; ++k) r[k] = f(k);
-    return r;
+    return [&]<std::size_t... k>(std::index_sequence<k...>) { return Tensor{{f(int(k))...}}; }(std::make_index_sequence<size>{});
   }
-  /// sum over the stored components of f(i, j) e_i (x) e_j.
+  /// Components f(i, j).
   template <class F>
   static Tensor build(F&& f) noexcept {
-    Tensor r;
-    PERIKIT_UNROLL for (int i = 0; i < 3; ++i)
-      PERIKIT_UNROLL for (int j = 0; j < 3; ++j)
-        if (component<S>(i, j) >= 0) r(i, j) = f(i, j);
-    return r;
+    return map([&](int k) { return f(row<S>(k), column<S>(k)); });
   }
-  /// As build, for a symmetric result: f is asked once for each pair.
+  /// As build, asking only for i <= j.
   template <class F>
   static Tensor build_symmetric(F&& f) noexcept {
-    Tensor r;
-    PERIKIT_UNROLL for (int i = 0; i < 3; ++i)
-      PERIKIT_UNROLL for (int j = i; j < 3; ++j)
-        if (component<S>(i, j) >= 0) r(j, i) = r(i, j) = f(i, j);
-    return r;
+    return build([&](int i, int j) { return f(i < j ? i : j, i < j ? j : i); });
   }
   /// The unit tensor of component k.
   static Tensor unit(int k) noexcept {
-    Tensor r = {};
-    PERIKIT_UNROLL for (int l = 0; l < size; ++l) r[l] = T(l == k ? 1.0 : 0.0);
-    return r;
+    return map([&](int l) { return T(l == k ? 1.0 : 0.0); });
   }
 };
 
@@ -128,7 +125,7 @@ Tensor<T, S> symmetric_part(const Tensor<T, S>& a) noexcept {
   return Tensor<T, S>::build_symmetric([&](int i, int j) { return i == j ? a(i, i) : (a(i, j) + a(j, i)) * 0.5; });
 }
 
-/// (a b + (a b)^T)/2 would round differently; this is a^T a, exactly symmetric.
+/// a^T a, exactly symmetric.
 template <class T, class S>
 Tensor<T, S> gram(const Tensor<T, S>& a) noexcept {
   return Tensor<T, S>::build_symmetric(
@@ -160,23 +157,16 @@ T second_invariant(const Tensor<T, S>& a) noexcept {
 /// det(a) a^-T.
 template <class T, class S>
 Tensor<T, S> cofactor(const Tensor<T, S>& a) noexcept {
-  Tensor<T, S> r;
   if constexpr (S::dimension == 3) {
-    PERIKIT_UNROLL for (int i = 0; i < 3; ++i)
-      PERIKIT_UNROLL for (int j = 0; j < 3; ++j) {
-        const int k = (i + 1) % 3, l = (i + 2) % 3, m = (j + 1) % 3, n = (j + 2) % 3;
-        r(i, j) = a(k, m) * a(l, n) - a(k, n) * a(l, m);
-      }
+    return Tensor<T, S>::build([&](int i, int j) {
+      const int k = (i + 1) % 3, l = (i + 2) % 3, m = (j + 1) % 3, n = (j + 2) % 3;
+      return a(k, m) * a(l, n) - a(k, n) * a(l, m);
+    });
   } else if constexpr (S::dimension == 2) {
-    r(0, 0) = a(1, 1) * a(2, 2);
-    r(1, 1) = a(0, 0) * a(2, 2);
-    r(0, 1) = -(a(1, 0) * a(2, 2));
-    r(1, 0) = -(a(0, 1) * a(2, 2));
-    r(2, 2) = a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0);
+    return {{a(1, 1) * a(2, 2), -(a(1, 0) * a(2, 2)), -(a(0, 1) * a(2, 2)), a(0, 0) * a(2, 2), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)}};
   } else {
-    PERIKIT_UNROLL for (int i = 0; i < 3; ++i) r(i, i) = a((i + 1) % 3, (i + 1) % 3) * a((i + 2) % 3, (i + 2) % 3);
+    return {{a[1] * a[2], a[2] * a[0], a[0] * a[1]}};
   }
-  return r;
 }
 
 template <class T, class S>

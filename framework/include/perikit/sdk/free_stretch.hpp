@@ -10,9 +10,7 @@ namespace perikit {
 /// The direction that is free: zz of a plane, yy + zz of a line (equal for an isotropic law).
 template <class T, class S>
 Tensor<T, S> free_direction() noexcept {
-  Tensor<T, S> N = {};
-  for (int i = S::dimension; i < 3; ++i) N(i, i) = T(1.0);
-  return N;
+  return Tensor<T, S>::build([](int i, int j) { return T(i == j && i >= S::dimension ? 1.0 : 0.0); });
 }
 
 template <class T, class S, class U>
@@ -24,7 +22,7 @@ Tensor<T, S> with_free_part(Tensor<T, S> a, const U& s) noexcept {
 /// Lateral contraction at F = I in the sense of logarithmic strains, -d ln(free stretch) / d ln(J in the body's space).
 template <class S, class Law, class K>
 Pack contraction_ratio(const Law& law, const K& k) noexcept {
-  const auto q = tangent(law, Tensor<Pack, S>{}, k)(free_direction<Pack, S>());
+  const auto q = tangent(law, Tensor<Pack, S>::map([](int) { return Pack(0.0); }), k)(free_direction<Pack, S>());
   return q[0] / inner(free_direction<Pack, S>(), q);
 }
 

@@ -64,7 +64,7 @@ class LawMaterial final : public Material {
   }
   template <class S>
   static void store(const Tensor<Pack, S>& t, double* x, std::size_t stride, int p) noexcept {
-    for (int c = 0; c < S::components; ++c) t[c].store(x + c * stride + p);
+    PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) t[c].store(x + c * stride + p);
   }
 
   /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
@@ -72,7 +72,7 @@ class LawMaterial final : public Material {
   static PackMask admissible(const Tensor<Pack, S>& H) noexcept {
     if constexpr (small_strain_law) {
       Pack total = H[0] * 0.0;
-      for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
+      PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
       return total == 0.0;
     } else {
       const Pack j = jacobian_minus_one(H);   // not finite if any component is not
@@ -80,8 +80,9 @@ class LawMaterial final : public Material {
     }
   }
 
+  // flatten: the tensors of a point live in registers only where nothing is called
   template <class S, bool free_stretch>
-  Status run(const MaterialBatch& b) const noexcept {
+  [[gnu::flatten]] Status run(const MaterialBatch& b) const noexcept {
     Status status;
     Constants k = load_constants(b, 0);
     Pack ratio = 0.0;
@@ -108,7 +109,7 @@ class LawMaterial final : public Material {
         if constexpr (free_stretch) P = with_free_part(P, Pack(0.0));
         store(P, b.P, b.stride, p);
         Pack total = P[0];
-        for (int c = 1; c < S::components; ++c) total += P[c];
+        PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += P[c];
         probe += 0.0 * total;
       }
       if (b.dP || b.A) tangents<S, free_stretch>(b, p, H, k);
@@ -119,7 +120,7 @@ class LawMaterial final : public Material {
   }
 
   template <class S, bool free_stretch>
-  [[gnu::noinline]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H, const Constants& k) const noexcept {
+  [[gnu::noinline, gnu::flatten]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H, const Constants& k) const noexcept {
     const auto action = [&] {
       if constexpr (free_stretch) return condensed_tangent(law_, H, k);
       else return tangent(law_, H, k);
