@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 
 #include "perikit/core/simd.hpp"
@@ -136,7 +137,8 @@ T integer_power(const T& x) noexcept {
   else return x * integer_power<N - 1>(x);
 }
 
-/// x^(N/D) for a constant exponent, D = 1, 2 or 3; x > 0 unless D = 1.
+/// x^(N/D) for a constant exponent, D = 1, 2 or 3; x > 0 unless D = 1. To 2 units in the last place for exponents in [-1, 1], 3 in
+/// [-2, 2].
 template <int N, int D, class T>
 T rational_power(const T& x) noexcept {
   static_assert(D >= 1 && D <= 3, "whole, half and third powers");
