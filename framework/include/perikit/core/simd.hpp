@@ -41,7 +41,7 @@ struct Pack {
   detail::Lanes v;
 
   Pack() noexcept : v{} {}
-  Pack(double a) noexcept : v(detail::Lanes{} + a) {}
+  Pack(double a) noexcept : v(a - detail::Lanes{}) {}   // a - 0 is a, also for -0
   Pack(detail::Lanes lanes) noexcept : v(lanes) {}
 
   /// p need not be aligned.

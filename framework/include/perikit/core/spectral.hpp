@@ -91,8 +91,7 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   const T mean = trace(b) * T(1.0 / 3.0);
   const Tensor<T, Solid> d = add_diagonal(b, -mean);
   const T square = inner(d, d) * T(1.0 / 6.0);
-  const auto distinct = square > T(1e-60);   // below, every rotation will do
-  const T radius = sqrt(select(distinct, square, T(1.0)));
+  const T radius = sqrt(select(square > T(1e-60), square, T(1.0)));
   const Tensor<T, Solid> unit = (T(1.0) / radius) * d;
 
   // Eigenvalues of `unit` are 2 cos(theta + 2 k pi/3), cos 3 theta = det/2. c = |cos| of the isolated one solves 4c^3 - 3c = |det|/2,
@@ -112,6 +111,8 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   length = max(length, second_length);
   v = choose(third_length > length, third, v);
   length = max(length, third_length);
+  // length >= 3/4 unless the deviator is nothing but rounding errors, where every rotation will do
+  const auto distinct = length > T(0.01);
   v = choose(distinct, v, V{T(1.0), T(0.0), T(0.0)});
   const T inverse_length = T(1.0) / sqrt(select(distinct, length, T(1.0)));
   v = {v.x * inverse_length, v.y * inverse_length, v.z * inverse_length};
