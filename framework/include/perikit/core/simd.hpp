@@ -5,7 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
 
 namespace perikit {
 
@@ -29,6 +32,8 @@ struct PackMask {
   friend PackMask operator&(PackMask a, PackMask b) noexcept { return {a.v & b.v}; }
   friend PackMask operator|(PackMask a, PackMask b) noexcept { return {a.v | b.v}; }
   friend PackMask operator!(PackMask a) noexcept { return {~a.v}; }
+  PackMask& operator&=(PackMask b) noexcept { v &= b.v; return *this; }
+  PackMask& operator|=(PackMask b) noexcept { v |= b.v; return *this; }
   bool operator[](int lane) const noexcept { return v[lane] != 0; }
 };
 
@@ -36,7 +41,7 @@ struct Pack {
   detail::Lanes v;
 
   Pack() noexcept : v{} {}
-  Pack(double a) noexcept : v(detail::Lanes{} + a) {}
+  Pack(double a) noexcept : v(a - detail::Lanes{}) {}   // a - 0 is a, also for -0
   Pack(detail::Lanes lanes) noexcept : v(lanes) {}
 
   /// p need not be aligned.
@@ -74,18 +79,32 @@ inline Pack select(PackMask m, Pack a, Pack b) noexcept { return {m.v ? a.v : b.
 inline double select(bool m, double a, double b) noexcept { return m ? a : b; }
 
 inline bool any(PackMask m) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(m.v)) != 0;
+#elif defined(__AVX__)
+  return _mm256_movemask_pd(reinterpret_cast<__m256d>(m.v)) != 0;
+#else
   std::int64_t r = 0;
   for (int i = 0; i < pack_width; ++i) r |= m.v[i];
   return r != 0;
+#endif
 }
 inline bool any(bool m) noexcept { return m; }
 
 inline Pack sqrt(Pack a) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return {reinterpret_cast<detail::Lanes>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
+#elif defined(__AVX__)
+  return {reinterpret_cast<detail::Lanes>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(a.v)))};
+#else
   Pack r;
   for (int i = 0; i < pack_width; ++i) r.v[i] = std::sqrt(a.v[i]);
   return r;
+#endif
 }
-inline Pack abs(Pack a) noexcept { return select(a < Pack(0.0), -a, a); }
+inline Pack abs(Pack a) noexcept {
+  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & std::int64_t{0x7fffffffffffffff})};
+}
 inline Pack min(Pack a, Pack b) noexcept { return select(a < b, a, b); }
 inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
 

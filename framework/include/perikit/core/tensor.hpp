@@ -1,0 +1,198 @@
+#pragma once
+/// Second-order tensors of a space: all nine components, or only those that can differ from zero in plane and line problems.
+/// A plane tensor never computes an xz component.
+
+#include <cstddef>
+#include <utility>
+
+#include "perikit/core/dual.hpp"
+#include "perikit/core/space.hpp"
+
+/// Loops over components are unrolled whole, so that absent components cost nothing.
+#define PERIKIT_UNROLL _Pragma("GCC unroll 9")
+
+namespace perikit {
+
+struct Solid { static constexpr int components = 9, dimension = 3; };   ///< xx xy xz yx yy yz zx zy zz
+struct Plane { static constexpr int components = 5, dimension = 2; };   ///< xx xy yx yy zz
+struct Line { static constexpr int components = 3, dimension = 1; };    ///< xx yy zz
+
+/// Place of component ij, -1 where it is always zero.
+template <class S>
+constexpr int component(int i, int j) noexcept {
+  if constexpr (S::dimension == 3) return 3 * i + j;
+  else if constexpr (S::dimension == 2) return i == 2 || j == 2 ? (i == j ? 4 : -1) : 2 * i + j;
+  else return i == j ? i : -1;
+}
+
+template <class S>
+constexpr int row(int k) noexcept { return S::dimension == 3 ? k / 3 : S::dimension == 2 ? k / 2 : k; }
+template <class S>
+constexpr int column(int k) noexcept { return S::dimension == 3 ? k % 3 : S::dimension == 2 ? (k == 4 ? 2 : k % 2) : k; }
+
+template <class T, class S>
+struct Tensor {
+  using Scalar = T;
+  using TensorSpace = S;
+  static constexpr int size = S::components;
+  T c[size];
+
+  T& operator[](int k) noexcept { return c[k]; }
+  const T& operator[](int k) const noexcept { return c[k]; }
+  T& operator()(int i, int j) noexcept { return c[component<S>(i, j)]; }
+  const T& operator()(int i, int j) const noexcept { return c[component<S>(i, j)]; }
+
+  friend Tensor operator+(const Tensor& a, const Tensor& b) noexcept { return map([&](int k) { return a[k] + b[k]; }); }
+  friend Tensor operator-(const Tensor& a, const Tensor& b) noexcept { return map([&](int k) { return a[k] - b[k]; }); }
+  template <std::convertible_to<T> U>
+  friend Tensor operator*(const U& s, const Tensor& a) noexcept {
+    return map([&](int k) { return s * a[k]; });
+  }
+
+  /// Components f(k). (Not a loop over a default-constructed tensor: that one would be cleared in memory first.)
+  template <class F>
+  static Tensor map(F&& f) noexcept {
+    return [&]<std::size_t... k>(std::index_sequence<k...>) { return Tensor{{f(int(k))...}}; }(std::make_index_sequence<size>{});
+  }
+  /// Components f(i, j).
+  template <class F>
+  static Tensor build(F&& f) noexcept {
+    return map([&](int k) { return f(row<S>(k), column<S>(k)); });
+  }
+  /// As build, asking only for i <= j.
+  template <class F>
+  static Tensor build_symmetric(F&& f) noexcept {
+    return build([&](int i, int j) { return f(i < j ? i : j, i < j ? j : i); });
+  }
+  /// The unit tensor of component k.
+  static Tensor unit(int k) noexcept {
+    return map([&](int l) { return T(l == k ? 1.0 : 0.0); });
+  }
+};
+
+template <class T, class S>
+Tensor<T, S> transpose(const Tensor<T, S>& a) noexcept {
+  return Tensor<T, S>::build([&](int i, int j) { return a(j, i); });
+}
+
+template <class T, class S>
+T trace(const Tensor<T, S>& a) noexcept { return a(0, 0) + a(1, 1) + a(2, 2); }
+
+/// a + s I.
+template <class T, class S, class U>
+Tensor<T, S> add_diagonal(Tensor<T, S> a, const U& s) noexcept {
+  PERIKIT_UNROLL for (int i = 0; i < 3; ++i) a(i, i) = a(i, i) + s;
+  return a;
+}
+
+/// a - tr(a)/3 I.
+template <class T, class S>
+Tensor<T, S> deviator(const Tensor<T, S>& a) noexcept { return add_diagonal(a, trace(a) * (-1.0 / 3.0)); }
+
+namespace detail {
+/// sum over k of a(i, k) b(k, j), over products that can differ from zero; A and B give the components.
+template <class S, class A, class B>
+auto contract(int i, int j, A&& a, B&& b) noexcept {
+  auto r = a(i, i) * b(i, j);
+  PERIKIT_UNROLL for (int k = 0; k < 3; ++k)
+    if (k != i && component<S>(i, k) >= 0 && component<S>(k, j) >= 0) r = r + a(i, k) * b(k, j);
+  return r;
+}
+}  // namespace detail
+
+template <class T, class S>
+Tensor<T, S> operator*(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
+  return Tensor<T, S>::build([&](int i, int j) { return detail::contract<S>(i, j, a, b); });
+}
+
+/// a^T b.
+template <class T, class S>
+Tensor<T, S> transpose_times(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
+  return Tensor<T, S>::build([&](int i, int j) { return detail::contract<S>(i, j, [&](int k, int l) { return a(l, k); }, b); });
+}
+
+/// a : b, the sum of all products of components.
+template <class T, class S>
+T inner(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
+  T r = a[0] * b[0];
+  PERIKIT_UNROLL for (int k = 1; k < S::components; ++k) r = r + a[k] * b[k];
+  return r;
+}
+
+/// (a + a^T)/2.
+template <class T, class S>
+Tensor<T, S> symmetric_part(const Tensor<T, S>& a) noexcept {
+  return Tensor<T, S>::build_symmetric([&](int i, int j) { return i == j ? a(i, i) : (a(i, j) + a(j, i)) * 0.5; });
+}
+
+/// a^T a, exactly symmetric.
+template <class T, class S>
+Tensor<T, S> gram(const Tensor<T, S>& a) noexcept {
+  return Tensor<T, S>::build_symmetric(
+      [&](int i, int j) { return detail::contract<S>(i, j, [&](int k, int l) { return a(l, k); }, a); });
+}
+
+/// F^T F - I of F = I + H, without forming F: small strains keep their digits. Exactly symmetric.
+template <class T, class S>
+Tensor<T, S> right_cauchy_green_minus_identity(const Tensor<T, S>& H) noexcept {
+  const Tensor<T, S> square = gram(H);
+  return Tensor<T, S>::build_symmetric([&](int i, int j) { return (H(i, j) + H(j, i)) + square(i, j); });
+}
+
+/// F F^T - I of F = I + H.
+template <class T, class S>
+Tensor<T, S> left_cauchy_green_minus_identity(const Tensor<T, S>& H) noexcept {
+  return right_cauchy_green_minus_identity(transpose(H));
+}
+
+/// Sum of the principal minors of order two.
+template <class T, class S>
+T second_invariant(const Tensor<T, S>& a) noexcept {
+  T r = a(0, 0) * a(1, 1) + a(2, 2) * (a(0, 0) + a(1, 1));
+  if constexpr (S::dimension >= 2) r = r - a(0, 1) * a(1, 0);
+  if constexpr (S::dimension == 3) r = r - a(0, 2) * a(2, 0) - a(1, 2) * a(2, 1);
+  return r;
+}
+
+/// det(a) a^-T.
+template <class T, class S>
+Tensor<T, S> cofactor(const Tensor<T, S>& a) noexcept {
+  if constexpr (S::dimension == 3) {
+    return Tensor<T, S>::build([&](int i, int j) {
+      const int k = (i + 1) % 3, l = (i + 2) % 3, m = (j + 1) % 3, n = (j + 2) % 3;
+      return a(k, m) * a(l, n) - a(k, n) * a(l, m);
+    });
+  } else if constexpr (S::dimension == 2) {
+    return {{a(1, 1) * a(2, 2), -(a(1, 0) * a(2, 2)), -(a(0, 1) * a(2, 2)), a(0, 0) * a(2, 2), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)}};
+  } else {
+    return {{a[1] * a[2], a[2] * a[0], a[0] * a[1]}};
+  }
+}
+
+template <class T, class S>
+T determinant(const Tensor<T, S>& a) noexcept {
+  if constexpr (S::dimension == 3) {
+    return a(0, 0) * (a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1)) + a(0, 1) * (a(1, 2) * a(2, 0) - a(1, 0) * a(2, 2)) +
+           a(0, 2) * (a(1, 0) * a(2, 1) - a(1, 1) * a(2, 0));
+  } else if constexpr (S::dimension == 2) {
+    return (a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)) * a(2, 2);
+  } else {
+    return a(0, 0) * a(1, 1) * a(2, 2);
+  }
+}
+
+/// det(I + H) - 1 from the invariants of H.
+template <class T, class S>
+T jacobian_minus_one(const Tensor<T, S>& H) noexcept { return trace(H) + (second_invariant(H) + determinant(H)); }
+
+/// cof(I + H) - I = tr(H) I - H^T + cof(H).
+template <class T, class S>
+Tensor<T, S> cofactor_minus_identity(const Tensor<T, S>& H) noexcept {
+  const Tensor<T, S> quadratic = cofactor(H);
+  return Tensor<T, S>::build([&](int i, int j) {
+    if (i != j) return quadratic(i, j) - H(j, i);
+    return quadratic(i, i) + (H((i + 1) % 3, (i + 1) % 3) + H((i + 2) % 3, (i + 2) % 3));
+  });
+}
+
+}  // namespace perikit

@@ -1,0 +1,156 @@
+#pragma once
+/// A whole Material from a point law that is written once:
+///
+///   struct MyLaw {
+///     static constexpr MaterialTraits traits{.constants = 2};
+///     void constants(const MaterialInput&, double* out) const;                  // throws std::domain_error
+///     Moduli small_strain(const double* k) const noexcept;
+///     template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept;             // one of these
+///     template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept;    // or both
+///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left out
+///   };
+///   auto material = std::make_unique<LawMaterial<MyLaw>>();
+///
+/// T is a Pack, or Duals of it; k is a std::array<Pack, traits.constants>. P(0) must be exactly zero: write it in H, not in F.
+/// Stress, tangent actions, tangents and all five spaces follow; whatever the law leaves out comes from forward differentiation.
+/// A law with P alone stores no energy: it declares hyperelastic = false, and its psi reads zero.
+/// Laws with traits.objective = false are small-strain laws and accept every finite H.
+/// Uniaxial stress needs an isotropic law (both free stretches are taken equal).
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "perikit/core/field.hpp"
+#include "perikit/model/material.hpp"
+#include "perikit/sdk/free_stretch.hpp"
+
+namespace perikit {
+
+template <class Law>
+class LawMaterial final : public Material {
+ public:
+  explicit LawMaterial(Law law = {}) : law_(std::move(law)) {}
+
+  MaterialTraits traits() const noexcept override { return Law::traits; }
+  void constants(const MaterialInput& input, double* out) const override { law_.constants(input, out); }
+  Moduli small_strain(const double* k) const noexcept override { return law_.small_strain(k); }
+
+  Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
+    switch (space) {
+      case Space::solid: return run<Solid, false>(batch);
+      case Space::plane_strain: return run<Plane, false>(batch);
+      case Space::plane_stress: return run<Plane, true>(batch);
+      case Space::line_strain: return run<Line, false>(batch);
+      case Space::line_stress: return run<Line, true>(batch);
+    }
+    return {0};
+  }
+
+ private:
+  static constexpr bool small_strain_law = !Law::traits.objective;
+  using Constants = std::array<Pack, Law::traits.constants>;
+
+  static Constants load_constants(const MaterialBatch& b, int p) noexcept {
+    Constants k;
+    for (std::size_t i = 0; i < k.size(); ++i)
+      k[i] = b.constant_stride == 0 ? Pack(b.constants[i]) : Pack::load(b.constants + i * b.constant_stride + p);
+    return k;
+  }
+
+  template <class S>
+  static Tensor<Pack, S> load(const double* x, std::size_t stride, int p) noexcept {
+    return Tensor<Pack, S>::map([&](int c) { return Pack::load(x + c * stride + p); });
+  }
+  template <class S>
+  static void store(const Tensor<Pack, S>& t, double* x, std::size_t stride, int p) noexcept {
+    PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) t[c].store(x + c * stride + p);
+  }
+
+  /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
+  template <class S>
+  static PackMask admissible(const Tensor<Pack, S>& H) noexcept {
+    if constexpr (small_strain_law) {
+      Pack total = H[0] * 0.0;
+      PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
+      return total == 0.0;
+    } else {
+      const Pack j = jacobian_minus_one(H);   // not finite if any component is not
+      return (j > -1.0) & (j < std::numeric_limits<double>::infinity());
+    }
+  }
+
+  // flatten: the tensors of a point live in registers only where nothing is called
+  template <class S, bool free_stretch>
+  [[gnu::flatten]] Status run(const MaterialBatch& b) const noexcept {
+    Status status;
+    Constants k = load_constants(b, 0);
+    Pack ratio = 0.0;
+    if constexpr (free_stretch) ratio = contraction_ratio<S>(law_, k);
+    for (int p = 0; p < b.n; p += pack_width) {
+      if (b.constant_stride != 0) {
+        k = load_constants(b, p);
+        if constexpr (free_stretch) ratio = contraction_ratio<S>(law_, k);
+      }
+      Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
+      PackMask good = Pack(0.0) == Pack(0.0);
+      if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law_, H, k, ratio, good);
+      good &= admissible(H);
+
+      Pack probe = 0.0;   // turns to NaN where an output is not finite
+      if (b.psi) {
+        Pack psi = 0.0;
+        if constexpr (HasEnergy<Law, Pack, S, Constants>) psi = law_.psi(H, k);
+        psi.store(b.psi + p);
+        probe += 0.0 * psi;
+      }
+      if (b.P) {
+        Tensor<Pack, S> P = stress(law_, H, k);
+        if constexpr (free_stretch) P = with_free_part(P, Pack(0.0));
+        store(P, b.P, b.stride, p);
+        Pack total = P[0];
+        PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += P[c];
+        probe += 0.0 * total;
+      }
+      if (b.dP || b.A) tangents<S, free_stretch>(b, p, H, k);
+      good &= probe == 0.0;
+      if (any(!good)) [[unlikely]] clear(b, S::components, p, good, status);
+    }
+    return status;
+  }
+
+  template <class S, bool free_stretch>
+  [[gnu::noinline, gnu::flatten]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H, const Constants& k) const noexcept {
+    const auto action = [&] {
+      if constexpr (free_stretch) return condensed_tangent(law_, H, k);
+      else return tangent(law_, H, k);
+    }();
+    if (b.dP) store(action(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
+    if (!b.A) return;
+#pragma GCC unroll 1
+    for (int c = 0; c < S::components; ++c) {
+      Tensor<Pack, S> direction = Tensor<Pack, S>::unit(c);
+      store(action(direction), b.A + c * b.stride, S::components * b.stride, p);
+    }
+  }
+
+  /// Zeroes the outputs of the lanes that are not good and notes the first of them.
+  [[gnu::noinline, gnu::cold]] static void clear(const MaterialBatch& b, int components, int p, PackMask good, Status& status) noexcept {
+    for (int lane = 0; lane < pack_width && p + lane < b.n; ++lane) {
+      if (good[lane]) continue;
+      if (status.ok()) status.inadmissible = p + lane;
+      const auto zero = [&](double* x, int count) {
+        if (!x) return;
+        for (int c = 0; c < count; ++c) x[static_cast<std::size_t>(c) * b.stride + p + lane] = 0.0;
+      };
+      zero(b.psi, 1);
+      zero(b.P, components);
+      zero(b.dP, components);
+      zero(b.A, components * components);
+    }
+  }
+
+  Law law_;
+};
+
+}  // namespace perikit

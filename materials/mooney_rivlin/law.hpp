@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "perikit/core/tensor.hpp"
+#include "perikit/model/material.hpp"
+#include "perikit/sdk/volumetric.hpp"
+
+namespace perikit {
+
+/// Compressible Mooney-Rivlin rubber [Scabbia et al. 2025, eqs. 3-7].
+///   psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J),  I1, I2 invariants of C
+///   P = tau F^-T,  tau = 2 C1 J^(-2/3) d + 2 C2 J^(-4/3) ((1 + m) d - dev d^2) + J psi_vol'(J) I
+/// with b = F F^T, 1 + m = tr(b)/3, d = dev b.
+struct MooneyRivlin {
+  static constexpr MaterialTraits traits{.constants = 3};
+  Volumetric volumetric = Volumetric::quadratic;
+
+  void constants(const MaterialInput& input, double* k) const {
+    k[0] = input.value("C1");
+    k[1] = input.value("C2");
+    k[2] = input.value("bulk_modulus");
+    if (!(k[0] + k[1] > 0) || !std::isfinite(k[0] + k[1]))
+      throw std::domain_error("C1 + C2 is " + std::to_string(k[0] + k[1]) + "; must be > 0 (half the shear modulus) and finite");
+    if (!(k[2] > 0) || !std::isfinite(k[2]))
+      throw std::domain_error("bulk_modulus is " + std::to_string(k[2]) + "; must be > 0 and finite");
+  }
+  Moduli small_strain(const double* k) const noexcept {
+    const double mu = 2 * (k[0] + k[1]);
+    return {k[2] - 2 * mu / 3, mu};
+  }
+
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    // I1* = 3/r and I2* = (3 + p)/r^2 with p = I2(d)/(1 + m)^2, q = det(d)/(1 + m)^3, r^3 = 1 + p + q = J^2/(1 + m)^3;
+    // what is left after subtracting 3 is of second order in d, term by term.
+    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
+    const T j = jacobian_minus_one(H), a = T(1.0) / (1.0 + trace(e) * (1.0 / 3.0));
+    const T p = -0.5 * inner(d, d) * (a * a), q = determinant(d) * (a * a * a);
+    const T r = rational_power<2, 3>(T(1.0 + j)) * a, sum = 1.0 + r * (1.0 + r);
+    const T first = -3.0 * (p + q) / (r * sum);
+    const T second = (p * (r * r - 2.0 * r - 2.0) - 3.0 * q * (1.0 + r)) / (r * r * sum);
+    return C1 * first + C2 * second + volumetric_energy(volumetric, kappa, j);
+  }
+
+  template <class T, class S, class K>
+  Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
+    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), inverse_J = T(1.0) / (1.0 + j);
+    const T scale = cbrt(T(1.0 + j)) * inverse_J;   // J^(-2/3)
+    const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale);
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, j);
+    const Tensor<T, S> tau =
+        add_diagonal((first + second * (1.0 + m)) * d - second * deviator(gram(d)), pressure);
+    const Tensor<T, S> G = cofactor_minus_identity(H);
+    return inverse_J * (tau + tau * G);
+  }
+};
+
+}  // namespace perikit

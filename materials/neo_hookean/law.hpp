@@ -1,0 +1,58 @@
+#pragma once
+
+#include "perikit/core/tensor.hpp"
+#include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/volumetric.hpp"
+
+namespace perikit {
+
+/// Compressible neo-Hookean rubber [Scabbia et al. 2025, eq. 5].
+///   psi = mu/2 (J^(-2/3) tr C - 3) + psi_vol(kappa, J)
+///   P = mu J^(-2/3) (F - tr(C)/3 F^-T) + J psi_vol'(J) F^-T
+/// Written in H = F - I: with m = tr(C - I)/3, j = J - 1, G = cof F - I,
+///   J (F - tr(C)/3 F^-T) = J F - (1 + m) cof F = J H + (j - m) I - (1 + m) G - [...] with all terms O(H).
+struct NeoHookean {
+  static constexpr MaterialTraits traits{.constants = 2};
+  Volumetric volumetric = Volumetric::quadratic;
+
+  void constants(const MaterialInput& input, double* k) const {
+    const Moduli moduli = elastic_constants(input);
+    k[0] = moduli.mu;
+    k[1] = moduli.bulk();
+  }
+  Moduli small_strain(const double* k) const noexcept { return {k[1] - 2 * k[0] / 3, k[0]}; }
+
+  /// tr(C)/3 - 1.
+  template <class T, class S>
+  static T mean_strain(const Tensor<T, S>& H) noexcept { return (2.0 * trace(H) + inner(H, H)) * (1.0 / 3.0); }
+
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [mu, kappa] = k;
+    // tr C / J^(2/3) = 3/r with r^3 = J^2 / (1 + m)^3 = 1 + w, and w is of second order in the deviator d of C - I:
+    // w = I2(d)/(1 + m)^2 + det(d)/(1 + m)^3. So 3/r - 3 = -3 w / (r (1 + r + r^2)) keeps its digits.
+    const T m = mean_strain(H), j = jacobian_minus_one(H), a = T(1.0) / (1.0 + m);
+    const Tensor<T, S> d = deviator(right_cauchy_green_minus_identity(H));
+    const T w = (determinant(d) * a - 0.5 * inner(d, d)) * (a * a);
+    const T r = rational_power<2, 3>(T(1.0 + j)) * a;
+    return -1.5 * mu * (w / (r * (1.0 + r * (1.0 + r)))) + volumetric_energy(volumetric, kappa, j);
+  }
+
+  template <class T, class S, class K>
+  Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [mu, kappa] = k;
+    const T m = mean_strain(H), j = jacobian_minus_one(H), J = 1.0 + j;
+    const Tensor<T, S> G = cofactor_minus_identity(H);
+    const T inverse_J = T(1.0) / J;
+    const T shear = mu * (cbrt(J) * inverse_J);                                         // mu J^(-2/3)
+    const T cofactor_part = volumetric_kirchhoff(volumetric, kappa, j) * inverse_J;     // factor of cof F from psi_vol
+    const T on_cofactor = cofactor_part - shear * (inverse_J * (1.0 + m));
+    const T on_identity = shear * (inverse_J * (j - m)) + cofactor_part;
+    return Tensor<T, S>::build([&](int i, int l) {
+      const T off = shear * H(i, l) + on_cofactor * G(i, l);
+      return i == l ? T(off + on_identity) : off;
+    });
+  }
+};
+
+}  // namespace perikit

@@ -1,0 +1,37 @@
+#pragma once
+
+#include "perikit/core/tensor.hpp"
+#include "perikit/model/elastic_constants.hpp"
+
+namespace perikit {
+
+/// Saint Venant-Kirchhoff solid: second Piola-Kirchhoff stress linear in the Green-Lagrange strain.
+///   psi = lambda/2 (tr E)^2 + mu E:E,  E = (F^T F - I)/2,  S = lambda tr(E) I + 2 mu E,  P = F S
+struct SaintVenantKirchhoff {
+  static constexpr MaterialTraits traits{.constants = 2};
+
+  void constants(const MaterialInput& input, double* k) const {
+    const Moduli moduli = elastic_constants(input);
+    k[0] = moduli.lambda;
+    k[1] = moduli.mu;
+  }
+  Moduli small_strain(const double* k) const noexcept { return {k[0], k[1]}; }
+
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);   // 2 E
+    const T t = trace(c);
+    return 0.125 * lambda * (t * t) + 0.25 * mu * inner(c, c);
+  }
+
+  template <class T, class S, class K>
+  Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
+    const Tensor<T, S> second = add_diagonal(mu * c, (0.5 * lambda) * trace(c));
+    return second + H * second;
+  }
+};
+
+}  // namespace perikit

@@ -1,0 +1,299 @@
+#pragma once
+/// What every material must fulfil, as doctest checks: check_material(material, constants, {.law = "my_law"}).
+/// Differences are compared with a tolerance times a stated magnitude: `stress scale` = largest |A| times (1 + largest |H|) at the
+/// point, where a condensed A (plane and uniaxial stress) counts at least lambda + 2 mu.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <sstream>
+#include <string>
+
+#include "tests/contract/material_batch.hpp"
+
+namespace perikit::contract {
+
+struct MaterialOptions {
+  std::string law;                                  ///< name for messages
+  double least_stretch = 0.2, most_stretch = 5.0;   ///< of the random deformations, where all stretches are given
+  double least_free = 0.8, most_free = 1.2;         ///< the same where a stretch is free (some laws have no solution far out)
+  std::vector<bool> moduli = {};                       ///< which constants are moduli [Pa]; empty: all
+  std::uint64_t seed = 20240229;
+};
+
+/// One material in one space.
+class MaterialContract {
+ public:
+  MaterialContract(const Material& material, std::vector<double> constants, Space space, MaterialOptions options)
+      : material_(material), traits_(material.traits()), constants_(std::move(constants)), space_(space), options_(std::move(options)),
+        components_(tensor_components(space)), random_(options_.seed) {}
+
+  void check() {
+    CHECK_MESSAGE(traits_.constants == static_cast<int>(constants_.size()), label(), "number of constants");
+    if (traits_.constants != static_cast<int>(constants_.size()) || traits_.state != 0) return;
+    reference_state();
+    small_strains();
+    derivatives();
+    tangent_action();
+    batches();
+    rotations();
+    units();
+    inadmissible();
+  }
+
+ private:
+  std::string label() const {
+    std::ostringstream s;
+    s << options_.law << ", " << name(space_) << ", constants";
+    for (const double k : constants_) s << ' ' << k;
+    s << ", seed " << options_.seed << ": ";
+    return s.str();
+  }
+
+  /// |found - expected| <= tolerance * scale in every entry, reported once with the worst entry.
+  void near(const std::string& identity, const Values& found, const Values& expected, double tolerance, double scale) const {
+    std::size_t worst = 0;
+    double error = -1;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const double e = std::abs(found[i] - expected[i]);
+      if (!(e <= error)) worst = i, error = e;
+      if (std::isnan(e)) break;
+    }
+    CHECK_MESSAGE(error <= tolerance * scale, label(), identity, ": component ", worst, " is ", found[worst], ", expected ", expected[worst],
+                  ", error ", error, " > ", tolerance, " * ", scale);
+  }
+  void same_bits(const std::string& identity, const Values& found, const Values& expected) const {
+    std::size_t i = 0;
+    while (i < found.size() && std::bit_cast<std::uint64_t>(found[i]) == std::bit_cast<std::uint64_t>(expected[i])) ++i;
+    if (i == found.size()) return;
+    CHECK_MESSAGE(i == found.size(), label(), identity, ": value ", i, " is ", found[i], ", expected ", expected[i]);
+  }
+
+  Values gradient(const Matrix& F) const {
+    Values H = restrict_to(space_, F);
+    std::size_t c = 0;
+    for (const int k : places(space_)) H[c++] -= identity[k];
+    return H;
+  }
+  Matrix random_F() {
+    const bool free = free_stretch(space_);
+    return random_deformation(random_, space_, free ? options_.least_free : options_.least_stretch,
+                              free ? options_.most_free : options_.most_stretch);
+  }
+  std::vector<Values> random_points(int n) {
+    std::vector<Values> r;
+    for (int p = 0; p < n; ++p) r.push_back(gradient(random_F()));
+    return r;
+  }
+  std::vector<Values> random_directions(int n) {
+    std::vector<Values> r;
+    for (int p = 0; p < n; ++p) r.push_back(random_direction(random_, space_));
+    return r;
+  }
+  Evaluation evaluate(const std::vector<Values>& points, const std::vector<Values>& directions = {}) const {
+    return {material_, space_, constants_, points, directions};
+  }
+  /// Largest stiffness; a condensed one is a difference of uncondensed ones, of the size of lambda + 2 mu.
+  double stiffness_scale(const Values& A) const {
+    const Moduli m = material_.small_strain(constants_.data());
+    return free_stretch(space_) ? std::max(largest(A), m.lambda + 2 * m.mu) : largest(A);
+  }
+  double stress_scale(const Evaluation& e, int p) const { return stiffness_scale(e.at(e.A, p)) * (1 + largest(e.at(e.H, p))); }
+
+  /// C : a with the small-strain moduli, condensed where stretches are free.
+  Values linear_stress(const Values& a) const {
+    const Moduli m = material_.small_strain(constants_.data());
+    const int d = dimension(space_);
+    const bool free = free_stretch(space_);
+    const double lambda = !free ? m.lambda : d == 2 ? 2 * m.lambda * m.mu / (m.lambda + 2 * m.mu) : m.youngs() - 2 * m.mu;
+    Matrix full = extend(space_, a);
+    if (free)
+      for (int i = d; i < 3; ++i) full[4 * i] = 0;
+    const double trace = full[0] + full[4] + full[8];
+    Matrix s{};
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) s[3 * i + j] = m.mu * (full[3 * i + j] + full[3 * j + i]) + (i == j ? lambda * trace : 0.0);
+    if (free)
+      for (int i = d; i < 3; ++i) s[4 * i] = 0;
+    return restrict_to(space_, s);
+  }
+
+  void reference_state() {
+    const Evaluation e = evaluate({Values(components_, 0.0)});
+    CHECK_MESSAGE(e.status.ok(), label(), "F = I is refused");
+    CHECK_MESSAGE(e.psi.data()[0] == 0.0, label(), "psi(0) = 0: ", e.psi.data()[0]);
+    for (int c = 0; c < components_; ++c) CHECK_MESSAGE(e.P.component(c)[0] == 0.0, label(), "P(0) = 0: component ", c, " ", e.P.component(c)[0]);
+    const double scale = stiffness_scale(e.at(e.A, 0));
+    for (int c = 0; c < components_; ++c) {
+      Values unit(components_, 0.0), column;
+      unit[c] = 1;
+      for (int r = 0; r < components_; ++r) column.push_back(e.A.component(r * components_ + c)[0]);
+      near("tangent at I is linear elastic", column, linear_stress(unit), 1e-12, scale);
+    }
+  }
+
+  /// P and psi of strains of 1e-10 to nine digits: impossible through F = I + H or C.
+  void small_strains() {
+    constexpr double size = 1e-10;
+    for (int trial = 0; trial < 4; ++trial) {
+      Values H = random_direction(random_, space_);
+      for (double& x : H) x *= size;
+      const Evaluation e = evaluate({H});
+      const Values linear = linear_stress(H);
+      near("P of a strain of 1e-10", e.at(e.P, 0), linear, 1e-8, largest(linear));
+      if (!traits_.hyperelastic) continue;
+      double energy = 0;
+      for (int c = 0; c < components_; ++c) energy += is_free(space_, c) ? 0.0 : 0.5 * linear[c] * H[c];
+      near("psi of a strain of 1e-10", e.at(e.psi, 0), {energy}, 1e-8, energy);
+    }
+  }
+
+  /// P = dpsi/dF, A = dP/dF by central differences of order six, and the major symmetry of A.
+  void derivatives() {
+    constexpr int n = 24;
+    constexpr double weights[] = {3.0 / 4, -3.0 / 20, 1.0 / 60};
+    const std::vector<Values> points = random_points(n), directions = random_directions(n);
+    const Evaluation e = evaluate(points, directions);
+    CHECK_MESSAGE(e.status.ok(), label(), "admissible deformation refused, point ", e.status.inadmissible);
+    const double h = 1e-3 * std::min(1.0, free_stretch(space_) ? options_.least_free : options_.least_stretch);
+    std::vector<double> energy_slope(n, 0.0);
+    std::vector<Values> stress_slope(n, Values(components_, 0.0));
+    for (int k = 1; k <= 3; ++k)
+      for (const int sign : {1, -1}) {
+        std::vector<Values> moved = points;
+        for (int p = 0; p < n; ++p)
+          for (int c = 0; c < components_; ++c) moved[p][c] += sign * k * h * directions[p][c];
+        const Evaluation m = evaluate(moved);
+        for (int p = 0; p < n; ++p) {
+          energy_slope[p] += sign * weights[k - 1] / h * m.psi.data()[p];
+          for (int c = 0; c < components_; ++c) stress_slope[p][c] += sign * weights[k - 1] / h * m.P.component(c)[p];
+        }
+      }
+    for (int p = 0; p < n; ++p) {
+      const double scale = stress_scale(e, p);
+      const Values P = e.at(e.P, p), A = e.at(e.A, p);
+      double power = 0;
+      for (int c = 0; c < components_; ++c) power += P[c] * directions[p][c];
+      if (traits_.hyperelastic) near("P : dF = dpsi (differences)", {power}, {energy_slope[p]}, 1e-7, scale);
+      near("A : dF = dP (differences)", e.at(e.dP, p), stress_slope[p], 1e-7, scale);
+      if (!traits_.hyperelastic) continue;
+      Values transposed(A.size());
+      for (int r = 0; r < components_; ++r)
+        for (int c = 0; c < components_; ++c) transposed[c * components_ + r] = A[r * components_ + c];
+      near("major symmetry of A", A, transposed, 1e-12, scale);
+    }
+  }
+
+  void tangent_action() {
+    constexpr int n = 16;
+    const std::vector<Values> directions = random_directions(n);
+    const Evaluation e = evaluate(random_points(n), directions);
+    for (int p = 0; p < n; ++p) {
+      Values action(components_, 0.0);
+      for (int r = 0; r < components_; ++r)
+        for (int c = 0; c < components_; ++c) action[r] += e.A.component(r * components_ + c)[p] * directions[p][c];
+      near("dP = A : dH", e.at(e.dP, p), action, 1e-12, stress_scale(e, p));
+      for (int c = 0; c < components_; ++c)
+        if (is_free(space_, c)) CHECK_MESSAGE(e.P.component(c)[p] == 0.0, label(), "free stress is exactly zero: ", e.P.component(c)[p]);
+    }
+  }
+
+  /// A batch equals its points one at a time, to the bit; outputs are overwritten; nothing behind the padding is touched.
+  void batches() {
+    constexpr int n = 37;
+    std::vector<Values> points = random_points(n);
+    const std::vector<Values> directions = random_directions(n);
+    const Evaluation batch = evaluate(points, directions);
+    CHECK_MESSAGE(batch.guards_intact, label(), "writes behind padded(n)");
+    for (int p = 0; p < n; ++p) {
+      const Values all = batch.all(p);
+      CHECK_MESSAGE(std::none_of(all.begin(), all.end(), [](double x) { return std::isnan(x); }), label(), "outputs overwritten, point ", p);
+      const Evaluation single = evaluate({points[p]}, {directions[p]});
+      same_bits("batch = single", all, single.all(0));
+      if (!free_stretch(space_)) continue;
+      Values other = points[p];
+      for (int c = 0; c < components_; ++c)
+        if (is_free(space_, c)) other[c] = -7.0;
+      same_bits("free components of H are not read", evaluate({other}, {directions[p]}).all(0), all);
+    }
+    const Evaluation per_point(material_, space_, constants_, points, directions, true);
+    for (int p = 0; p < n; ++p) same_bits("constants per point = uniform constants", per_point.all(p), batch.all(p));
+  }
+
+  void rotations() {
+    if (dimension(space_) == 1) return;
+    for (int trial = 0; trial < 12; ++trial) {
+      const Matrix F = random_F(), Q = random_rotation(random_, space_);
+      const Evaluation e = evaluate({gradient(F)});
+      const Matrix P = extend(space_, e.at(e.P, 0));
+      const double scale = stress_scale(e, 0);
+      if (traits_.objective) {
+        const Evaluation r = evaluate({gradient(product(Q, F))});
+        near("objectivity P(QF) = Q P(F)", r.at(r.P, 0), restrict_to(space_, product(Q, P)), 1e-12, scale);
+      }
+      if (traits_.objective && traits_.isotropic) {
+        const Evaluation r = evaluate({gradient(product(F, Q))});
+        near("isotropy P(FQ) = P(F) Q", r.at(r.P, 0), restrict_to(space_, product(P, Q)), 1e-12, scale);
+      }
+    }
+  }
+
+  void units() {
+    constexpr double s = 1e9;
+    const std::vector<Values> points = random_points(8), directions = random_directions(8);
+    std::vector<double> scaled = constants_;
+    for (std::size_t k = 0; k < scaled.size(); ++k)
+      if (options_.moduli.empty() || options_.moduli[k]) scaled[k] *= s;
+    const Evaluation one = evaluate(points, directions), other(material_, space_, scaled, points, directions);
+    for (int p = 0; p < 8; ++p) {
+      Values expected = one.all(p);
+      for (double& x : expected) x *= s;
+      near("scaling the moduli scales psi, P, dP, A", other.all(p), expected, 1e-12, s * stress_scale(one, p));
+    }
+  }
+
+  /// The first bad point is named, bad points read zero, good points do not notice.
+  void inadmissible() {
+    constexpr int n = 21, first = 5;
+    std::vector<Values> points = random_points(n);
+    const std::vector<Values> directions = random_directions(n);
+    const Evaluation clean = evaluate(points, directions);
+    std::vector<int> bad{first, 9, 18};
+    points[9][0] = std::numeric_limits<double>::quiet_NaN();
+    points[18][0] = std::numeric_limits<double>::infinity();
+    points[first] = Values(components_, 0.0);
+    points[first][0] = traits_.objective ? -1.5 : -std::numeric_limits<double>::infinity();
+    const Evaluation e = evaluate(points, directions);
+    CHECK_MESSAGE(e.status.inadmissible == first, label(), "first inadmissible point ", first, ", reported ", e.status.inadmissible);
+    for (int p = 0; p < n; ++p) {
+      const bool is_bad = std::find(bad.begin(), bad.end(), p) != bad.end();
+      const Values all = e.all(p);
+      if (is_bad) CHECK_MESSAGE(std::all_of(all.begin(), all.end(), [](double x) { return x == 0; }), label(), "zero at bad point ", p);
+      else same_bits("points beside inadmissible ones", all, clean.all(p));
+    }
+    if (!traits_.objective) return;
+    Values flat(components_, 0.0);
+    flat[0] = -1;   // det F = 0
+    CHECK_MESSAGE(evaluate({flat}).status.inadmissible == 0, label(), "det F = 0 must be refused");
+  }
+
+  const Material& material_;
+  MaterialTraits traits_;
+  std::vector<double> constants_;
+  Space space_;
+  MaterialOptions options_;
+  int components_;
+  Random random_;
+};
+
+/// The whole contract in all five spaces.
+inline void check_material(const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
+  for (const Space space : {Space::solid, Space::plane_strain, Space::plane_stress, Space::line_strain, Space::line_stress}) {
+    if (space == Space::line_stress && !material.traits().isotropic) continue;
+    MaterialContract(material, constants, space, options).check();
+  }
+}
+
+}  // namespace perikit::contract

@@ -1,0 +1,197 @@
+#include <doctest/doctest.h>
+
+#include "materials/hencky/law.hpp"
+#include "materials/linear_elastic/law.hpp"
+#include "materials/mooney_rivlin/law.hpp"
+#include "materials/neo_hookean/law.hpp"
+#include "materials/saint_venant_kirchhoff/law.hpp"
+#include "perikit/sdk/law_material.hpp"
+#include "tests/contract/material_contract.hpp"
+
+using namespace perikit;
+using contract::check_material;
+using contract::Evaluation;
+using contract::MaterialOptions;
+
+namespace {
+
+/// (lambda, mu) for mu = 1 and Poisson's ratio nu.
+std::vector<double> lame(double nu) { return {2 * nu / (1 - 2 * nu), 1.0}; }
+
+}  // namespace
+
+TEST_CASE("contract: linear_elastic") {
+  for (const double nu : {-0.3, 0.0, 0.25, 0.49999})
+    check_material(LawMaterial<LinearElastic>(), lame(nu), {.law = "linear_elastic", .least_free = 0.2, .most_free = 5});
+}
+
+TEST_CASE("contract: saint_venant_kirchhoff") {
+  for (const double nu : {-0.3, 0.0, 0.25, 0.49999})
+    check_material(LawMaterial<SaintVenantKirchhoff>(), lame(nu), {.law = "saint_venant_kirchhoff"});
+}
+
+TEST_CASE("contract: neo_hookean") {
+  for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic})
+    for (const double kappa : {1.7, 20.0, 1e4})
+      check_material(LawMaterial(NeoHookean{form}), {1.0, kappa}, {.law = "neo_hookean", .least_free = 0.4, .most_free = 4});
+}
+
+TEST_CASE("contract: mooney_rivlin") {
+  for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic})
+    for (const double kappa : {1.7, 20.0, 1e4})
+      check_material(LawMaterial(MooneyRivlin{form}), {0.3, 0.2, kappa}, {.law = "mooney_rivlin", .least_free = 0.4, .most_free = 4});
+}
+
+TEST_CASE("contract: hencky") {
+  for (const double nu : {-0.3, 0.0, 0.25, 0.49999})
+    check_material(LawMaterial<Hencky>(), lame(nu), {.law = "hencky", .least_free = 0.2, .most_free = 5});
+}
+
+namespace {
+
+/// Laws that keep only a part of another, so that the rest must be differentiated.
+template <class Law>
+struct EnergyOnly : Law {
+  using Law::constants, Law::small_strain, Law::traits;
+  template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept { return Law::psi(H, k); }
+
+ private:
+  using Law::P;
+};
+template <class Law>
+struct StressOnly : Law {
+  static constexpr MaterialTraits traits = [] {
+    MaterialTraits t = Law::traits;
+    t.hyperelastic = false;
+    return t;
+  }();
+
+ private:
+  using Law::psi;
+};
+
+/// psi, P, dP, A of two materials agree to 1e-10 of the magnitude of each.
+void check_same(const Material& found, const Material& expected, const std::vector<double>& constants, const std::string& what, bool with_energy) {
+  contract::Random random(11);
+  for (const Space space : {Space::solid, Space::plane_strain, Space::plane_stress, Space::line_strain, Space::line_stress}) {
+    const bool free = contract::free_stretch(space);
+    std::vector<contract::Values> points, directions;
+    for (int p = 0; p < 19; ++p) {
+      contract::Matrix F = contract::random_deformation(random, space, free ? 0.8 : 0.2, free ? 1.2 : 5.0);
+      for (int i = 0; i < 3; ++i) F[4 * i] -= 1;
+      points.push_back(contract::restrict_to(space, F));
+      directions.push_back(contract::random_direction(random, space));
+    }
+    const Evaluation a(found, space, constants, points, directions), b(expected, space, constants, points, directions);
+    CHECK(a.status.ok());
+    for (int p = 0; p < a.n; ++p) {
+      const double scale = contract::largest(b.at(b.A, p));
+      const contract::Values x = a.all(p), y = b.all(p);
+      for (std::size_t i = with_energy ? 0 : 1; i < x.size(); ++i)
+        CHECK_MESSAGE(std::abs(x[i] - y[i]) <= 1e-10 * scale, what, ", ", name(space), ": value ", i, " is ", x[i], ", expected ", y[i]);
+    }
+  }
+}
+
+template <class Law>
+void check_differentiated(const std::vector<double>& constants, const std::string& what) {
+  check_same(LawMaterial<EnergyOnly<Law>>(), LawMaterial<Law>(), constants, what + " from psi alone", true);
+  check_same(LawMaterial<StressOnly<Law>>(), LawMaterial<Law>(), constants, what + " from P alone", false);
+}
+
+/// P of one point in 3D.
+contract::Matrix stress_of(const Material& material, const std::vector<double>& constants, contract::Matrix F) {
+  for (int i = 0; i < 3; ++i) F[4 * i] -= 1;
+  const Evaluation e(material, Space::solid, constants, {contract::restrict_to(Space::solid, F)});
+  return contract::extend(Space::solid, e.at(e.P, 0));
+}
+
+}  // namespace
+
+TEST_CASE("missing pieces by forward differentiation equal the written ones") {
+  check_differentiated<SaintVenantKirchhoff>({1.2, 0.8}, "saint_venant_kirchhoff");
+  check_differentiated<NeoHookean>({0.8, 8.0}, "neo_hookean");
+  check_differentiated<MooneyRivlin>({0.3, 0.1, 8.0}, "mooney_rivlin");
+  check_differentiated<LinearElastic>({1.2, 0.8}, "linear_elastic");
+}
+
+TEST_CASE("saint_venant_kirchhoff: uniaxial strain and uniaxial stress") {
+  const double lambda = 1.2, mu = 0.8, E = mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  const LawMaterial<SaintVenantKirchhoff> material;
+  for (const double stretch : {0.7, 0.9, 1.1, 1.4}) {
+    const double green = (stretch * stretch - 1) / 2;
+    const Evaluation strain(material, Space::line_strain, std::vector{lambda, mu}, {{stretch - 1, 0, 0}});
+    CHECK(strain.P.data()[0] == doctest::Approx(stretch * (lambda + 2 * mu) * green).epsilon(1e-14));
+    CHECK(strain.P.component(1)[0] == doctest::Approx(lambda * green).epsilon(1e-14));
+    const Evaluation stress(material, Space::line_stress, std::vector{lambda, mu}, {{stretch - 1, 0, 0}});
+    CHECK(stress.P.data()[0] == doctest::Approx(stretch * E * green).epsilon(1e-14));
+    CHECK(stress.psi.data()[0] == doctest::Approx(E * green * green / 2).epsilon(1e-14));
+  }
+  // E33 = -lambda/(lambda + 2 mu) (E11 + E22) < -1/2: no thickness is left to carry
+  const Evaluation beyond(material, Space::plane_stress, std::vector{lambda, mu}, {{0.1, 0, 0, 0, 0}, {1.5, 0, 0, 1.5, 0}});
+  CHECK(beyond.status.inadmissible == 1);
+}
+
+TEST_CASE("neo_hookean: nearly incompressible tension and simple shear") {
+  const double mu = 0.8, kappa = 8e6;
+  const LawMaterial<NeoHookean> material;
+  for (const double stretch : {0.5, 0.8, 1.5, 3.0}) {
+    const Evaluation e(material, Space::line_stress, std::vector{mu, kappa}, {{stretch - 1, 0, 0}});
+    CHECK(e.P.data()[0] == doctest::Approx(mu * (stretch - 1 / (stretch * stretch))).epsilon(1e-6));
+    const Evaluation sheet(material, Space::plane_stress, std::vector{mu, kappa}, {{stretch - 1, 0, 0, stretch - 1, 0}});
+    CHECK(sheet.P.data()[0] == doctest::Approx(mu * (stretch - std::pow(stretch, -5))).epsilon(1e-5));
+  }
+  for (const double gamma : {1e-6, 0.1, 2.0}) {
+    const contract::Matrix P = stress_of(material, {mu, kappa}, {1, gamma, 0, 0, 1, 0, 0, 0, 1});
+    // tau = mu dev b with b = I + gamma (xy + yx) + gamma^2 xx, P = tau F^-T
+    CHECK(P[1] == doctest::Approx(mu * gamma).epsilon(1e-13));
+    CHECK(P[3] == doctest::Approx(mu * gamma * (1 + gamma * gamma / 3)).epsilon(1e-13));
+    CHECK(P[8] == doctest::Approx(-mu * gamma * gamma / 3).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("hencky: hydrostatic and principal stretches") {
+  const double lambda = 1.2, mu = 0.8, kappa = lambda + 2 * mu / 3;
+  const LawMaterial<Hencky> material;
+  for (const double a : {0.2, 0.9, 1.0 + 1e-9, 1.1, 5.0}) {
+    const contract::Matrix P = stress_of(material, {lambda, mu}, {a, 0, 0, 0, a, 0, 0, 0, a});
+    for (int i = 0; i < 9; ++i) CHECK(P[i] == doctest::Approx(i % 4 == 0 ? 3 * kappa * std::log(a) / a : 0.0).epsilon(1e-14).scale(kappa));
+  }
+  const double l[3] = {0.6, 1.1, 2.5}, volume = std::log(l[0] * l[1] * l[2]);
+  const contract::Matrix P = stress_of(material, {lambda, mu}, {l[0], 0, 0, 0, l[1], 0, 0, 0, l[2]});
+  for (int i = 0; i < 3; ++i) CHECK(P[4 * i] == doctest::Approx((lambda * volume + 2 * mu * std::log(l[i])) / l[i]).epsilon(1e-13));
+}
+
+// The reference is the same law in long double with its own tolerance: derivatives there by central differences of order six.
+TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
+  using Long = long double;
+  using LongTensor = Tensor<Long, Solid>;
+  const Hencky law;
+  const std::array<Long, 2> k{1.2L, 0.8L};
+  const std::vector<double> constants{1.2, 0.8};
+  constexpr Long weights[] = {3.0L / 4, -3.0L / 20, 1.0L / 60};
+  contract::Random random(3);
+  for (int shape = 0; shape < 3; ++shape)
+    for (int exponent = 0; exponent <= 17; ++exponent) {
+      const double gap = exponent == 17 ? 0.0 : std::pow(10.0, -exponent);
+      // 0: two equal and a third above, 1: below, 2: all three near
+      const double third = shape == 0 ? 2.0 : shape == 1 ? 0.5 : 1.3 + 2 * gap;
+      const contract::Matrix F = contract::product(contract::random_rotation(random, Space::solid),
+          contract::product({1.3, 0, 0, 0, 1.3 + gap, 0, 0, 0, third}, contract::random_rotation(random, Space::solid)));
+      contract::Values H = contract::restrict_to(Space::solid, F);
+      for (int i = 0; i < 3; ++i) H[4 * i] -= 1;
+      const contract::Values direction = contract::random_direction(random, Space::solid);
+      const Evaluation e(LawMaterial<Hencky>(), Space::solid, constants, {H}, {direction});
+      const Long h = 2e-3L;
+      const auto moved = [&](int c, Long by) { return LongTensor::map([&](int i) { return Long(H[i]) + (c < 0 ? by * Long(direction[i]) : i == c ? by : 0.0L); }); };
+      for (int c = 0; c < 9; ++c) {
+        Long slope = 0;
+        for (int step = 1; step <= 3; ++step) slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
+        CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= 1e-11, "P: shape ", shape, ", gap ", gap, ", component ", c);
+      }
+      LongTensor slope = LongTensor::map([](int) { return 0.0L; });
+      for (int step = 1; step <= 3; ++step) slope = slope + (weights[step - 1] / h) * (law.P(moved(-1, step * h), k) - law.P(moved(-1, -step * h), k));
+      for (int c = 0; c < 9; ++c)
+        CHECK_MESSAGE(std::abs(double(slope[c] - e.dP.component(c)[0])) <= 1e-11, "dP: shape ", shape, ", gap ", gap, ", component ", c, " ", double(slope[c]), " ", e.dP.component(c)[0]);
+    }
+}
