@@ -92,7 +92,8 @@ std::string reason(const mu::ParserError& error) {
 
 std::vector<std::string> expression_words() {
   std::vector<std::string> words{"x", "y", "z", "t", "pi"};
-  for (const auto& [name, function] : make_parser().GetFunDef()) words.push_back(name);
+  const mu::Parser parser = make_parser();
+  for (const auto& [name, function] : parser.GetFunDef()) words.push_back(name);
   return words;
 }
 

@@ -27,7 +27,7 @@ std::string scalar(const std::vector<T>& list) {
 }  // namespace
 
 void ResolvedWriter::header(const std::string& name, bool array) {
-  text_ += fmt::format(array ? "\n[[{}]]\n" : "\n[{}]\n", name);
+  text_ += array ? fmt::format("\n[[{}]]\n", name) : fmt::format("\n[{}]\n", name);
 }
 
 void ResolvedWriter::line(const std::string& key, const std::string& toml) {

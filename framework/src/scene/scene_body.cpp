@@ -28,8 +28,8 @@ void SceneReader::read_body(const toml::table& root) {
 
   // Keys of another dimension are known words: say so instead of calling them unknown.
   std::vector<std::string> others{"lattice", "points"};
-  const ParameterTable table = body_parameters(reader_.dimension);
-  for (const Parameter& parameter : body_parameters(0).parameters()) {
+  const ParameterTable table = body_parameters(reader_.dimension), every = body_parameters(0);
+  for (const Parameter& parameter : every.parameters()) {
     if (table.find(parameter.name) || !body->contains(parameter.name)) continue;
     others.push_back(parameter.name);
     const int fits = body_parameters(1).find(parameter.name) ? 1 : 2;

@@ -165,7 +165,8 @@ void SceneReader::read_sets(const toml::table& root) {
 }
 
 void SceneReader::read_parts(const toml::table& root) {
-  for (const Parameter& parameter : model_parameters().parameters()) {
+  const ParameterTable model = model_parameters();
+  for (const Parameter& parameter : model.parameters()) {
     const toml::node* node = root.get(parameter.name);
     if (!node) {
       if (parameter.required) reader_.errors.add(reader_.position(root), parameter.name, "found nothing; allowed: " + allowed(parameter));

@@ -182,7 +182,8 @@ std::vector<std::string> field_components(std::string_view field, int dimension)
 const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
   static const std::vector<std::pair<std::string, ParameterTable>> sections = [] {
     ParameterTable top = head_parameters();
-    for (const Parameter& part : model_parameters().parameters()) top.add(part.type, part.name, part.unit, part.text) = part;
+    const ParameterTable model = model_parameters();
+    for (const Parameter& part : model.parameters()) top.add(part.type, part.name, part.unit, part.text) = part;
     return std::vector<std::pair<std::string, ParameterTable>>{
         {"", top},
         {"constants", {}},
