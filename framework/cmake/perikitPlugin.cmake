@@ -19,14 +19,19 @@ function(perikit_compile_options target)
 endfunction()
 
 # perikit_add_plugin(name sources...): a shared library that the registry can load, with its manifest beside it.
+# PERIKIT_PLUGIN_OUTPUT, where set, is the folder that it is built into, and it is installed with the program.
 function(perikit_add_plugin name)
   add_library(${name} MODULE ${ARGN})
   target_link_libraries(${name} PRIVATE perikit::perikit)
   target_link_options(${name} PRIVATE -Wl,-z,defs)
   perikit_compile_options(${name})
-  set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ".so" CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  # Built with the rpath it is installed with: an installed plugin is byte for byte the one that its manifest was written for.
+  set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ".so" CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
+                        BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH "$ORIGIN/.." INSTALL_RPATH_USE_LINK_PATH ON)
   if(PERIKIT_PLUGIN_OUTPUT)
     set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${PERIKIT_PLUGIN_OUTPUT})
     install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/perikit)
+    install(FILES ${PERIKIT_PLUGIN_OUTPUT}/${name}.parts DESTINATION ${CMAKE_INSTALL_LIBDIR}/perikit)
   endif()
+  add_custom_command(TARGET ${name} POST_BUILD COMMAND perikit::perikit-manifest $<TARGET_FILE:${name}> VERBATIM)
 endfunction()

@@ -16,7 +16,7 @@ struct RefusedLibrary {
   std::string reason;
 };
 
-class Registry : public PartFactory {
+class Registry final : public PartFactory, public PartCatalogue {
  public:
   Registry();
   ~Registry() override;
@@ -29,18 +29,20 @@ class Registry : public PartFactory {
 
   /// Adds every *.so below `folder` (not recursive) as a candidate: reads the manifest beside it (X.so -> X.parts) where there is
   /// one, so that names are known without opening; opens the library at once where there is none.
+  /// A manifest that was not written for exactly this file is stale and ignored. What is refused is kept in `refused`; a folder
+  /// that cannot be read throws InputError. Of two libraries that bring the same part, the second is refused.
   void add_folder(const std::filesystem::path& folder);
-  /// Opens and registers one library now. Throws InputError with file and reason when it is refused.
-  void open(const std::filesystem::path& library);
+  /// Opens and registers one library now. Throws InputError with file and reason when it is refused; nothing of it is then known.
+  void open(const std::filesystem::path& library) override;
 
   /// Parts in hand: registered, or named by a manifest. Sorted.
-  std::vector<std::string> names(Kind kind) const;
+  std::vector<std::string> names(Kind kind) const override;
   /// Opens the library that has it if need be. Throws InputError "unknown material 'x'; did you mean 'y'? known: ..." - with
   /// the refused libraries appended when one of them might have held it.
-  const PartDescription& describe(Kind kind, std::string_view name);
+  const PartDescription& describe(Kind kind, std::string_view name) override;
   /// The library that brings this part.
   std::filesystem::path library_of(Kind kind, std::string_view name) const;
-  bool known(Kind kind, std::string_view name) const;
+  bool known(Kind kind, std::string_view name) const override;
 
   const std::vector<RefusedLibrary>& refused() const noexcept;
   /// Libraries opened so far, in order.
@@ -48,6 +50,7 @@ class Registry : public PartFactory {
   /// What one opened library registered.
   std::vector<std::pair<Kind, std::string>> parts_of(const std::filesystem::path& library) const;
 
+  // Parts from their checked values. What a factory throws or leaves null becomes an InputError with part and library.
   std::unique_ptr<Kinematics> kinematics(const PartValues&) const override;
   std::unique_ptr<Stabilization> stabilization(const PartValues&) const override;
   std::unique_ptr<Material> material(const PartValues&) const override;

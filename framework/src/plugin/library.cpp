@@ -1,0 +1,125 @@
+#include "plugin/library.hpp"
+
+#include <elf.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/dll/shared_library.hpp>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <vector>
+
+#include "perikit/plugin/abi.hpp"
+#include "plugin/registrar.hpp"
+
+namespace perikit {
+
+namespace fs = std::filesystem;
+namespace dll = boost::dll;
+
+namespace {
+
+/// Whether [offset, offset + length) lies inside a file of `size` bytes; no sum that could overflow.
+bool inside(std::uint64_t offset, std::uint64_t length, std::uint64_t size) { return offset <= size && length <= size - offset; }
+
+/// Whether header, program headers, segments and section table of a 64-bit ELF file lie inside the file.
+bool complete(std::ifstream& in, std::uint64_t size) {
+  Elf64_Ehdr header{};
+  in.seekg(0);
+  if (!in.read(reinterpret_cast<char*>(&header), sizeof header)) return false;
+  const std::uint64_t segments = std::uint64_t{header.e_phnum} * sizeof(Elf64_Phdr);
+  if (header.e_phentsize != sizeof(Elf64_Phdr) || !inside(header.e_phoff, segments, size)) return false;
+  if (!inside(header.e_shoff, std::uint64_t{header.e_shnum} * header.e_shentsize, size)) return false;
+  std::vector<Elf64_Phdr> program(header.e_phnum);
+  in.seekg(static_cast<std::streamoff>(header.e_phoff));
+  if (!in.read(reinterpret_cast<char*>(program.data()), static_cast<std::streamsize>(segments))) return false;
+  return std::ranges::all_of(program, [&](const Elf64_Phdr& p) { return inside(p.p_offset, p.p_filesz, size); });
+}
+
+dll::shared_library load(const fs::path& file) try {
+  // Never unloaded: live objects, std::functions and kept exceptions hold the library's code.
+  constexpr auto mode = static_cast<dll::load_mode::type>(RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  return dll::shared_library(file, mode);
+} catch (const dll::fs::system_error& error) {
+  throw Refusal(fmt::format("the loader refuses it: {}", error.what()));  // its text is dlerror's; its code means nothing
+}
+
+[[noreturn]] void probe_in_child(const fs::path& file) {
+  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) std::signal(signal, SIG_DFL);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  const int silence = ::open("/dev/null", O_WRONLY);
+  dup2(silence, STDOUT_FILENO);
+  dup2(silence, STDERR_FILENO);
+  alarm(30);  // [s]: a library that never returns from its registration
+  try {
+    PartCollector collector([](Kind, std::string_view) { return fs::path(); });
+    load_library(file, collector);
+  } catch (const Refusal&) {  // the caller meets it again, and reports it
+  }
+  _exit(0);
+}
+
+}  // namespace
+
+void check_file(const fs::path& file) {
+  std::error_code unreadable;
+  if (!fs::exists(file, unreadable)) throw Refusal("no such file");
+  if (!fs::is_regular_file(file, unreadable)) throw Refusal("not a regular file");
+  const std::uintmax_t size = fs::file_size(file, unreadable);
+  std::ifstream in(file, std::ios::binary);
+  if (unreadable || !in) throw Refusal("cannot be read");
+  std::array<unsigned char, EI_NIDENT> identity{};
+  in.read(reinterpret_cast<char*>(identity.data()), identity.size());
+  if (std::memcmp(identity.data(), ELFMAG, SELFMAG) != 0) throw Refusal("not a shared library (ELF magic missing)");
+  if (!in) throw Refusal("truncated (shorter than its ELF header)");
+  // Other classes and byte orders have other headers; the loader refuses them by name.
+  const bool readable = identity[EI_CLASS] == ELFCLASS64 && identity[EI_DATA] == ELFDATA2LSB;
+  if (readable && !complete(in, size)) throw Refusal(fmt::format("truncated ({} bytes, its ELF headers name more)", size));
+}
+
+void check_abi(int version, const std::string& build_id) {
+  if (version != PERIKIT_ABI_VERSION) {
+    throw Refusal(fmt::format("ABI version {}, this program has {}", version, PERIKIT_ABI_VERSION));
+  }
+  if (build_id != PERIKIT_BUILD_ID) throw Refusal(fmt::format("built as '{}', this program as '{}'", build_id, PERIKIT_BUILD_ID));
+}
+
+void load_library(const fs::path& file, Registrar& registrar) {
+  check_file(file);
+  const dll::shared_library library = load(file);
+  for (const char* symbol : {"perikit_abi_version", "perikit_build_id", "perikit_register"}) {
+    if (!library.has(symbol)) throw Refusal(fmt::format("symbol {} missing (PERIKIT_PLUGIN defines it)", symbol));
+  }
+  try {
+    const char* build_id = library.get<const char*()>("perikit_build_id")();
+    check_abi(library.get<int()>("perikit_abi_version")(), build_id ? build_id : "");
+    library.get<void(void*)>("perikit_register")(&registrar);
+  } catch (const Refusal&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Refusal(fmt::format("its registration failed: {}", error.what()));
+  } catch (...) {
+    throw Refusal("its registration failed: it threw something that is no std::exception");
+  }
+}
+
+void probe_library(const fs::path& file) {
+  check_file(file);
+  const pid_t child = fork();
+  if (child == 0) probe_in_child(file);
+  int status = 0;
+  pid_t ended = -1;
+  while (child > 0 && (ended = waitpid(child, &status, 0)) < 0 && errno == EINTR) {
+  }
+  if (ended != child || !WIFSIGNALED(status)) return;
+  throw Refusal(fmt::format("it kills the process that loads it ({})", strsignal(WTERMSIG(status))));
+}
+
+}  // namespace perikit

@@ -1,0 +1,32 @@
+#pragma once
+/// Opening one shared library: the checks before, during and after dlopen.
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "perikit/plugin/part.hpp"
+
+namespace perikit {
+
+/// Why a library is refused; `what()` is the reason alone, without the file.
+class Refusal : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws Refusal unless `file` is a regular file, ELF, and as long as its headers say. (A truncated library raises SIGBUS inside
+/// the loader, which nothing can catch.)
+void check_file(const std::filesystem::path& file);
+
+/// Throws Refusal unless a library of this ABI version and build id fits this program.
+void check_abi(int version, const std::string& build_id);
+
+/// Loads `file` for good, compares its C symbols and calls its registration function. Throws Refusal.
+void load_library(const std::filesystem::path& file, Registrar& registrar);
+
+/// Loads and registers `file` in a child process first. Throws Refusal when that kills the child: a file damaged inside, or a
+/// library that crashes in its static constructors or its registration.
+void probe_library(const std::filesystem::path& file);
+
+}  // namespace perikit

@@ -1,0 +1,103 @@
+#include "plugin/manifest.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <fstream>
+#include <toml++/toml.h>
+
+#include "perikit/plugin/abi.hpp"
+
+namespace perikit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::int64_t manifest_format = 1;
+constexpr std::uintmax_t largest_manifest = 1 << 20;  // [bytes]: far more parts than any library brings
+
+std::string checksum(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::array<char, 1 << 16> buffer;
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  do {
+    in.read(buffer.data(), buffer.size());
+    for (std::streamsize i = 0; i < in.gcount(); ++i) {
+      hash = (hash ^ static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)])) * 0x100000001b3u;
+    }
+  } while (in);
+  return fmt::format("{:016x}", hash);
+}
+
+/// The value of a key that every manifest has.
+template <class T>
+T required(const toml::table& table, std::string_view key, const fs::path& file) {
+  if (const auto* value = table[key].template as<T>()) return value->get();
+  const toml::source_position at = table[key] ? table[key].node()->source().begin : table.source().begin;
+  throw InputError({file.string(), static_cast<int>(at.line), static_cast<int>(at.column)}, key,
+                   fmt::format("{}; must be {}", table[key] ? "another type" : "missing",
+                               std::is_same_v<T, std::string> ? "a string" : "an integer"));
+}
+
+NamedPart read_part(const toml::table& table, const fs::path& file) {
+  const auto kind_name = required<std::string>(table, "kind", file);
+  const auto kind = kind_from_name(kind_name);
+  if (!kind) throw InputError({file.string()}, "kind", fmt::format("'{}' is no kind of part", kind_name));
+  return {*kind, required<std::string>(table, "name", file), required<std::string>(table, "summary", file)};
+}
+
+}  // namespace
+
+bool Manifest::matches(const fs::path& library) const {
+  std::error_code unreadable;
+  return fs::file_size(library, unreadable) == size && !unreadable && checksum == perikit::checksum(library);
+}
+
+fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
+
+Manifest read_manifest(const fs::path& file) try {
+  std::error_code unreadable;
+  if (!fs::is_regular_file(file, unreadable)) throw InputError({file.string()}, "", "not a regular file");
+  if (fs::file_size(file, unreadable) > largest_manifest || unreadable) throw InputError({file.string()}, "", "too large for a manifest");
+  const toml::table table = toml::parse_file(file.string());
+  if (const auto format = required<std::int64_t>(table, "format", file); format != manifest_format) {
+    throw InputError({file.string()}, "format", fmt::format("{}; this program reads {}", format, manifest_format));
+  }
+  Manifest manifest{.abi = static_cast<int>(required<std::int64_t>(table, "abi", file)),
+                    .build_id = required<std::string>(table, "build_id", file),
+                    .size = static_cast<std::uintmax_t>(required<std::int64_t>(table, "size", file)),
+                    .checksum = required<std::string>(table, "checksum", file),
+                    .parts = {}};
+  const toml::array* parts = table["part"].as_array();
+  if (!parts || parts->empty() || !parts->is_homogeneous<toml::table>()) {
+    throw InputError({file.string()}, "part", "must be a list of tables, at least one");
+  }
+  for (const toml::node& part : *parts) manifest.parts.push_back(read_part(*part.as_table(), file));
+  return manifest;
+} catch (const toml::parse_error& error) {
+  const auto& at = error.source().begin;
+  throw InputError({file.string(), static_cast<int>(at.line), static_cast<int>(at.column)}, "", error.description());
+}
+
+void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts) {
+  toml::array list;
+  for (const NamedPart& part : parts) {
+    list.push_back(toml::table{{"kind", name(part.kind)}, {"name", part.name}, {"summary", part.summary}});
+  }
+  const toml::table table{{"format", manifest_format},
+                          {"abi", PERIKIT_ABI_VERSION},
+                          {"build_id", PERIKIT_BUILD_ID},
+                          {"size", static_cast<std::int64_t>(fs::file_size(library))},
+                          {"checksum", checksum(library)},
+                          {"part", std::move(list)}};
+  const fs::path file = manifest_path(library);
+  const fs::path temporary = file.string() + ".new";
+  std::ofstream out(temporary);
+  out << table << '\n';
+  out.close();
+  if (!out) throw RunError(fmt::format("{}: cannot be written", temporary.string()));
+  fs::rename(temporary, file);
+}
+
+}  // namespace perikit

@@ -1,0 +1,45 @@
+#pragma once
+/// Manifests: beside X.so lies X.parts, TOML text that names the parts of the library, so that names are known without opening it.
+///
+///   format = 1
+///   abi = 1
+///   build_id = "gcc12 libstdc++-cxx11abi1 simd512"
+///   size = 48216                       # of the library [bytes]
+///   checksum = "ab12..."               # FNV-1a, 64 bits, of the library
+///   part = [ { kind = "material", name = "neo_hookean", summary = "..." } ]
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "perikit/plugin/parameters.hpp"
+
+namespace perikit {
+
+struct NamedPart {
+  Kind kind;
+  std::string name, summary;
+};
+
+struct Manifest {
+  int abi = 0;
+  std::string build_id;
+  std::uintmax_t size = 0;
+  std::string checksum;
+  std::vector<NamedPart> parts;
+
+  /// Whether `library` is, byte for byte, the file that this manifest was written for.
+  bool matches(const std::filesystem::path& library) const;
+};
+
+/// X.so -> X.parts
+std::filesystem::path manifest_path(const std::filesystem::path& library);
+
+/// Throws InputError naming file and place for anything that is not a complete manifest.
+Manifest read_manifest(const std::filesystem::path& file);
+
+/// Writes the manifest of a library of this program's ABI, by a temporary name and a rename. Throws RunError.
+void write_manifest(const std::filesystem::path& library, const std::vector<NamedPart>& parts);
+
+}  // namespace perikit

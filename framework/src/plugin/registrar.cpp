@@ -1,0 +1,57 @@
+#include "plugin/registrar.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+namespace perikit {
+
+namespace {
+
+bool is_snake_case(std::string_view text) {
+  const auto allowed = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
+  return !text.empty() && text.front() >= 'a' && text.front() <= 'z' && std::ranges::all_of(text, allowed);
+}
+
+/// What is wrong with a parameter table; empty when nothing is.
+std::string fault(const ParameterTable& table) {
+  std::set<std::string_view> names;
+  for (const Parameter& parameter : table.parameters()) {
+    if (parameter.name.empty()) return "a parameter has no name";
+    if (parameter.name == "type") return "a parameter cannot be named 'type', which names the part";
+    if (!names.insert(parameter.name).second) return fmt::format("parameter '{}' is declared twice", parameter.name);
+  }
+  for (const ParameterGroup& group : table.groups()) {
+    for (const std::string& name : group.names) {
+      if (!names.contains(name)) return fmt::format("a group names '{}', which is no parameter", name);
+    }
+  }
+  return {};
+}
+
+std::string fault(const PartDescription& description) {
+  if (!is_snake_case(description.name)) return "the name must be snake_case (a-z, 0-9, _)";
+  if (description.summary.empty() || description.summary.find('\n') != std::string::npos) return "the summary must be one line of text";
+  if (description.examples.empty()) return "at least one example is needed (\"\" where nothing is required)";
+  return fault(description.parameters);
+}
+
+}  // namespace
+
+void PartCollector::add(RegisteredPart part) {
+  const auto& [description, factory] = part;
+  const auto refuse = [&](const std::string& reason) {
+    throw std::invalid_argument(fmt::format("{} '{}': {}", name(part.kind()), description.name, reason));
+  };
+  if (const std::string reason = fault(description); !reason.empty()) refuse(reason);
+  if (!std::visit([](const auto& f) { return static_cast<bool>(f); }, factory)) refuse("no factory");
+  const auto same = [&](const auto& other) { return other->kind() == part.kind() && other->description.name == description.name; };
+  if (std::ranges::any_of(parts, same)) refuse("registered twice");
+  if (const auto owner = owner_(part.kind(), description.name); !owner.empty()) {
+    refuse(fmt::format("duplicate: {} already brings it", owner.string()));
+  }
+  parts.push_back(std::make_shared<const RegisteredPart>(std::move(part)));
+}
+
+}  // namespace perikit

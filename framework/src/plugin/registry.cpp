@@ -1,0 +1,249 @@
+#include "perikit/plugin/registry.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/dll/runtime_symbol_info.hpp>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "perikit/sdk/plugin.hpp"
+#include "plugin/library.hpp"
+#include "plugin/manifest.hpp"
+#include "plugin/registrar.hpp"
+
+namespace perikit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The one name of a file, so that a library reached by two ways is one library.
+fs::path canonical_path(const fs::path& file) {
+  std::error_code failed;
+  const fs::path path = fs::weakly_canonical(file, failed);
+  return failed ? fs::absolute(file) : path;
+}
+
+}  // namespace
+
+struct Registry::Implementation {
+  struct Entry {
+    fs::path library;
+    std::shared_ptr<const RegisteredPart> part;  ///< null: named by a manifest, the library is not open yet
+  };
+  using Entries = std::map<std::string, Entry, std::less<>>;
+
+  std::array<Entries, all_kinds.size()> entries;
+  std::set<fs::path> candidates;
+  std::vector<fs::path> opened;
+  std::vector<RefusedLibrary> refused;
+
+  Entries& of(Kind kind) { return entries[static_cast<std::size_t>(kind)]; }
+  const Entries& of(Kind kind) const { return entries[static_cast<std::size_t>(kind)]; }
+
+  fs::path owner(Kind kind, std::string_view name) const {
+    const auto entry = of(kind).find(name);
+    return entry == of(kind).end() ? fs::path() : entry->second.library;
+  }
+
+  std::vector<std::string> names(Kind kind) const {
+    std::vector<std::string> names;
+    for (const auto& [name, entry] : of(kind)) names.push_back(name);
+    return names;
+  }
+
+  /// Forgets what a manifest named, and keeps the reason.
+  void refuse(const fs::path& file, const std::string& reason) {
+    for (Entries& kind : entries) std::erase_if(kind, [&](const auto& e) { return e.second.library == file; });
+    std::erase_if(refused, [&](const RefusedLibrary& r) { return r.file == file; });
+    refused.push_back({file, reason});
+  }
+
+  /// The manifest of exactly this file, if there is one. A stale one says nothing; an unreadable one is refused by name.
+  std::optional<Manifest> manifest_of(const fs::path& library) {
+    const fs::path file = manifest_path(library);
+    if (!fs::exists(file)) return std::nullopt;
+    try {
+      Manifest manifest = read_manifest(file);
+      if (manifest.matches(library)) return manifest;
+    } catch (const InputError& error) {
+      refuse(file, fmt::format("bad manifest: {}", error.what()));
+    }
+    return std::nullopt;
+  }
+
+  void name_parts(const fs::path& library, const Manifest& manifest) {
+    check_file(library);
+    check_abi(manifest.abi, manifest.build_id);
+    for (const NamedPart& part : manifest.parts) {
+      if (const fs::path first = owner(part.kind, part.name); !first.empty()) {
+        throw Refusal(fmt::format("{} '{}': duplicate: {} already brings it", name(part.kind), part.name, first.string()));
+      }
+    }
+    for (const NamedPart& part : manifest.parts) of(part.kind)[part.name] = {library, nullptr};
+  }
+
+  void load(const fs::path& library, bool trusted) {
+    if (!trusted) probe_library(library);
+    PartCollector collector([&](Kind kind, std::string_view name) {
+      const fs::path first = owner(kind, name);
+      return first == library ? fs::path() : first;
+    });
+    load_library(library, collector);
+    if (collector.parts.empty()) throw Refusal("it registers no part");
+    for (const auto& part : collector.parts) of(part->kind())[part->description.name] = {library, part};
+    for (const Entries& kind : entries) {
+      for (const auto& [name, entry] : kind) {
+        if (entry.library == library && !entry.part) throw Refusal(fmt::format("its manifest names '{}', which it does not register", name));
+      }
+    }
+  }
+
+  void open(const fs::path& library, bool trusted) {
+    if (std::ranges::find(opened, library) != opened.end()) return;
+    try {
+      load(library, trusted);
+    } catch (const Refusal& reason) {
+      refuse(library, reason.what());
+      throw InputError({library.string()}, "", fmt::format("this library is refused: {}", reason.what()));
+    }
+    std::erase_if(refused, [&](const RefusedLibrary& r) { return r.file == library; });
+    opened.push_back(library);
+  }
+
+  /// What a folder holds is taken where it is good; what is refused is only kept in `refused`.
+  void add_candidate(const fs::path& library) {
+    if (!candidates.insert(library).second) return;
+    try {
+      if (const auto manifest = manifest_of(library)) {
+        name_parts(library, *manifest);
+      } else {
+        open(library, false);
+      }
+    } catch (const Refusal& reason) {
+      refuse(library, reason.what());
+    } catch (const InputError&) {  // open has kept the reason
+    }
+  }
+
+  [[noreturn]] void unknown(Kind kind, std::string_view part) const {
+    const auto known = names(kind);
+    std::string message = fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
+                                      nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
+    const char* separator = "; refused libraries, one of which may hold it: ";
+    for (const RefusedLibrary& r : refused) {
+      message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);
+      separator = "; ";
+    }
+    throw InputError(message);
+  }
+
+  const RegisteredPart& part(Kind kind, std::string_view part) {
+    const auto entry = of(kind).find(part);
+    if (entry == of(kind).end()) unknown(kind, part);
+    if (!entry->second.part) open(fs::path(entry->second.library), true);
+    return *of(kind).find(part)->second.part;
+  }
+
+  InputError not_made(Kind kind, const PartValues& values, std::string_view reason) const {
+    return InputError(values.values.position("type"), values.values.path(),
+                      fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
+  }
+
+  template <class Interface>
+  std::unique_ptr<Interface> create(Kind kind, const PartValues& values, const PartFactory& parts) {
+    const RegisteredPart& chosen = part(kind, values.type);
+    try {
+      if (auto product = std::get<Factory<Interface>>(chosen.factory)(values.values, parts)) return product;
+    } catch (const InputError&) {
+      throw;  // it names its place already
+    } catch (const std::exception& error) {
+      throw not_made(kind, values, error.what());
+    } catch (...) {
+      throw not_made(kind, values, "its factory threw something that is no std::exception");
+    }
+    throw not_made(kind, values, "its factory returned nothing");
+  }
+};
+
+Registry::Registry() : implementation_(std::make_unique<Implementation>()) {}
+Registry::~Registry() = default;
+
+std::vector<fs::path> Registry::standard_search_path(const std::vector<fs::path>& first) {
+  std::vector<fs::path> folders = first;
+  if (const char* variable = std::getenv("PERIKIT_PLUGIN_PATH")) {
+    std::istringstream list(variable);
+    for (std::string folder; std::getline(list, folder, ':');) {
+      if (!folder.empty()) folders.emplace_back(folder);
+    }
+  }
+  static const char here = 0;
+  const fs::path own = canonical_path(boost::dll::symbol_location_ptr(&here)).parent_path() / "perikit";
+  if (fs::is_directory(own)) folders.push_back(own);
+  return folders;
+}
+
+void Registry::add_folder(const fs::path& folder) {
+  std::error_code failed;
+  std::vector<fs::path> libraries;
+  for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed)) {
+    if (entry->path().extension() == ".so") libraries.push_back(canonical_path(entry->path()));
+  }
+  if (failed) throw InputError({folder.string()}, "", fmt::format("this plugin folder cannot be read: {}", failed.message()));
+  std::ranges::sort(libraries);
+  for (const fs::path& library : libraries) implementation_->add_candidate(library);
+}
+
+void Registry::open(const fs::path& library) {
+  const fs::path file = canonical_path(library);
+  implementation_->candidates.insert(file);
+  implementation_->open(file, implementation_->manifest_of(file).has_value());
+}
+
+std::vector<std::string> Registry::names(Kind kind) const { return implementation_->names(kind); }
+const PartDescription& Registry::describe(Kind kind, std::string_view name) { return implementation_->part(kind, name).description; }
+bool Registry::known(Kind kind, std::string_view name) const { return !implementation_->owner(kind, name).empty(); }
+const std::vector<RefusedLibrary>& Registry::refused() const noexcept { return implementation_->refused; }
+std::vector<fs::path> Registry::opened() const { return implementation_->opened; }
+
+fs::path Registry::library_of(Kind kind, std::string_view name) const {
+  fs::path library = implementation_->owner(kind, name);
+  if (library.empty()) implementation_->unknown(kind, name);
+  return library;
+}
+
+std::vector<std::pair<Kind, std::string>> Registry::parts_of(const fs::path& library) const {
+  std::vector<std::pair<Kind, std::string>> parts;
+  for (const Kind kind : all_kinds) {
+    for (const auto& [name, entry] : implementation_->of(kind)) {
+      if (entry.part && entry.library == canonical_path(library)) parts.emplace_back(kind, name);
+    }
+  }
+  return parts;
+}
+
+std::unique_ptr<Kinematics> Registry::kinematics(const PartValues& values) const {
+  return implementation_->create<Kinematics>(Kind::kinematics, values, *this);
+}
+std::unique_ptr<Stabilization> Registry::stabilization(const PartValues& values) const {
+  throw implementation_->not_made(Kind::stabilization, values, "the interface of its kind is not part of this version");
+}
+std::unique_ptr<Material> Registry::material(const PartValues& values) const {
+  return implementation_->create<Material>(Kind::material, values, *this);
+}
+std::unique_ptr<Damage> Registry::damage(const PartValues& values) const {
+  throw implementation_->not_made(Kind::damage, values, "the interface of its kind is not part of this version");
+}
+std::unique_ptr<InfluenceFunction> Registry::influence(const PartValues& values) const {
+  return implementation_->create<InfluenceFunction>(Kind::influence, values, *this);
+}
+std::unique_ptr<Integrator> Registry::integrator(const PartValues& values) const {
+  return implementation_->create<Integrator>(Kind::integrator, values, *this);
+}
+
+}  // namespace perikit
