@@ -58,6 +58,7 @@ struct Parameter {
   std::size_t min_length = 0, max_length = std::numeric_limits<std::size_t>::max();
   bool time = false;                   ///< expressions may use t
   bool per_point = false;              ///< material parameter that may vary in space; evaluated at set-up
+  bool per_axis = false;               ///< numbers, expressions: as long as the dimension of the body; points: each of them
   Kind kind = Kind::influence;         ///< for type part
 
   // Modifiers, to be chained after ParameterTable::number and its like.
@@ -70,7 +71,11 @@ struct Parameter {
   Parameter& positive() { return above(0.0); }
   Parameter& length(std::size_t least, std::size_t most) { min_length = least; max_length = most; return *this; }
   Parameter& with_time() { time = true; return *this; }
+  Parameter& one_per_axis() { per_axis = true; return *this; }
 };
+
+/// What a value may be, as messages and the reference page print it: "a number > 0 [m]", "\"strain\" or \"stress\"".
+std::string allowed(const Parameter& parameter);
 
 /// "exactly `count` of `names` must be given" (count < 0: at most -count).
 struct ParameterGroup {
@@ -106,6 +111,8 @@ class ParameterTable {
 
 /// density, and exactly two of youngs_modulus, poisson_ratio, shear_modulus, bulk_modulus, lame_lambda.
 ParameterTable elastic_parameters();
+/// elastic_parameters(), and volumetric = "quadratic" (kappa/2 (J-1)^2, default) | "logarithmic" (kappa/2 (ln J)^2).
+ParameterTable rubber_parameters();
 
 class PartValues;
 
@@ -115,6 +122,7 @@ using ParameterValue = std::variant<double, std::int64_t, bool, std::string, std
                                     std::vector<std::variant<double, std::string>>, std::shared_ptr<const PartValues>>;
 
 /// The checked values of one table (defaults filled in), with the place each came from.
+/// Asking for a key that is not there, or as another type, throws std::logic_error: the part and its table disagree.
 class ParameterValues {
  public:
   bool has(std::string_view key) const noexcept;

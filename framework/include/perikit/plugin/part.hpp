@@ -1,9 +1,11 @@
 #pragma once
 /// What a shared library says about the parts it brings, and how it hands them over.
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "perikit/plugin/parameters.hpp"
@@ -42,6 +44,18 @@ struct PartDescription {
 
 template <class Interface>
 using Factory = std::function<std::unique_ptr<Interface>(const ParameterValues&, const PartFactory&)>;
+
+/// Where the scene reader looks parts up. Implemented by Registry.
+class PartCatalogue {
+ public:
+  virtual ~PartCatalogue() = default;
+  /// Throws InputError for an unknown name, with the nearest and the known ones.
+  virtual const PartDescription& describe(Kind kind, std::string_view name) = 0;
+  virtual std::vector<std::string> names(Kind kind) const = 0;
+  virtual bool known(Kind kind, std::string_view name) const = 0;
+  /// Registers one more library. Throws InputError with file and reason when it is refused.
+  virtual void open(const std::filesystem::path& library) = 0;
+};
 
 /// Handed to a library's registration function. Throws std::invalid_argument for a bad or duplicate description.
 class Registrar {

@@ -13,8 +13,8 @@ namespace perikit {
 
 using Constants = std::map<std::string, double>;
 
-/// A number, or a parsed expression in x, y, z and (where allowed) t. Cheap to copy; one object must not be evaluated by two
-/// threads at once.
+/// A number, or a parsed expression in x, y, z and (where allowed) t. Cheap to copy; copies share
+/// the parsed form, so that an expression and its copies must not be evaluated by two threads at once.
 class Expression {
  public:
   Expression() : Expression(0.0) {}

@@ -7,11 +7,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "perikit/core/space.hpp"
 #include "perikit/plugin/parameters.hpp"
-#include "perikit/plugin/registry.hpp"
+#include "perikit/plugin/part.hpp"
 #include "perikit/scene/expression.hpp"
 
 namespace perikit {
@@ -112,17 +113,18 @@ struct SceneOptions {
   bool trust = false;                        ///< open the libraries that the scene lists
 };
 
-/// Reads and checks a scene. Opens (through the registry) the libraries of the parts it names and no others.
+/// Reads and checks a scene. Opens (through the catalogue) the libraries of the parts it names and no others.
 /// Throws InputErrors with every error found, each with file, line, column, key, what was found and what is allowed.
-Scene read_scene(const std::filesystem::path& file, Registry& registry, const SceneOptions& options = {});
+Scene read_scene(const std::filesystem::path& file, PartCatalogue& parts, const SceneOptions& options = {});
 /// The same from memory; `file` is only used in messages and for relative paths.
-Scene parse_scene(const std::string& text, const std::filesystem::path& file, Registry& registry, const SceneOptions& options = {});
+Scene parse_scene(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts, const SceneOptions& options = {});
 
 /// Checked values of one part from TOML text of its table without `type` - for contract suites and tests.
 /// Throws InputErrors.
-std::shared_ptr<const PartValues> parse_part(Kind kind, const std::string& type, const std::string& toml, Registry& registry);
+std::shared_ptr<const PartValues> parse_part(Kind kind, const std::string& type, const std::string& toml, PartCatalogue& parts);
 
-/// The keys of the scene's own sections ("body", "body.lattice", "family", "output", ...), for `describe` and the reference page.
+/// The keys of the scene's own sections ("" for the top level, "body", "body.lattice", "family", "output", ...), for `describe`
+/// and the reference page. "kinematics" and "damage" hold the keys that the framework adds to every part of these kinds.
 const std::vector<std::pair<std::string, ParameterTable>>& scene_sections();
 
 }  // namespace perikit

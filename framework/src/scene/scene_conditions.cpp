@@ -1,0 +1,155 @@
+// [initial], [[boundary]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "scene/scene_reader.hpp"
+#include "scene/sections.hpp"
+#include "scene/toml_text.hpp"
+
+namespace perikit {
+
+void SceneReader::read_initial(const toml::table& root) {
+  const toml::table* initial = section(root, "initial", "initial");
+  if (!initial) return;
+  const ParameterTable table = initial_parameters();
+  ParameterValues values = reader_.read(*initial, table, "initial");
+  const auto fill = [&](const char* key, std::vector<std::optional<Expression>>& components) {
+    if (!values.has(key)) return;
+    for (Expression& component : expressions(values, key, false)) components.emplace_back(std::move(component));
+  };
+  fill("displacement", scene_.initial_displacement);
+  fill("velocity", scene_.initial_velocity);
+  scene_.initial_from = existing_file(values, "from");
+  writer_.header("initial");
+  writer_.lines(table, values);
+}
+
+void SceneReader::read_boundaries(const toml::table& root) {
+  const ParameterTable table = boundary_parameters();
+  for (const toml::table* boundary : sections(root, "boundary", "boundary")) {
+    const ParameterValues values = reader_.read(*boundary, table, fmt::format("boundary.{}", scene_.boundaries.size()));
+    writer_.header("boundary", true);
+    writer_.lines(table, values);
+    BoundaryDescription description;
+    description.set = set_of(values);
+    description.velocity = values.has("velocity");
+    for (const char* key : {"displacement", "velocity"}) {
+      if (values.has(key)) description.components = components(values, key);
+    }
+    description.position = reader_.position(*boundary);
+    scene_.boundaries.push_back(std::move(description));
+  }
+}
+
+void SceneReader::read_loads(const toml::table& root) {
+  const ParameterTable table = load_parameters();
+  for (const toml::table* load : sections(root, "load", "load")) {
+    const std::string path = fmt::format("load.{}", scene_.loads.size());
+    const ParameterValues values = reader_.read(*load, table, path);
+    writer_.header("load", true);
+    writer_.lines(table, values);
+    LoadDescription description;
+    description.position = reader_.position(*load);
+    description.set = set_of(values);
+    using Type = LoadDescription::Type;
+    for (const auto& [key, type] : {std::pair{"force", Type::force}, {"body_force", Type::body_force}, {"traction", Type::traction}}) {
+      if (!values.has(key)) continue;
+      description.type = type;
+      description.components = expressions(values, key, true);
+    }
+    if (load->contains("traction") && !load->contains("face")) {
+      reader_.errors.add(description.position, path + ".face", "found nothing beside traction; allowed: " + allowed(*table.find("face")));
+    }
+    if (values.has("face")) {
+      description.face = values.text("face");
+      if (!load->contains("traction")) {
+        reader_.errors.add(values.position("face"), path + ".face",
+                           fmt::format("found \"{}\" without traction; allowed: only with traction", description.face));
+      } else if (reader_.dimension > 0 && description.face[1] - 'x' >= reader_.dimension) {
+        reader_.errors.add(values.position("face"), path + ".face",
+                           fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", description.face, reader_.dimension));
+      }
+    }
+    scene_.loads.push_back(std::move(description));
+  }
+}
+
+void SceneReader::read_output(const toml::table& root) {
+  static const toml::table none;
+  const toml::table* given = section(root, "output", "output");
+  const toml::table& output = given ? *given : none;
+  const ParameterTable table = output_parameters();
+  const ParameterValues values = reader_.read(output, table, "output", {"history"});
+  writer_.header("output");
+  writer_.lines(table, values);
+
+  OutputDescription& description = scene_.output;
+  if (values.has("frames")) description.frames = values.integer("frames");
+  if (values.has("every")) description.every = values.integer("every");
+  if (values.has("times")) description.times = values.numbers("times");
+  if (std::adjacent_find(description.times.begin(), description.times.end(), std::greater_equal<>()) != description.times.end()) {
+    reader_.errors.add(values.position("times"), "output.times", "found times that do not ascend; allowed: each above the one before");
+  }
+  if (values.has("history_every")) description.history_every = values.integer("history_every");
+  if (values.has("checkpoint_every")) description.checkpoint_every = values.integer("checkpoint_every");
+  if (values.has("fields")) description.fields = values.texts("fields");
+  for (std::size_t i = 0; i < description.fields.size(); ++i) {
+    if (std::count(description.fields.begin(), description.fields.begin() + static_cast<std::ptrdiff_t>(i), description.fields[i]) == 0) continue;
+    reader_.errors.add(values.position("fields"), fmt::format("output.fields.{}", i),
+                       fmt::format("found \"{}\" twice; allowed: each field once", description.fields[i]));
+  }
+  read_history(output);
+}
+
+void SceneReader::read_history(const toml::table& output) {
+  const ParameterTable table = history_parameters();
+  std::vector<std::string> columns{"time", "step"};
+  for (const toml::table* record : sections(output, "history", "output.history")) {
+    const std::string path = fmt::format("output.history.{}", scene_.output.history.size());
+    const ParameterValues values = reader_.read(*record, table, path);
+    writer_.header("output.history", true);
+    writer_.lines(table, values);
+    const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
+    HistoryDescription description{text("name"), set_of(values), text("quantity"), text("component"), text("reduce"), reader_.position(*record)};
+    const auto refuse = [&](const char* key, const std::string& message) {
+      reader_.errors.add(values.position(key), join_path(path, key), message);
+    };
+
+    if (values.has("name")) {
+      const std::string& name = description.name;
+      const bool fits_csv = !name.empty() && std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == ',' || c == '"'; });
+      if (!fits_csv) refuse("name", fmt::format("found {}; allowed: a column name without commas, quotes and control characters", toml_string(name)));
+      else if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
+        refuse("name", fmt::format("found \"{}\" again; allowed: names that no other column of history.csv has", name));
+      }
+      columns.push_back(name);
+    }
+    if (values.has("quantity")) {
+      const std::vector<std::string> allowed = field_components(description.quantity, reader_.dimension);
+      const bool known = std::find(allowed.begin(), allowed.end(), description.component) != allowed.end();
+      if (allowed.empty() && values.has("component")) {
+        refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", description.component, description.quantity));
+      } else if (!allowed.empty() && !known && (values.has("component") || !record->contains("component"))) {
+        refuse("component", fmt::format("found {}; allowed: {}", values.has("component") ? toml_string(description.component) : "nothing",
+                                        fmt::join(allowed, ", ")));
+      }
+    }
+    scene_.output.history.push_back(std::move(description));
+  }
+}
+
+void SceneReader::read_run(const toml::table& root) {
+  static const toml::table none;
+  const toml::table* given = section(root, "run", "run");
+  const ParameterTable table = run_parameters();
+  const ParameterValues values = reader_.read(given ? *given : none, table, "run");
+  writer_.header("run");
+  writer_.lines(table, values);
+  if (values.has("skip")) scene_.skip = values.boolean("skip");
+  if (values.has("threads")) scene_.threads = static_cast<int>(values.integer("threads"));
+  if (values.has("seed")) scene_.seed = values.integer("seed");
+}
+
+}  // namespace perikit

@@ -1,0 +1,269 @@
+#include "scene/scene_reader.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "scene/expression_names.hpp"
+#include "scene/sections.hpp"
+#include "scene/toml_text.hpp"
+
+namespace perikit {
+
+namespace {
+
+const std::vector<std::string> section_names{"constants", "body",  "sets",    "family",   "kinematics", "material",   "region", "damage",
+                                             "crack",     "initial", "boundary", "load", "integrator", "output", "run"};
+
+bool identifier(std::string_view name) {
+  return !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) { return (c < 0x80 && std::isalnum(c)) || c == '_'; });
+}
+
+}  // namespace
+
+SceneReader::SceneReader(PartCatalogue& parts, const std::filesystem::path& file, bool trust)
+    : parts_(parts), reader_(parts, file.string()), writer_(parts), trust_(trust) {
+  scene_.file = file;
+}
+
+void SceneReader::read(toml::table& root) {
+  refuse_reserved(root);
+  read_head(root);
+  read_constants(root);
+  read_body(root);
+  read_sets(root);
+  read_family(root);
+  read_parts(root);
+  read_regions(root);
+  read_cracks(root);
+  read_initial(root);
+  read_boundaries(root);
+  read_loads(root);
+  read_output(root);
+  read_run(root);
+}
+
+Scene SceneReader::take() {
+  scene_.resolved = writer_.text();
+  return std::move(scene_);
+}
+
+void SceneReader::refuse_reserved(toml::table& root) {
+  const auto refuse = [&](toml::table& table, const std::string& key, const std::string& path) {
+    const toml::node& node = *table.get(key);
+    reader_.refuse(node, path, fmt::format("found {}; the word \"{}\" is reserved for a later version", found(node), key));
+    table.erase(key);
+  };
+  for (const char* word : {"contact", "stage", "periodic", "symmetry"}) {
+    if (root.contains(word)) refuse(root, word, word);
+  }
+  if (auto* bodies = root["body"].as_array()) {
+    reader_.refuse(*bodies, "body", "found a list of bodies; [[body]] is reserved for a later version; allowed: one table [body]");
+  }
+  if (auto* regions = root["region"].as_array()) {
+    for (std::size_t i = 0; i < regions->size(); ++i) {
+      auto* region = regions->get(i)->as_table();
+      if (region && region->contains("damage")) refuse(*region, "damage", fmt::format("region.{}.damage", i));
+    }
+  }
+}
+
+void SceneReader::read_head(const toml::table& root) {
+  const ParameterTable table = head_parameters();
+  ParameterValues values = reader_.read(root, table, "", section_names);
+  if (values.has("title")) scene_.title = values.text("title");
+  if (values.has("plugins") && !values.texts("plugins").empty()) {
+    if (!trust_) {
+      reader_.errors.add(values.position("plugins"), "plugins",
+                         fmt::format("found {} to open; libraries that a scene lists are opened only with --trust",
+                                     fmt::join(values.texts("plugins"), ", ")));
+    }
+    std::vector<std::string> files;
+    for (const std::string& name : values.texts("plugins")) {
+      const std::filesystem::path file = from_scene_folder(name);
+      files.push_back(file.string());
+      try {
+        if (trust_) parts_.open(file);
+      } catch (const std::exception& error) {
+        reader_.errors.add(values.position("plugins"), "plugins", error.what());
+      }
+    }
+    values.set("plugins", files, values.position("plugins"));
+  }
+  writer_.lines(table, values);
+}
+
+void SceneReader::read_constants(const toml::table& root) {
+  const toml::table* constants = section(root, "constants", "constants");
+  if (!constants || constants->empty()) return;
+  const std::vector<std::string> taken = expression_words();
+  const Parameter number;
+  writer_.header("constants");
+  for (const auto& [key, node] : *constants) {
+    const std::string name(key.str()), path = join_path("constants", name);
+    if (!identifier(name)) {
+      reader_.errors.add(reader_.position(key.source()), path,
+                         fmt::format("found the name {}; allowed: letters, digits and _, not starting with a digit", toml_string(name)));
+    } else if (std::find(taken.begin(), taken.end(), name) != taken.end()) {
+      reader_.errors.add(reader_.position(key.source()), path,
+                         fmt::format("found the name \"{}\", which expressions use already; allowed: any but {}", name, fmt::join(taken, ", ")));
+    } else if (const auto value = reader_.value(number, node, path)) {
+      scene_.constants[name] = std::get<double>(*value);
+      writer_.line(name, toml_number(std::get<double>(*value)));
+    } else {
+      scene_.constants[name] = 0.0;   // known, so that its uses are not reported as well
+    }
+  }
+  reader_.constants = scene_.constants;
+}
+
+void SceneReader::read_sets(const toml::table& root) {
+  set_names_ = {"all"};
+  const toml::table* sets = section(root, "sets", "sets");
+  if (!sets || sets->empty()) return;
+  const ParameterTable table = set_parameters();
+  Parameter condition;
+  condition.type = ParameterType::expression;
+  writer_.header("sets");
+  for (const auto& [key, node] : *sets) {
+    SetDescription set;
+    set.name = key.str();
+    set.position = reader_.position(node);
+    const std::string path = join_path("sets", set.name);
+    if (set.name == "all") {
+      reader_.errors.add(reader_.position(key.source()), path, "found a set named \"all\"; that set exists and holds every point; allowed: another name");
+      continue;
+    }
+    if (set.name.empty() || std::any_of(set.name.begin(), set.name.end(), [](unsigned char c) { return c < 0x20 || c == '/' || c == 0x7f; })) {
+      reader_.errors.add(reader_.position(key.source()), path,
+                         fmt::format("found the name {}; allowed: names that are not empty, without / and control characters", toml_string(set.name)));
+      continue;
+    }
+    set_names_.push_back(set.name);
+    if (node.is_string()) {
+      if (const auto text = reader_.value(condition, node, path)) {
+        set.expression = Expression(std::get<std::string>(*text), scene_.constants, false, set.position, path);
+        writer_.line(set.name, toml_string(std::get<std::string>(*text)));
+      }
+    } else if (const auto* description = node.as_table()) {
+      const ParameterValues values = reader_.read(*description, table, path);
+      if (values.has("nearest")) {
+        set.nearest.emplace();
+        const auto& place = values.numbers("nearest");
+        std::copy_n(place.begin(), std::min<std::size_t>(3, place.size()), set.nearest->begin());
+      }
+      if (values.has("points")) set.points = values.integers("points");
+      writer_.line(set.name, writer_.inline_table(table, values));
+    } else {
+      reader_.refuse(node, path, fmt::format("found {}; allowed: an expression in x, y, z, {{ nearest = [...] }} or {{ points = [...] }}", found(node)));
+    }
+    scene_.sets.push_back(std::move(set));
+  }
+}
+
+void SceneReader::read_parts(const toml::table& root) {
+  const ParameterTable model = model_parameters();
+  for (const Parameter& parameter : model.parameters()) {
+    const toml::node* node = root.get(parameter.name);
+    if (!node) {
+      if (parameter.required) reader_.errors.add(reader_.position(root), parameter.name, "found nothing; allowed: " + allowed(parameter));
+      continue;
+    }
+    const auto part = reader_.part(parameter.kind, *node, parameter.name);
+    if (!part) continue;
+    writer_.part(*part);
+    switch (parameter.kind) {
+      case Kind::kinematics:
+        scene_.kinematics = part;
+        if (part->values.has("stabilization")) scene_.stabilization = part->values.shared_part("stabilization");
+        break;
+      case Kind::material: scene_.material = part; break;
+      case Kind::damage:
+        scene_.damage = part;
+        if (part->values.has("no_fail")) scene_.no_fail = part->values.texts("no_fail");
+        for (const std::string& set : scene_.no_fail) check_set(set, part->values.position("no_fail"), "damage.no_fail");
+        break;
+      default: scene_.integrator = part;
+    }
+  }
+}
+
+const toml::table* SceneReader::section(const toml::table& parent, const std::string& key, const std::string& path, bool required) {
+  const toml::node* node = parent.get(key);
+  if (node && node->is_table()) return node->as_table();
+  if (node && !(path == "body" && node->is_array())) {
+    reader_.refuse(*node, path, fmt::format("found {}; allowed: a table [{}]", found(*node), path));
+  }
+  if (!node && required) reader_.errors.add(reader_.position(parent), path, fmt::format("found nothing; allowed: a table [{}]", path));
+  return nullptr;
+}
+
+std::vector<const toml::table*> SceneReader::sections(const toml::table& parent, const std::string& key, const std::string& path) {
+  const toml::node* node = parent.get(key);
+  if (!node) return {};
+  std::vector<const toml::table*> tables;
+  const toml::array* array = node->as_array();
+  bool sound = array != nullptr;
+  for (std::size_t i = 0; sound && i < array->size(); ++i) {
+    tables.push_back(array->get(i)->as_table());
+    sound = tables.back() != nullptr;
+  }
+  if (sound) return tables;
+  reader_.refuse(*node, path, fmt::format("found {}; allowed: [[{}]], a list of tables", found(*node), path));
+  return {};
+}
+
+void SceneReader::check_set(const std::string& name, const SourcePosition& position, const std::string& key) {
+  if (std::find(set_names_.begin(), set_names_.end(), name) != set_names_.end()) return;
+  reader_.errors.add(position, key, fmt::format("found the unknown set {}; allowed: {}{}", toml_string(name), fmt::join(set_names_, ", "),
+                                                did_you_mean(name, set_names_)));
+}
+
+std::string SceneReader::set_of(const ParameterValues& values) {
+  if (!values.has("set")) return {};
+  check_set(values.text("set"), values.position("set"), join_path(values.path(), "set"));
+  return values.text("set");
+}
+
+std::vector<Expression> SceneReader::expressions(const ParameterValues& values, const std::string& key, bool with_time) const {
+  std::vector<Expression> list;
+  for (const auto& value : values.expressions(key)) {
+    list.emplace_back(value, scene_.constants, with_time, values.position(key), fmt::format("{}.{}.{}", values.path(), key, list.size()));
+  }
+  return list;
+}
+
+std::vector<std::optional<Expression>> SceneReader::components(const ParameterValues& values, const std::string& key) const {
+  std::vector<std::optional<Expression>> list;
+  for (const auto& value : values.expressions(key)) {
+    const auto* text = std::get_if<std::string>(&value);
+    if (text && *text == "free") list.emplace_back(std::nullopt);
+    else list.emplace_back(Expression(value, scene_.constants, true, values.position(key), fmt::format("{}.{}.{}", values.path(), key, list.size())));
+  }
+  return list;
+}
+
+std::filesystem::path SceneReader::from_scene_folder(const std::string& path) const {
+  return std::filesystem::absolute(scene_.file.parent_path() / path).lexically_normal();
+}
+
+std::optional<std::filesystem::path> SceneReader::existing_file(ParameterValues& values, const std::string& key) {
+  if (!values.has(key)) return std::nullopt;
+  const SourcePosition position = values.position(key);
+  const std::filesystem::path file = from_scene_folder(values.text(key));
+  std::error_code failure;
+  const auto status = std::filesystem::status(file, failure);
+  if (!std::filesystem::is_regular_file(status)) {
+    const char* what = std::filesystem::is_directory(status) ? "is a folder" : "does not exist";
+    reader_.errors.add(position, join_path(values.path(), key),
+                       fmt::format("found {}, but {} {}; allowed: an existing file", toml_string(values.text(key)), file.string(), what));
+    return std::nullopt;
+  }
+  values.set(key, file.string(), position);
+  return file;
+}
+
+}  // namespace perikit

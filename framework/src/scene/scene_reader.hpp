@@ -1,0 +1,61 @@
+#pragma once
+/// Turns a parsed scene into checked values, section by section.
+
+#include "perikit/scene/scene.hpp"
+#include "scene/resolved.hpp"
+#include "scene/toml_reader.hpp"
+
+namespace perikit {
+
+class SceneReader {
+ public:
+  SceneReader(PartCatalogue& parts, const std::filesystem::path& file, bool trust);
+
+  /// Reads everything; errors are collected in errors().
+  void read(toml::table& root);
+  Diagnostics& errors() noexcept { return reader_.errors; }
+  /// The scene with its resolved text, once there are no errors.
+  Scene take();
+
+ private:
+  void refuse_reserved(toml::table& root);
+  void read_head(const toml::table& root);
+  void read_constants(const toml::table& root);
+  void read_body(const toml::table& root);
+  void read_lattice(const toml::table& body);
+  void read_points(const toml::table& body);
+  void read_sets(const toml::table& root);
+  void read_family(const toml::table& root);
+  void read_parts(const toml::table& root);
+  void read_regions(const toml::table& root);
+  void read_cracks(const toml::table& root);
+  void read_initial(const toml::table& root);
+  void read_boundaries(const toml::table& root);
+  void read_loads(const toml::table& root);
+  void read_output(const toml::table& root);
+  void read_history(const toml::table& output);
+  void read_run(const toml::table& root);
+
+  /// The table `key` of `parent`; null (after an error if it is no table, or missing though required) where there is none.
+  const toml::table* section(const toml::table& parent, const std::string& key, const std::string& path, bool required = false);
+  /// The tables of [[key]].
+  std::vector<const toml::table*> sections(const toml::table& parent, const std::string& key, const std::string& path);
+  /// An error unless `name` is a set.
+  void check_set(const std::string& name, const SourcePosition& position, const std::string& key);
+  /// The set that `values` names, checked.
+  std::string set_of(const ParameterValues& values);
+  std::vector<Expression> expressions(const ParameterValues& values, const std::string& key, bool with_time) const;
+  std::vector<std::optional<Expression>> components(const ParameterValues& values, const std::string& key) const;
+  /// An existing file, relative to the scene, as an absolute path; written so into `values` too.
+  std::optional<std::filesystem::path> existing_file(ParameterValues& values, const std::string& key);
+  std::filesystem::path from_scene_folder(const std::string& path) const;
+
+  PartCatalogue& parts_;
+  TomlReader reader_;
+  ResolvedWriter writer_;
+  Scene scene_;
+  std::vector<std::string> set_names_;
+  bool trust_;
+};
+
+}  // namespace perikit

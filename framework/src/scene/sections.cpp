@@ -1,0 +1,209 @@
+#include "scene/sections.hpp"
+
+#include "perikit/scene/scene.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr auto unbounded = std::numeric_limits<std::size_t>::max();
+
+const std::vector<std::string> point_fields{"displacement",  "velocity",    "acceleration", "internal_force",
+                                            "external_force", "reaction",    "strain_energy_density", "deformation_gradient",
+                                            "first_piola",   "cauchy",      "von_mises",    "jacobian",
+                                            "damage",        "shape_tensor_condition", "material_id"};
+
+}  // namespace
+
+ParameterTable head_parameters() {
+  ParameterTable table;
+  table.integer("format", "Version of the scene vocabulary.").require().at_least(1).at_most(1);
+  table.string("title", "Written into the results.").by_default("\"\"");
+  table.add(ParameterType::texts, "plugins", "-", "Extra libraries, relative to the scene file; opened only with --trust.").by_default("[]");
+  return table;
+}
+
+ParameterTable model_parameters() {
+  ParameterTable table;
+  table.part("kinematics", Kind::kinematics, "How displacements give deformation gradients.").require();
+  table.part("material", Kind::material, "The point law of the body.").require();
+  table.part("damage", Kind::damage, "When bonds fail.");
+  table.part("integrator", Kind::integrator, "How the problem is solved in time or load.").require();
+  return table;
+}
+
+ParameterTable body_parameters(int dimension) {
+  ParameterTable table;
+  table.integer("dimension", "Spatial dimension of the body.").require().at_least(1).at_most(3);
+  const bool all = dimension == 0;
+  if (all || dimension == 2) {
+    Parameter& plane = table.choice("plane", {"strain", "stress"}, "2D, where it is required: plane strain or plane stress.");
+    plane.required = !all;
+    table.number("thickness", "m", "2D: thickness of the body.").positive().by_default("1.0");
+  }
+  if (all || dimension == 1) {
+    table.choice("line", {"stress", "strain"}, "1D: uniaxial stress or uniaxial strain.").by_default("\"stress\"");
+    table.number("area", "m^2", "1D: cross section of the body.").positive().by_default("1.0");
+  }
+  return table;
+}
+
+ParameterTable lattice_parameters() {
+  ParameterTable table;
+  table.number("spacing", "m", "Distance of neighbouring points.").require().positive();
+  table.add(ParameterType::numbers, "lower", "m", "Lower corner; the first point lies half a spacing inside.").require().one_per_axis();
+  table.add(ParameterType::numbers, "upper", "m", "Upper corner.").require().one_per_axis();
+  table.expression("inside", "-", "Points are kept where this is true.");
+  table.number("jitter", "-", "Random shift of the points, as a fraction of the spacing.").at_least(0).at_most(0.5).by_default("0.0");
+  table.integer("seed", "Seed of the random shift.").at_least(0).by_default("1");
+  return table;
+}
+
+ParameterTable points_parameters() {
+  ParameterTable table;
+  table.string("file", "A .csv with the header x,y,z,volume, or an .h5 with datasets of these names; relative to the scene file.").require();
+  return table;
+}
+
+ParameterTable set_parameters() {
+  ParameterTable table;
+  table.add(ParameterType::numbers, "nearest", "m", "The point nearest to this position.").one_per_axis();
+  table.add(ParameterType::integers, "points", "-", "Indices of points in input order, from 0.").at_least(0).length(1, unbounded);
+  table.exactly(1, {"nearest", "points"});
+  return table;
+}
+
+ParameterTable family_parameters() {
+  ParameterTable table;
+  table.number("horizon_ratio", "-", "Horizon over the spacing of the points.").at_least(1);
+  table.number("horizon", "m", "Horizon as a length.").positive();
+  table.part("influence", Kind::influence, "Influence function.").by_default("\"constant\"");
+  table.exactly(1, {"horizon_ratio", "horizon"});
+  return table;
+}
+
+ParameterTable region_parameters() {
+  ParameterTable table;
+  table.string("set", "The points that have another material.").require();
+  table.part("material", Kind::material, "Their point law.").require();
+  return table;
+}
+
+ParameterTable crack_parameters() {
+  ParameterTable table;
+  table.add(ParameterType::points, "segment", "m", "2D: the two ends of the crack.").length(2, 2).one_per_axis();
+  table.add(ParameterType::points, "polygon", "m", "3D: the corners of a plane crack, in order.").length(3, unbounded).one_per_axis();
+  table.exactly(1, {"segment", "polygon"});
+  return table;
+}
+
+ParameterTable initial_parameters() {
+  ParameterTable table;
+  table.add(ParameterType::expressions, "displacement", "m", "Displacement at the start.").one_per_axis();
+  table.add(ParameterType::expressions, "velocity", "m/s", "Velocity at the start.").one_per_axis();
+  table.string("from", "Start from the last frame of these results (results.h5), relative to the scene file.");
+  table.at_most_of(1, {"from", "displacement"}).at_most_of(1, {"from", "velocity"});
+  return table;
+}
+
+ParameterTable boundary_parameters() {
+  ParameterTable table;
+  table.string("set", "The points whose motion is prescribed.").require();
+  table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
+  table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
+  table.exactly(1, {"displacement", "velocity"});
+  return table;
+}
+
+ParameterTable load_parameters() {
+  ParameterTable table;
+  table.string("set", "The points that are loaded.").require();
+  table.add(ParameterType::expressions, "force", "N", "Total force on the set, shared by volume.").with_time().one_per_axis();
+  table.add(ParameterType::expressions, "body_force", "N/m^3", "Force per volume.").with_time().one_per_axis();
+  table.add(ParameterType::expressions, "traction", "Pa", "Force per area on `face`.").with_time().one_per_axis();
+  table.choice("face", {"+x", "-x", "+y", "-y", "+z", "-z"}, "With traction: the side of the set that carries it.");
+  table.exactly(1, {"force", "body_force", "traction"});
+  return table;
+}
+
+ParameterTable output_parameters() {
+  ParameterTable table;
+  table.integer("frames", "Number of frames, evenly spaced in time.").at_least(1).by_default("20");
+  table.integer("every", "A frame every so many steps.").at_least(1);
+  table.add(ParameterType::numbers, "times", "s", "A frame at the first step at or after each of these times, ascending.").at_least(0).length(1, unbounded);
+  table.integer("history_every", "Steps between samples; 0: as the integrator suggests.").at_least(0).by_default("0");
+  table.integer("checkpoint_every", "Steps between checkpoints; 0: none.").at_least(0).by_default("0");
+  table.add(ParameterType::texts, "fields", "-", "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if any).")
+      .length(1, unbounded).choices = point_fields;
+  table.at_most_of(1, {"frames", "every", "times"});
+  return table;
+}
+
+ParameterTable history_parameters() {
+  ParameterTable table;
+  table.string("name", "Name of the column.").require();
+  table.string("set", "The points that are sampled.").by_default("\"all\"");
+  table.choice("quantity", point_fields, "A point field.").require();
+  table.string("component", "Component of a vector (x) or tensor (xy).");
+  table.choice("reduce", {"mean", "sum", "min", "max"}, "How the values of the set become one.").by_default("\"mean\"");
+  return table;
+}
+
+ParameterTable run_parameters() {
+  ParameterTable table;
+  table.boolean("skip", "Skip work that the scene does not need; false only to compare.").by_default("true");
+  table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
+  table.integer("seed", "Seed of everything random in the run.").at_least(0).by_default("1");
+  return table;
+}
+
+ParameterTable common_part_parameters(Kind kind) {
+  ParameterTable table;
+  if (kind == Kind::kinematics) table.part("stabilization", Kind::stabilization, "Against zero-energy modes.");
+  if (kind == Kind::damage) {
+    table.add(ParameterType::texts, "no_fail", "-", "Sets of points whose bonds never fail.").by_default("[]");
+  }
+  return table;
+}
+
+std::vector<std::string> field_components(std::string_view field, int dimension) {
+  if (field == "deformation_gradient" || field == "first_piola" || field == "cauchy") {
+    return {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};
+  }
+  for (std::string_view vector : {"displacement", "velocity", "acceleration", "internal_force", "external_force", "reaction"}) {
+    if (field != vector) continue;
+    std::vector<std::string> axes{"x", "y", "z"};
+    axes.resize(static_cast<std::size_t>(dimension > 0 ? dimension : 3));
+    return axes;
+  }
+  return {};
+}
+
+const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
+  static const std::vector<std::pair<std::string, ParameterTable>> sections = [] {
+    ParameterTable top = head_parameters();
+    const ParameterTable model = model_parameters();
+    for (const Parameter& part : model.parameters()) top.add(part.type, part.name, part.unit, part.text) = part;
+    return std::vector<std::pair<std::string, ParameterTable>>{
+        {"", top},
+        {"constants", {}},
+        {"body", body_parameters(0)},
+        {"body.lattice", lattice_parameters()},
+        {"body.points", points_parameters()},
+        {"sets", set_parameters()},
+        {"family", family_parameters()},
+        {"kinematics", common_part_parameters(Kind::kinematics)},
+        {"region", region_parameters()},
+        {"damage", common_part_parameters(Kind::damage)},
+        {"crack", crack_parameters()},
+        {"initial", initial_parameters()},
+        {"boundary", boundary_parameters()},
+        {"load", load_parameters()},
+        {"output", output_parameters()},
+        {"output.history", history_parameters()},
+        {"run", run_parameters()}};
+  }();
+  return sections;
+}
+
+}  // namespace perikit

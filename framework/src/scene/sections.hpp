@@ -1,0 +1,30 @@
+#pragma once
+/// The tables of the scene's own sections.
+
+#include "perikit/plugin/parameters.hpp"
+
+namespace perikit {
+
+ParameterTable head_parameters();                     ///< format, title, plugins
+ParameterTable model_parameters();                    ///< the parts at the top level
+ParameterTable body_parameters(int dimension);        ///< keys that fit the dimension; 0: all
+ParameterTable lattice_parameters();
+ParameterTable points_parameters();
+ParameterTable set_parameters();
+ParameterTable family_parameters();
+ParameterTable region_parameters();
+ParameterTable crack_parameters();
+ParameterTable initial_parameters();
+ParameterTable boundary_parameters();
+ParameterTable load_parameters();
+ParameterTable output_parameters();
+ParameterTable history_parameters();
+ParameterTable run_parameters();
+
+/// Keys that the framework adds to every part of a kind at the top level: stabilization, no_fail.
+ParameterTable common_part_parameters(Kind kind);
+
+/// The components of a point field that history may ask for, none for scalars.
+std::vector<std::string> field_components(std::string_view field, int dimension);
+
+}  // namespace perikit
