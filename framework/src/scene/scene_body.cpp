@@ -140,28 +140,24 @@ void SceneReader::read_cracks(const toml::table& root) {
   const ParameterTable table = crack_parameters();
   for (const toml::table* crack : sections(root, "crack", "crack")) {
     const std::string path = fmt::format("crack.{}", scene_.cracks.size());
-    const ParameterValues values = reader_.read(*crack, table, path);
-    writer_.header("crack", true);
-    writer_.lines(table, values);
     CrackDescription description;
     description.position = reader_.position(*crack);
-    const std::string fitting = reader_.dimension == 2 ? "segment" : "polygon";
+    bool fits = true;
     for (const std::string key : {"segment", "polygon"}) {
-      if (!values.has(key)) continue;
-      if (reader_.dimension == 1 || (reader_.dimension > 1 && key != fitting)) {
-        reader_.errors.add(values.position(key), join_path(path, key),
-                           fmt::format("found a {} in a body of dimension {}; allowed: segment in 2D, polygon in 3D", key, reader_.dimension));
-        continue;
-      }
-      for (const auto& vertex : values.points(key)) {
-        if (reader_.dimension > 0 && vertex.size() != static_cast<std::size_t>(reader_.dimension)) {
-          reader_.errors.add(values.position(key), join_path(path, key),
-                             fmt::format("found a point with {} coordinates; allowed: {}", vertex.size(), reader_.dimension));
-        }
-        description.vertices.push_back(coordinates(vertex));
-      }
-      const std::string fault = crack_fault(description.vertices);
-      if (!fault.empty()) {
+      if (!crack->contains(key) || reader_.dimension == 0 || reader_.dimension == (key == "segment" ? 2 : 3)) continue;
+      fits = false;
+      reader_.refuse(*crack->get(key), join_path(path, key),
+                     fmt::format("found a {} in a body of dimension {}; allowed: segment in 2D, polygon in 3D", key, reader_.dimension));
+    }
+    if (fits) {
+      const ParameterValues values = reader_.read(*crack, table, path);
+      writer_.header("crack", true);
+      writer_.lines(table, values);
+      for (const std::string key : {"segment", "polygon"}) {
+        if (!values.has(key)) continue;
+        for (const auto& vertex : values.points(key)) description.vertices.push_back(coordinates(vertex));
+        const std::string fault = crack_fault(description.vertices);
+        if (fault.empty()) continue;
         reader_.errors.add(values.position(key), join_path(path, key), fmt::format("found {}; allowed: {}", fault,
                            key == "segment" ? "two different ends" : "a plane polygon with an area"));
       }
