@@ -44,9 +44,9 @@ type = "newton"
 )";
 
 struct Case {
-  int line;               // replaced, 0: text is appended
+  int line;  // replaced, 0: text is appended
   const char* text;
-  int at;                 // line of the message
+  int at;  // line of the message
   const char* key;
   const char* fragment;
 };
@@ -118,34 +118,41 @@ const Case cases[]{
     {16, "horizon_ratio = 3\nhorizon = 0.3", 15, "family", "found horizon_ratio, horizon; allowed: exactly 1"},
     {16, "horizon_ratio = 0.5", 16, "family.horizon_ratio", "allowed: a number >= 1"},
     {16, "horizon = 0.05", 16, "family.horizon", "allowed: at least the spacing 0.1"},
-    {16, "horizon_ratio = 3\ninfluence = \"gausian\"", 17, "family.influence", "unknown influence 'gausian'; did you mean 'gaussian'?"},
-    {16, "horizon_ratio = 3\ninfluence = { type = \"expression\" }", 17, "family.influence.omega", "found nothing; allowed: a string"},
+    {16, "horizon_ratio = 3\ninfluence = \"gausian\"", 17, "family.influence",
+     "unknown influence 'gausian'; did you mean 'gaussian'?"},
+    {16, "horizon_ratio = 3\ninfluence = { type = \"expression\" }", 17, "family.influence.omega",
+     "found nothing; allowed: a string"},
     // parts
     {18, "type = \"bapq\"", 18, "kinematics.type", "unknown kinematics 'bapq'; did you mean 'baqp'?"},
-    {18, "", 17, "kinematics.type", "found nothing; allowed: the name of a kinematics; known: baqp, conventional"},
+    {18, "", 17, "kinematics.type", "found nothing; allowed: the name of one; known: baqp, conventional"},
     {18, "type = 3", 18, "kinematics.type", "found the integer 3"},
     {19, "order = 3", 19, "kinematics.order", "allowed: an integer >= 1 and <= 2"},
     {19, "ordre = 2", 19, "kinematics.ordre", "did you mean 'order'?"},
     {19, "stabilization = \"siling\"", 19, "kinematics.stabilization", "did you mean 'silling'?"},
-    {18, "type = \"selective\"\nbase = { type = \"baqp\", order = 0 }\n[kinematics.x]", 19, "kinematics.base.order", "found the integer 0"},
+    {18, "type = \"selective\"\nbase = { type = \"baqp\", order = 0 }\n[kinematics.x]", 19, "kinematics.base.order",
+     "found the integer 0"},
     {20, "[materials]", 20, "materials", "did you mean 'material'?"},
     {20, "[materials]", 1, "material", "found nothing; allowed: the name of a material"},
-    {22, "shear_modulus = -1", 22, "material.shear_modulus", "found the integer -1; allowed: a number > 0 [Pa], or an expression in x, y, z"},
+    {22, "shear_modulus = -1", 22, "material.shear_modulus",
+     "found the integer -1; allowed: a number > 0 [Pa], or an expression in x, y, z"},
     {22, "shear_modulus = \"1 + t\"", 22, "material.shear_modulus", "t is not allowed here"},
     {22, "", 20, "material", "found bulk_modulus only; allowed: exactly 2 of"},
     {22, "shear_modulus = 1\nvolumetric = \"cubic\"", 23, "material.volumetric", "allowed: \"quadratic\" or \"logarithmic\""},
     {0, "[damage]\ntype = \"critical_stretch\"", 29, "damage", "found none of them"},
     {0, "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\nno_fail = [\"tap\"]", 32, "damage.no_fail", "did you mean 'tip'?"},
     {28, "type = \"verlet\"", 27, "integrator.end_time", "found nothing; allowed: a number > 0 [s]"},
-    {28, "type = \"verlet\"\nend_time = 1\nsafety = 0.5\ntime_step = 1", 27, "integrator", "found time_step, safety; allowed: at most 1"},
+    {28, "type = \"verlet\"\nend_time = 1\nsafety = 0.5\ntime_step = 1", 27, "integrator",
+     "found time_step, safety; allowed: at most 1"},
     // regions and cracks
-    {0, "[[region]]\nset = \"hole\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }", 30, "region.0.set", "unknown set \"hole\""},
+    {0, "[[region]]\nset = \"hole\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }", 30,
+     "region.0.set", "unknown set \"hole\""},
     {0, "[[region]]\nset = \"left\"", 29, "region.0.material", "found nothing"},
     {0, "[[region]]\nset = \"left\"\nmaterial = \"neo_hookean\"", 31, "region.0.material", "exactly 2 of"},
-    {0, "[[region]]\nset = \"left\"\ndamage = \"x\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }", 31,
-     "region.0.damage", "reserved for a later version"},
+    {0, "[[region]]\nset = \"left\"\ndamage = \"x\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }",
+     31, "region.0.damage", "reserved for a later version"},
     {0, "[region]\nset = \"left\"", 29, "region", "allowed: [[region]], a list of tables"},
-    {0, "[[crack]]\npolygon = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]", 30, "crack.0.polygon", "in a body of dimension 2; allowed: segment in 2D"},
+    {0, "[[crack]]\npolygon = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]", 30, "crack.0.polygon",
+     "in a body of dimension 2; allowed: segment in 2D"},
     {0, "[[crack]]\nsegment = [[0, 0], [1, 0], [1, 1]]", 30, "crack.0.segment", "found a list of 3"},
     {0, "[[crack]]\nsegment = [[0, 0], [1]]", 30, "crack.0.segment.1", "found a list of 1; allowed: a list of 2"},
     {0, "[[crack]]\nsegment = [[0, 0], [0, 0]]", 30, "crack.0.segment", "allowed: two different ends"},
@@ -159,7 +166,8 @@ const Case cases[]{
     {25, "", 24, "boundary.0.set", "found nothing; allowed: a string"},
     {26, "displacement = [0]", 26, "boundary.0.displacement", "found a list of 1"},
     {26, "displacement = [0, \"fre\"]", 26, "boundary.0.displacement.1", "unknown name 'fre'"},
-    {26, "displacement = [0, true]", 26, "boundary.0.displacement.1", "found the boolean true; allowed: a number [m], an expression in x, y, z, t"},
+    {26, "displacement = [0, true]", 26, "boundary.0.displacement.1",
+     "found the boolean true; allowed: a number [m], an expression in x, y, z, t"},
     {26, "displacement = [0, 0]\nvelocity = [0, 0]", 24, "boundary.0", "found displacement, velocity; allowed: exactly 1"},
     {26, "displacment = [0, 0]", 26, "boundary.0.displacment", "did you mean 'displacement'?"},
     {24, "[boundary]", 24, "boundary", "found a table; allowed: [[boundary]]"},
@@ -176,13 +184,18 @@ const Case cases[]{
     {0, "[output]\nfields = [\"displacment\"]", 30, "output.fields.0", "did you mean 'displacement'?"},
     {0, "[output]\nfields = [\"damage\", \"damage\"]", 30, "output.fields.1", "twice"},
     {0, "[output]\nfields = \"damage\"", 30, "output.fields", "allowed: a list of"},
-    {0, "[output]\nhistory = [{ name = \"a\", set = \"lft\", quantity = \"damage\" }]", 30, "output.history.0.set", "did you mean 'left'?"},
-    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"velocity\" }]", 30, "output.history.0.component", "found nothing; allowed: x, y"},
-    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"velocity\", component = \"z\" }]", 30, "output.history.0.component", "found \"z\"; allowed: x, y"},
-    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"damage\", component = \"x\" }]", 30, "output.history.0.component", "which is a scalar"},
+    {0, "[output]\nhistory = [{ name = \"a\", set = \"lft\", quantity = \"damage\" }]", 30, "output.history.0.set",
+     "did you mean 'left'?"},
+    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"velocity\" }]", 30, "output.history.0.component",
+     "found nothing; allowed: x, y"},
+    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"velocity\", component = \"z\" }]", 30, "output.history.0.component",
+     "found \"z\"; allowed: x, y"},
+    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"damage\", component = \"x\" }]", 30, "output.history.0.component",
+     "which is a scalar"},
     {0, "[output]\nhistory = [{ name = \"time\", quantity = \"damage\" }]", 30, "output.history.0.name", "found \"time\" again"},
     {0, "[output]\nhistory = [{ name = \"a,b\", quantity = \"damage\" }]", 30, "output.history.0.name", "without commas"},
-    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"damage\", reduce = \"avg\" }]", 30, "output.history.0.reduce", "allowed: \"mean\", \"sum\""},
+    {0, "[output]\nhistory = [{ name = \"a\", quantity = \"damage\", reduce = \"avg\" }]", 30, "output.history.0.reduce",
+     "allowed: \"mean\", \"sum\""},
     {0, "[run]\nthreads = 0", 30, "run.threads", "allowed: an integer >= 1"},
     {0, "[run]\nskip = 1", 30, "run.skip", "found the integer 1; allowed: true or false"},
 };
@@ -212,7 +225,8 @@ TEST_CASE("bad scenes are refused with line, key and reason") {
     std::istringstream lines{message};
     bool found = false;
     for (std::string line; std::getline(lines, line);) {
-      found |= line.starts_with(fmt::format("plate.toml:{}:", c.at)) && contains(line, fmt::format(": {}: ", c.key)) && contains(line, c.fragment);
+      found |= line.starts_with(fmt::format("plate.toml:{}:", c.at)) && contains(line, fmt::format(": {}: ", c.key)) &&
+               contains(line, c.fragment);
     }
     CHECK(found);
   }

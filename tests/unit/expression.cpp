@@ -13,8 +13,12 @@ namespace {
 
 const Constants constants{{"w", 48.0}, {"E0", 2.0}};
 
-Expression timed(const std::string& text) { return Expression(text, constants, true, {"bar.toml", 3, 5}, "load.0.force"); }
-double at(const std::string& text, std::array<double, 3> x = {2, 3, 5}, double t = 0.5) { return timed(text)(x, t); }
+Expression timed(const std::string& text) {
+  return Expression(text, constants, true, {"bar.toml", 3, 5}, "load.0.force");
+}
+double at(const std::string& text, std::array<double, 3> x = {2, 3, 5}, double t = 0.5) {
+  return timed(text)(x, t);
+}
 
 }  // namespace
 
@@ -63,16 +67,24 @@ TEST_CASE("copies give the same values") {
 }
 
 TEST_CASE("bad expressions are refused with place and reason") {
-  const std::pair<const char*, const char*> cases[]{
-      {"x +", "ends too early"},         {"(x", "closing parenthesis is missing"},
-      {"", "empty"},                     {"foo(x)", "unknown name 'foo' at character 1"},
-      {"x + ww", "did you mean 'w'?"},    {"sni(x)", "did you mean 'sin'?"},
-      {"x = 1", "'=' at character 3"},   {"x, y", "several values"},
-      {"x ? 1", "'?' without ':'"},      {"sin(1, 2)", "too many arguments"},
-      {"atan2(1)", "too few arguments"}, {"2 x", "unexpected"},
-      {"x & y", "unexpected"},           {"\"abc\"", "allowed"},
-      {"_pi", "unknown name '_pi'"},     {"x > 0 and y > 0", "unknown name 'and'"},
-      {"x))", "unexpected"},             {"\xc3\xa9 + 1", "unexpected"}};
+  const std::pair<const char*, const char*> cases[]{{"x +", "ends too early"},
+                                                    {"(x", "closing parenthesis is missing"},
+                                                    {"", "empty"},
+                                                    {"foo(x)", "unknown name 'foo' at character 1"},
+                                                    {"x + ww", "did you mean 'w'?"},
+                                                    {"sni(x)", "did you mean 'sin'?"},
+                                                    {"x = 1", "'=' at character 3"},
+                                                    {"x, y", "several values"},
+                                                    {"x ? 1", "'?' without ':'"},
+                                                    {"sin(1, 2)", "too many arguments"},
+                                                    {"atan2(1)", "too few arguments"},
+                                                    {"2 x", "unexpected"},
+                                                    {"x & y", "unexpected"},
+                                                    {"\"abc\"", "allowed"},
+                                                    {"_pi", "unknown name '_pi'"},
+                                                    {"x > 0 and y > 0", "unknown name 'and'"},
+                                                    {"x))", "unexpected"},
+                                                    {"\xc3\xa9 + 1", "unexpected"}};
   for (const auto& [text, reason] : cases) {
     CAPTURE(text);
     const std::string message = message_of([&] { timed(text); });
@@ -80,7 +92,10 @@ TEST_CASE("bad expressions are refused with place and reason") {
     CHECK(contains(message, "bar.toml:3:5: load.0.force: found the expression"));
     CHECK(contains(message, reason));
   }
-  CHECK(contains(message_of([] { Expression(std::string("x*t"), {}, false, {"a", 1, 1}, "k"); }), "t is not allowed here; allowed: x, y, z, pi"));
+  CHECK(contains(message_of([] {
+                   Expression(std::string("x*t"), {}, false, {"a", 1, 1}, "k");
+                 }),
+                 "t is not allowed here; allowed: x, y, z, pi"));
 }
 
 TEST_CASE("values that are not finite name key and point") {

@@ -63,7 +63,8 @@ class FakeCatalogue final : public PartCatalogue {
     const auto found = parts_.find({kind, std::string(name)});
     if (found != parts_.end()) return found->second;
     const auto all = names(kind);
-    throw InputError(fmt::format("unknown {} '{}'{} known: {}", perikit::name(kind), name, did_you_mean(name, all), fmt::join(all, ", ")));
+    throw InputError(
+        fmt::format("unknown {} '{}'{} known: {}", perikit::name(kind), name, did_you_mean(name, all), fmt::join(all, ", ")));
   }
   std::vector<std::string> names(Kind kind) const override {
     std::vector<std::string> all;
@@ -102,6 +103,8 @@ std::string message_of(Call&& call) {
   return "no error";
 }
 
-inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 }  // namespace perikit::test

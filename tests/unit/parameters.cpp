@@ -46,7 +46,8 @@ TEST_CASE("values know what the scene gave and where") {
   CHECK(!verlet->values.has("time_step"));
   CHECK(verlet->values.position("end_time").line == 1);
   CHECK(verlet->values.position("end_time").column == 12);
-  CHECK(std::string(verlet->values.error("end_time", "too long").what()) == "integrator/verlet:1:12: integrator.end_time: too long");
+  CHECK(std::string(verlet->values.error("end_time", "too long").what()) ==
+        "integrator/verlet:1:12: integrator.end_time: too long");
 }
 
 TEST_CASE("a default gives way to the other member of its group") {
@@ -60,7 +61,8 @@ TEST_CASE("material parameters are numbers or expressions") {
   const auto material = parse_part(Kind::material, "neo_hookean", "shear_modulus = 2\nbulk_modulus = \"1 + x\"", parts);
   CHECK(std::get<double>(material->values.expression("shear_modulus")) == 2.0);
   CHECK(std::get<std::string>(material->values.expression("bulk_modulus")) == "1 + x");
-  CHECK(contains(message_of([&] { (void)material->values.number("bulk_modulus"); }), "2:16: material.bulk_modulus: found an expression"));
+  CHECK(contains(message_of([&] { (void)material->values.number("bulk_modulus"); }),
+                 "2:16: material.bulk_modulus: found an expression"));
   CHECK_THROWS_AS((void)material->values.number("nothing"), std::logic_error);
   CHECK_THROWS_AS((void)material->values.integer("volumetric"), std::logic_error);
 }
@@ -70,10 +72,13 @@ TEST_CASE("errors of a part table name key, found and allowed") {
   const auto errors = [&](const std::string& toml) {
     return message_of([&] { parse_part(Kind::material, "saint_venant_kirchhoff", toml, parts); });
   };
-  CHECK(contains(errors("youngs_modulus = 1"), "material: found youngs_modulus only; allowed: exactly 2 of youngs_modulus, poisson_ratio"));
+  CHECK(contains(errors("youngs_modulus = 1"),
+                 "material: found youngs_modulus only; allowed: exactly 2 of youngs_modulus, poisson_ratio"));
   CHECK(contains(errors(""), "found none of them; allowed: exactly 2"));
-  CHECK(contains(errors("youngs_modulus = 1\npoisson_ratio = 0.2\nbulk_modulus = 1"), "found youngs_modulus, poisson_ratio, bulk_modulus; allowed"));
-  CHECK(contains(errors("youngs_modulus = 1\npoisson_ratio = 0.5"), "2:17: material.poisson_ratio: found the number 0.5; allowed: a number > -1 and < 0.5"));
+  CHECK(contains(errors("youngs_modulus = 1\npoisson_ratio = 0.2\nbulk_modulus = 1"),
+                 "found youngs_modulus, poisson_ratio, bulk_modulus; allowed"));
+  CHECK(contains(errors("youngs_modulus = 1\npoisson_ratio = 0.5"),
+                 "2:17: material.poisson_ratio: found the number 0.5; allowed: a number > -1 and < 0.5"));
   CHECK(contains(errors("youngs_modulus = 1\npoisson_ration = 0.3"), "2:1: material.poisson_ration: found an unknown key"));
   CHECK(contains(errors("youngs_modulus = 1\npoisson_ration = 0.3"), "did you mean 'poisson_ratio'?"));
   CHECK(contains(errors("youngs_modulus = "), ":1:"));

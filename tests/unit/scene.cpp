@@ -173,9 +173,16 @@ TEST_CASE("the resolved scene resolves to itself") {
 
 TEST_CASE("overrides change values, reach into lists and fall back to strings") {
   SceneOptions options;
-  options.overrides = {"integrator.steps=20",          "boundary.0.displacement=[1, 0]", "boundary.1.velocity.1 = 3", "title=a plain title",
-                       "kinematics.base.type=conventional", "kinematics.base.order=1", "body.plane=stress",         "run.seed=7",
-                       "constants.w=50",               "initial.velocity=[\"w\", 0]"};
+  options.overrides = {"integrator.steps=20",
+                       "boundary.0.displacement=[1, 0]",
+                       "boundary.1.velocity.1 = 3",
+                       "title=a plain title",
+                       "kinematics.base.type=conventional",
+                       "kinematics.base.order=1",
+                       "body.plane=stress",
+                       "run.seed=7",
+                       "constants.w=50",
+                       "initial.velocity=[\"w\", 0]"};
   const Scene scene = parse(cook, options);
   CHECK(scene.integrator->values.integer("steps") == 20);
   CHECK(scene.integrator->values.position("steps").file == "command line");
@@ -198,8 +205,10 @@ TEST_CASE("bad overrides are reported as of the command line") {
   CHECK(contains(error("integrator.step=20"), "command line: integrator.step: found an unknown key"));
   CHECK(contains(error("integrator.step=20"), "did you mean 'steps'?"));
   CHECK(contains(error("integrators.steps=20"), "command line: integrators: found an unknown key"));
-  CHECK(contains(error("integrator.steps=2.5"), "command line: integrator.steps: found the number 2.5; allowed: an integer >= 1"));
-  CHECK(contains(error("boundary.2.set=left"), "command line: boundary.2.set: found the index \"2\" into boundary; allowed: 0 to 1"));
+  CHECK(
+      contains(error("integrator.steps=2.5"), "command line: integrator.steps: found the number 2.5; allowed: an integer >= 1"));
+  CHECK(contains(error("boundary.2.set=left"),
+                 "command line: boundary.2.set: found the index \"2\" into boundary; allowed: 0 to 1"));
   CHECK(contains(error("boundary.x.set=left"), "found the index \"x\""));
   CHECK(contains(error("boundary.0.set=lfet"), "command line: boundary.0.set: found the unknown set \"lfet\""));
   CHECK(contains(error("steps"), "command line: --set: found \"steps\"; allowed: key=value"));
@@ -212,13 +221,17 @@ TEST_CASE("libraries of a scene need trust") {
   FakeCatalogue parts;
   const std::string text = "plugins = [\"./libmy_law.so\"]\n" + std::string(bar);
   const std::string message = message_of([&] { parse_scene(text, "folder/bar.toml", parts); });
-  CHECK(contains(message, "folder/bar.toml:1:11: plugins: found ./libmy_law.so to open; libraries that a scene lists are opened only with --trust"));
+  CHECK(contains(
+      message,
+      "folder/bar.toml:1:11: plugins: found ./libmy_law.so to open; libraries that a scene lists are opened only with --trust"));
   CHECK(parts.opened.empty());
   const Scene scene = parse_scene(text, "folder/bar.toml", parts, {{}, true});
   REQUIRE(parts.opened.size() == 1);
   CHECK(parts.opened[0] == std::filesystem::absolute("folder/libmy_law.so"));
   CHECK(parse_scene(scene.resolved, "folder/bar.toml", parts, {{}, true}).resolved == scene.resolved);
-  const std::string broken = message_of([&] { parse_scene("plugins = [\"broken.so\"]\n" + std::string(bar), "bar.toml", parts, {{}, true}); });
+  const std::string broken = message_of([&] {
+    parse_scene("plugins = [\"broken.so\"]\n" + std::string(bar), "bar.toml", parts, {{}, true});
+  });
   CHECK(contains(broken, "bar.toml:1:11: plugins: broken.so: not a shared library"));
 }
 
