@@ -7,8 +7,8 @@ namespace perikit {
 
 /// Hencky solid: Kirchhoff stress linear in the logarithmic strain [Hashim et al., eqs. 4-8].
 ///   psi = lambda/2 (ln J)^2 + mu h:h,  h = ln(F F^T)/2,  tau = lambda ln J I + 2 mu h,  P = tau F^-T
-/// Logarithms of the eigenvalues of F F^T - I through log1p; derivatives by divided differences of the logarithm in a form that is
-/// exact for equal and for nearly equal principal stretches.
+/// Logarithms of the eigenvalues of F F^T - I through log1p; derivatives by divided differences of the logarithm in a form that
+/// is exact for equal and for nearly equal principal stretches.
 struct Hencky {
   static constexpr MaterialTraits traits{.constants = 2};
 
@@ -41,7 +41,7 @@ struct Hencky {
     const Tensor<T, S> slopes = Tensor<T, S>::build_symmetric([&](int i, int j) { return log_slope(e.values[i], e.values[j]); });
     return [=](const Tensor<T, S>& dH) {
       const auto& [lambda, mu] = k;
-      const Tensor<T, S> half = dH + dH * transpose(H);   // dH F^T
+      const Tensor<T, S> half = dH + dH * transpose(H);  // dH F^T
       const Tensor<T, S> turned = rotate(transpose(e.vectors), symmetric_part(half));
       const Tensor<T, S> log_change = Tensor<T, S>::map([&](int c) { return slopes[c] * turned[c]; });
       const Tensor<T, S> dtau = add_diagonal((2.0 * mu) * rotate(e.vectors, log_change), lambda * inner(G, dH));
@@ -53,7 +53,7 @@ struct Hencky {
   /// (log1p(a) - log1p(b))/(a - b), its limit 1/(1 + a) where they are equal.
   template <class T>
   static T log_slope(const T& a, const T& b) noexcept {
-    const T low = min(a, b), x = abs(a - b) / (1.0 + low);   // (1 + high)/(1 + low) = 1 + x
+    const T low = min(a, b), x = abs(a - b) / (1.0 + low);  // (1 + high)/(1 + low) = 1 + x
     const T ratio = log1p(x) / select(x > T(0.0), x, T(1.0));
     return select(x > T(0.0), ratio, T(1.0)) / (1.0 + low);
   }

@@ -51,11 +51,10 @@ struct MooneyRivlin {
     const auto& [C1, C2, kappa] = k;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
     const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), inverse_J = T(1.0) / (1.0 + j);
-    const T scale = cbrt(T(1.0 + j)) * inverse_J;   // J^(-2/3)
+    const T scale = cbrt(T(1.0 + j)) * inverse_J;  // J^(-2/3)
     const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale);
     const T pressure = volumetric_kirchhoff(volumetric, kappa, j);
-    const Tensor<T, S> tau =
-        add_diagonal((first + second * (1.0 + m)) * d - second * deviator(gram(d)), pressure);
+    const Tensor<T, S> tau = add_diagonal((first + second * (1.0 + m)) * d - second * deviator(gram(d)), pressure);
     const Tensor<T, S> G = cofactor_minus_identity(H);
     return inverse_J * (tau + tau * G);
   }

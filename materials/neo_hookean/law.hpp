@@ -24,7 +24,9 @@ struct NeoHookean {
 
   /// tr(C)/3 - 1.
   template <class T, class S>
-  static T mean_strain(const Tensor<T, S>& H) noexcept { return (2.0 * trace(H) + inner(H, H)) * (1.0 / 3.0); }
+  static T mean_strain(const Tensor<T, S>& H) noexcept {
+    return (2.0 * trace(H) + inner(H, H)) * (1.0 / 3.0);
+  }
 
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k) const noexcept {
@@ -44,8 +46,8 @@ struct NeoHookean {
     const T m = mean_strain(H), j = jacobian_minus_one(H), J = 1.0 + j;
     const Tensor<T, S> G = cofactor_minus_identity(H);
     const T inverse_J = T(1.0) / J;
-    const T shear = mu * (cbrt(J) * inverse_J);                                         // mu J^(-2/3)
-    const T cofactor_part = volumetric_kirchhoff(volumetric, kappa, j) * inverse_J;     // factor of cof F from psi_vol
+    const T shear = mu * (cbrt(J) * inverse_J);                                      // mu J^(-2/3)
+    const T cofactor_part = volumetric_kirchhoff(volumetric, kappa, j) * inverse_J;  // factor of cof F from psi_vol
     const T on_cofactor = cofactor_part - shear * (inverse_J * (1.0 + m));
     const T on_identity = shear * (inverse_J * (j - m)) + cofactor_part;
     return Tensor<T, S>::build([&](int i, int l) {

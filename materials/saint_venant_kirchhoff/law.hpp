@@ -20,7 +20,7 @@ struct SaintVenantKirchhoff {
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;
-    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);   // 2 E
+    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);  // 2 E
     const T t = trace(c);
     return 0.125 * lambda * (t * t) + 0.25 * mu * inner(c, c);
   }

@@ -1,4 +1,5 @@
-// Time of one stress (and of one tangent) per evaluation point, for every law and space, in batches of 128 through the virtual call.
+// Time of one stress (and of one tangent) per evaluation point, for every law and space, in batches of 128 through the virtual
+// call.
 
 #include <algorithm>
 #include <chrono>
@@ -48,8 +49,9 @@ void report(const char* name, const Material& material, const double* constants)
     stress.P = P.data();
     energy.psi = psi.data();
     tangent.A = A.data();
-    std::printf("%-24s %-16s %8.2f %8.2f %8.2f\n", name, std::string(perikit::name(space)).c_str(), time_per_point(material, space, stress),
-                time_per_point(material, space, energy), time_per_point(material, space, tangent));
+    std::printf("%-24s %-16s %8.2f %8.2f %8.2f\n", name, std::string(perikit::name(space)).c_str(),
+                time_per_point(material, space, stress), time_per_point(material, space, energy),
+                time_per_point(material, space, tangent));
   }
 }
 

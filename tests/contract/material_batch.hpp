@@ -13,8 +13,8 @@
 
 namespace perikit::contract {
 
-using Matrix = std::array<double, 9>;   ///< row-major 3 x 3
-using Values = std::vector<double>;     ///< components of one tensor in one space
+using Matrix = std::array<double, 9>;  ///< row-major 3 x 3
+using Values = std::vector<double>;    ///< components of one tensor in one space
 
 inline constexpr Matrix identity{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
@@ -46,9 +46,13 @@ inline Matrix extend(Space space, std::span<const double> values) {
   return m;
 }
 
-constexpr bool free_stretch(Space space) { return space == Space::plane_stress || space == Space::line_stress; }
+constexpr bool free_stretch(Space space) {
+  return space == Space::plane_stress || space == Space::line_stress;
+}
 /// True for a component that a free stretch determines (zz of plane stress; yy, zz of uniaxial stress).
-inline bool is_free(Space space, int component) { return free_stretch(space) && component >= gradient_components(dimension(space)); }
+inline bool is_free(Space space, int component) {
+  return free_stretch(space) && component >= gradient_components(dimension(space));
+}
 
 inline double largest(std::span<const double> v) {
   double r = 0;
@@ -58,7 +62,9 @@ inline double largest(std::span<const double> v) {
 
 using Random = std::mt19937_64;
 
-inline double uniform(Random& random, double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); }
+inline double uniform(Random& random, double a, double b) {
+  return std::uniform_real_distribution<double>(a, b)(random);
+}
 
 /// A random rotation of the space: any in 3D, about z in 2D, none in 1D.
 inline Matrix random_rotation(Random& random, Space space) {
@@ -71,8 +77,8 @@ inline Matrix random_rotation(Random& random, Space space) {
   const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (double& x : q) x /= n;
   const auto [w, x, y, z] = q;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-          2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),    1 - 2 * (x * x + z * z),
+          2 * (y * z - w * x),     2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
 }
 
 /// F = rotation x stretches x rotation, principal stretches log-uniform in [least, most].
@@ -99,9 +105,16 @@ struct Evaluation {
 
   Evaluation(const Material& material, Space space, std::span<const double> constants, const std::vector<Values>& points,
              const std::vector<Values>& directions = {}, bool constants_per_point = false)
-      : n(static_cast<int>(points.size())), components(tensor_components(space)), stride(padded(points.size()) + padding),
-        H(components, stride), dH(components, stride), psi(1, stride), P(components, stride), dP(components, stride),
-        A(components * components, stride), constant_field(static_cast<int>(constants.size()), stride) {
+      : n(static_cast<int>(points.size())),
+        components(tensor_components(space)),
+        stride(padded(points.size()) + padding),
+        H(components, stride),
+        dH(components, stride),
+        psi(1, stride),
+        P(components, stride),
+        dP(components, stride),
+        A(components * components, stride),
+        constant_field(static_cast<int>(constants.size()), stride) {
     for (int p = 0; p < n; ++p)
       for (int c = 0; c < components; ++c) {
         H.component(c)[p] = points[p][c];
@@ -110,10 +123,16 @@ struct Evaluation {
     for (std::size_t k = 0; k < constants.size(); ++k)
       for (std::size_t p = 0; p < stride; ++p) constant_field.component(static_cast<int>(k))[p] = constants[k];
     for (Field* f : {&psi, &P, &dP, &A}) f->fill(std::numeric_limits<double>::quiet_NaN());
-    status = material.evaluate(space, {.n = n, .stride = stride, .H = H.data(), .dH = dH.data(),
+    status = material.evaluate(space, {.n = n,
+                                       .stride = stride,
+                                       .H = H.data(),
+                                       .dH = dH.data(),
                                        .constants = constants_per_point ? constant_field.data() : constants.data(),
                                        .constant_stride = constants_per_point ? stride : 0,
-                                       .psi = psi.data(), .P = P.data(), .dP = dP.data(), .A = A.data()});
+                                       .psi = psi.data(),
+                                       .P = P.data(),
+                                       .dP = dP.data(),
+                                       .A = A.data()});
     for (Field* f : {&psi, &P, &dP, &A})
       for (int c = 0; c < f->components(); ++c)
         for (std::size_t p = padded(points.size()); p < stride; ++p) guards_intact &= std::isnan(f->component(c)[p]);

@@ -1,7 +1,7 @@
 #pragma once
 /// What every material must fulfil, as doctest checks: check_material(material, constants, {.law = "my_law"}).
-/// Differences are compared with a tolerance times a stated magnitude: `stress scale` = largest |A| times (1 + largest |H|) at the
-/// point, where a condensed A (plane and uniaxial stress) counts at least lambda + 2 mu.
+/// Differences are compared with a tolerance times a stated magnitude: `stress scale` = largest |A| times (1 + largest |H|) at
+/// the point, where a condensed A (plane and uniaxial stress) counts at least lambda + 2 mu.
 
 #include <doctest/doctest.h>
 
@@ -16,10 +16,10 @@
 namespace perikit::contract {
 
 struct MaterialOptions {
-  std::string law;                                  ///< name for messages
-  double least_stretch = 0.2, most_stretch = 5.0;   ///< of the random deformations, where all stretches are given
-  double least_free = 0.8, most_free = 1.2;         ///< the same where a stretch is free (some laws have no solution far out)
-  std::vector<bool> moduli = {};                       ///< which constants are moduli [Pa]; empty: all
+  std::string law;                                 ///< name for messages
+  double least_stretch = 0.2, most_stretch = 5.0;  ///< of the random deformations, where all stretches are given
+  double least_free = 0.8, most_free = 1.2;        ///< the same where a stretch is free (some laws have no solution far out)
+  std::vector<bool> moduli = {};                   ///< which constants are moduli [Pa]; empty: all
   std::uint64_t seed = 20240229;
 };
 
@@ -27,8 +27,13 @@ struct MaterialOptions {
 class MaterialContract {
  public:
   MaterialContract(const Material& material, std::vector<double> constants, Space space, MaterialOptions options)
-      : material_(material), traits_(material.traits()), constants_(std::move(constants)), space_(space), options_(std::move(options)),
-        components_(tensor_components(space)), random_(options_.seed) {}
+      : material_(material),
+        traits_(material.traits()),
+        constants_(std::move(constants)),
+        space_(space),
+        options_(std::move(options)),
+        components_(tensor_components(space)),
+        random_(options_.seed) {}
 
   void check() {
     CHECK_MESSAGE(traits_.constants == static_cast<int>(constants_.size()), label(), "number of constants");
@@ -61,8 +66,8 @@ class MaterialContract {
       if (!(e <= error)) worst = i, error = e;
       if (std::isnan(e)) break;
     }
-    CHECK_MESSAGE(error <= tolerance * scale, label(), identity, ": component ", worst, " is ", found[worst], ", expected ", expected[worst],
-                  ", error ", error, " > ", tolerance, " * ", scale);
+    CHECK_MESSAGE(error <= tolerance * scale, label(), identity, ": component ", worst, " is ", found[worst], ", expected ",
+                  expected[worst], ", error ", error, " > ", tolerance, " * ", scale);
   }
   void same_bits(const std::string& identity, const Values& found, const Values& expected) const {
     std::size_t i = 0;
@@ -124,7 +129,8 @@ class MaterialContract {
     const Evaluation e = evaluate({Values(components_, 0.0)});
     CHECK_MESSAGE(e.status.ok(), label(), "F = I is refused");
     CHECK_MESSAGE(e.psi.data()[0] == 0.0, label(), "psi(0) = 0: ", e.psi.data()[0]);
-    for (int c = 0; c < components_; ++c) CHECK_MESSAGE(e.P.component(c)[0] == 0.0, label(), "P(0) = 0: component ", c, " ", e.P.component(c)[0]);
+    for (int c = 0; c < components_; ++c)
+      CHECK_MESSAGE(e.P.component(c)[0] == 0.0, label(), "P(0) = 0: component ", c, " ", e.P.component(c)[0]);
     const double scale = stiffness_scale(e.at(e.A, 0));
     for (int c = 0; c < components_; ++c) {
       Values unit(components_, 0.0), column;
@@ -196,7 +202,8 @@ class MaterialContract {
         for (int c = 0; c < components_; ++c) action[r] += e.A.component(r * components_ + c)[p] * directions[p][c];
       near("dP = A : dH", e.at(e.dP, p), action, 1e-12, stress_scale(e, p));
       for (int c = 0; c < components_; ++c)
-        if (is_free(space_, c)) CHECK_MESSAGE(e.P.component(c)[p] == 0.0, label(), "free stress is exactly zero: ", e.P.component(c)[p]);
+        if (is_free(space_, c))
+          CHECK_MESSAGE(e.P.component(c)[p] == 0.0, label(), "free stress is exactly zero: ", e.P.component(c)[p]);
     }
   }
 
@@ -209,7 +216,8 @@ class MaterialContract {
     CHECK_MESSAGE(batch.guards_intact, label(), "writes behind padded(n)");
     for (int p = 0; p < n; ++p) {
       const Values all = batch.all(p);
-      CHECK_MESSAGE(std::none_of(all.begin(), all.end(), [](double x) { return std::isnan(x); }), label(), "outputs overwritten, point ", p);
+      CHECK_MESSAGE(std::none_of(all.begin(), all.end(), [](double x) { return std::isnan(x); }), label(),
+                    "outputs overwritten, point ", p);
       const Evaluation single = evaluate({points[p]}, {directions[p]});
       same_bits("batch = single", all, single.all(0));
       if (!free_stretch(space_)) continue;
@@ -266,16 +274,19 @@ class MaterialContract {
     points[first] = Values(components_, 0.0);
     points[first][0] = traits_.objective ? -1.5 : -std::numeric_limits<double>::infinity();
     const Evaluation e = evaluate(points, directions);
-    CHECK_MESSAGE(e.status.inadmissible == first, label(), "first inadmissible point ", first, ", reported ", e.status.inadmissible);
+    CHECK_MESSAGE(e.status.inadmissible == first, label(), "first inadmissible point ", first, ", reported ",
+                  e.status.inadmissible);
     for (int p = 0; p < n; ++p) {
       const bool is_bad = std::find(bad.begin(), bad.end(), p) != bad.end();
       const Values all = e.all(p);
-      if (is_bad) CHECK_MESSAGE(std::all_of(all.begin(), all.end(), [](double x) { return x == 0; }), label(), "zero at bad point ", p);
-      else same_bits("points beside inadmissible ones", all, clean.all(p));
+      if (is_bad)
+        CHECK_MESSAGE(std::all_of(all.begin(), all.end(), [](double x) { return x == 0; }), label(), "zero at bad point ", p);
+      else
+        same_bits("points beside inadmissible ones", all, clean.all(p));
     }
     if (!traits_.objective) return;
     Values flat(components_, 0.0);
-    flat[0] = -1;   // det F = 0
+    flat[0] = -1;  // det F = 0
     CHECK_MESSAGE(evaluate({flat}).status.inadmissible == 0, label(), "det F = 0 must be refused");
   }
 

@@ -14,7 +14,8 @@ namespace {
 using Given = std::map<std::string, double, std::less<>>;
 
 Moduli convert(const Given& given) {
-  return elastic_constants({[&](std::string_view k) { return given.contains(k); }, [&](std::string_view k) { return given.find(k)->second; }});
+  return elastic_constants(
+      {[&](std::string_view k) { return given.contains(k); }, [&](std::string_view k) { return given.find(k)->second; }});
 }
 
 std::string refusal(const Given& given) {
@@ -26,23 +27,26 @@ std::string refusal(const Given& given) {
   return "";
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 }  // namespace
 
 TEST_CASE("any two elastic constants give the same solid") {
   for (const double nu : {-0.9, -0.3, 0.2, 0.25, 0.45, 0.49999}) {
     const double mu = 0.8, lambda = 2 * mu * nu / (1 - 2 * nu), bulk = lambda + 2 * mu / 3, E = 2 * mu * (1 + nu);
-    const Given all{{"youngs_modulus", E}, {"poisson_ratio", nu}, {"shear_modulus", mu}, {"bulk_modulus", bulk}, {"lame_lambda", lambda}};
+    const Given all{
+        {"youngs_modulus", E}, {"poisson_ratio", nu}, {"shear_modulus", mu}, {"bulk_modulus", bulk}, {"lame_lambda", lambda}};
     for (auto a = all.begin(); a != all.end(); ++a)
       for (auto b = std::next(a); b != all.end(); ++b) {
         // E and lambda have two solids where nu < -1/4: the one with the larger shear modulus is taken
         if (nu < -0.25 && contains(a->first + b->first, "lame") && contains(a->first + b->first, "young")) continue;
         const Moduli m = convert({*a, *b});
-        const double sensitivity = 1 / (1 - 2 * nu) + 1 / (1 + nu);   // of mu to the pairs that do not hold it
+        const double sensitivity = 1 / (1 - 2 * nu) + 1 / (1 + nu);  // of mu to the pairs that do not hold it
         CHECK_MESSAGE(std::abs(m.mu - mu) <= 1e-14 * mu * sensitivity, a->first, ", ", b->first, ", nu = ", nu, ": mu ", m.mu);
-        CHECK_MESSAGE(std::abs(m.lambda - lambda) <= 1e-14 * (std::abs(lambda) + mu) * sensitivity * sensitivity, a->first, ", ", b->first, ", nu = ", nu,
-                      ": lambda ", m.lambda);
+        CHECK_MESSAGE(std::abs(m.lambda - lambda) <= 1e-14 * (std::abs(lambda) + mu) * sensitivity * sensitivity, a->first, ", ",
+                      b->first, ", nu = ", nu, ": lambda ", m.lambda);
       }
   }
 }

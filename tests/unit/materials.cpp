@@ -16,7 +16,9 @@ using contract::MaterialOptions;
 namespace {
 
 /// (lambda, mu) for mu = 1 and Poisson's ratio nu.
-std::vector<double> lame(double nu) { return {2 * nu / (1 - 2 * nu), 1.0}; }
+std::vector<double> lame(double nu) {
+  return {2 * nu / (1 - 2 * nu), 1.0};
+}
 
 }  // namespace
 
@@ -39,7 +41,8 @@ TEST_CASE("contract: neo_hookean") {
 TEST_CASE("contract: mooney_rivlin") {
   for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic})
     for (const double kappa : {1.7, 20.0, 1e4})
-      check_material(LawMaterial(MooneyRivlin{form}), {0.3, 0.2, kappa}, {.law = "mooney_rivlin", .least_free = 0.4, .most_free = 4});
+      check_material(LawMaterial(MooneyRivlin{form}), {0.3, 0.2, kappa},
+                     {.law = "mooney_rivlin", .least_free = 0.4, .most_free = 4});
 }
 
 TEST_CASE("contract: hencky") {
@@ -53,7 +56,10 @@ namespace {
 template <class Law>
 struct EnergyOnly : Law {
   using Law::constants, Law::small_strain, Law::traits;
-  template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept { return Law::psi(H, k); }
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    return Law::psi(H, k);
+  }
 
  private:
   using Law::P;
@@ -71,7 +77,8 @@ struct StressOnly : Law {
 };
 
 /// psi, P, dP, A of two materials agree to 1e-10 of the magnitude of each.
-void check_same(const Material& found, const Material& expected, const std::vector<double>& constants, const std::string& what, bool with_energy) {
+void check_same(const Material& found, const Material& expected, const std::vector<double>& constants, const std::string& what,
+                bool with_energy) {
   contract::Random random(11);
   for (const Space space : {Space::solid, Space::plane_strain, Space::plane_stress, Space::line_strain, Space::line_stress}) {
     const bool free = contract::free_stretch(space);
@@ -88,7 +95,8 @@ void check_same(const Material& found, const Material& expected, const std::vect
       const double scale = contract::largest(b.at(b.A, p));
       const contract::Values x = a.all(p), y = b.all(p);
       for (std::size_t i = with_energy ? 0 : 1; i < x.size(); ++i)
-        CHECK_MESSAGE(std::abs(x[i] - y[i]) <= 1e-10 * scale, what, ", ", name(space), ": value ", i, " is ", x[i], ", expected ", y[i]);
+        CHECK_MESSAGE(std::abs(x[i] - y[i]) <= 1e-10 * scale, what, ", ", name(space), ": value ", i, " is ", x[i], ", expected ",
+                      y[i]);
     }
   }
 }
@@ -155,11 +163,13 @@ TEST_CASE("hencky: hydrostatic and principal stretches") {
   const LawMaterial<Hencky> material;
   for (const double a : {0.2, 0.9, 1.0 + 1e-9, 1.1, 5.0}) {
     const contract::Matrix P = stress_of(material, {lambda, mu}, {a, 0, 0, 0, a, 0, 0, 0, a});
-    for (int i = 0; i < 9; ++i) CHECK(P[i] == doctest::Approx(i % 4 == 0 ? 3 * kappa * std::log(a) / a : 0.0).epsilon(1e-14).scale(kappa));
+    for (int i = 0; i < 9; ++i)
+      CHECK(P[i] == doctest::Approx(i % 4 == 0 ? 3 * kappa * std::log(a) / a : 0.0).epsilon(1e-14).scale(kappa));
   }
   const double l[3] = {0.6, 1.1, 2.5}, volume = std::log(l[0] * l[1] * l[2]);
   const contract::Matrix P = stress_of(material, {lambda, mu}, {l[0], 0, 0, 0, l[1], 0, 0, 0, l[2]});
-  for (int i = 0; i < 3; ++i) CHECK(P[4 * i] == doctest::Approx((lambda * volume + 2 * mu * std::log(l[i])) / l[i]).epsilon(1e-13));
+  for (int i = 0; i < 3; ++i)
+    CHECK(P[4 * i] == doctest::Approx((lambda * volume + 2 * mu * std::log(l[i])) / l[i]).epsilon(1e-13));
 }
 
 // The reference is the same law in long double with its own tolerance: derivatives there by central differences of order six.
@@ -176,22 +186,29 @@ TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
       const double gap = exponent == 17 ? 0.0 : std::pow(10.0, -exponent);
       // 0: two equal and a third above, 1: below, 2: all three near
       const double third = shape == 0 ? 2.0 : shape == 1 ? 0.5 : 1.3 + 2 * gap;
-      const contract::Matrix F = contract::product(contract::random_rotation(random, Space::solid),
+      const contract::Matrix F = contract::product(
+          contract::random_rotation(random, Space::solid),
           contract::product({1.3, 0, 0, 0, 1.3 + gap, 0, 0, 0, third}, contract::random_rotation(random, Space::solid)));
       contract::Values H = contract::restrict_to(Space::solid, F);
       for (int i = 0; i < 3; ++i) H[4 * i] -= 1;
       const contract::Values direction = contract::random_direction(random, Space::solid);
       const Evaluation e(LawMaterial<Hencky>(), Space::solid, constants, {H}, {direction});
       const Long h = 2e-3L;
-      const auto moved = [&](int c, Long by) { return LongTensor::map([&](int i) { return Long(H[i]) + (c < 0 ? by * Long(direction[i]) : i == c ? by : 0.0L); }); };
+      const auto moved = [&](int c, Long by) {
+        return LongTensor::map([&](int i) { return Long(H[i]) + (c < 0 ? by * Long(direction[i]) : i == c ? by : 0.0L); });
+      };
       for (int c = 0; c < 9; ++c) {
         Long slope = 0;
-        for (int step = 1; step <= 3; ++step) slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
-        CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= 1e-11, "P: shape ", shape, ", gap ", gap, ", component ", c);
+        for (int step = 1; step <= 3; ++step)
+          slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
+        CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= 1e-11, "P: shape ", shape, ", gap ", gap, ", component ",
+                      c);
       }
       LongTensor slope = LongTensor::map([](int) { return 0.0L; });
-      for (int step = 1; step <= 3; ++step) slope = slope + (weights[step - 1] / h) * (law.P(moved(-1, step * h), k) - law.P(moved(-1, -step * h), k));
+      for (int step = 1; step <= 3; ++step)
+        slope = slope + (weights[step - 1] / h) * (law.P(moved(-1, step * h), k) - law.P(moved(-1, -step * h), k));
       for (int c = 0; c < 9; ++c)
-        CHECK_MESSAGE(std::abs(double(slope[c] - e.dP.component(c)[0])) <= 1e-11, "dP: shape ", shape, ", gap ", gap, ", component ", c, " ", double(slope[c]), " ", e.dP.component(c)[0]);
+        CHECK_MESSAGE(std::abs(double(slope[c] - e.dP.component(c)[0])) <= 1e-11, "dP: shape ", shape, ", gap ", gap,
+                      ", component ", c, " ", double(slope[c]), " ", e.dP.component(c)[0]);
     }
 }

@@ -17,8 +17,12 @@ double positive(std::string_view name, double value) {
   return value;
 }
 
-Moduli from_shear_and_bulk(double mu, double bulk) { return {bulk - 2 * mu / 3, mu}; }
-Moduli from_young_and_shear(double E, double mu) { return {mu * (E - 2 * mu) / (3 * mu - E), mu}; }
+Moduli from_shear_and_bulk(double mu, double bulk) {
+  return {bulk - 2 * mu / 3, mu};
+}
+Moduli from_young_and_shear(double E, double mu) {
+  return {mu * (E - 2 * mu) / (3 * mu - E), mu};
+}
 
 /// mu = (E - 3 lambda + R)/4 with R = sqrt(E^2 + 9 lambda^2 + 2 E lambda), without cancellation.
 Moduli from_young_and_lambda(double E, double lambda) {
@@ -27,7 +31,8 @@ Moduli from_young_and_lambda(double E, double lambda) {
 }
 
 Moduli from_poisson_and_lambda(double nu, double lambda) {
-  if (nu == 0 || lambda / nu <= 0) refuse("lame_lambda", lambda, fmt::format("with poisson_ratio = {} it must have the sign of poisson_ratio, not zero", nu));
+  if (nu == 0 || lambda / nu <= 0)
+    refuse("lame_lambda", lambda, fmt::format("with poisson_ratio = {} it must have the sign of poisson_ratio, not zero", nu));
   return {lambda, lambda * (1 - 2 * nu) / (2 * nu)};
 }
 
@@ -45,8 +50,10 @@ Moduli elastic_constants(const MaterialInput& input) {
       if (!std::isfinite(value[i])) refuse(names[i], value[i], "must be finite");
     }
   if (given != 2)
-    throw std::domain_error(fmt::format("{} elastic constants are given; exactly two of youngs_modulus, poisson_ratio, shear_modulus, "
-                                        "bulk_modulus, lame_lambda are needed", given));
+    throw std::domain_error(
+        fmt::format("{} elastic constants are given; exactly two of youngs_modulus, poisson_ratio, shear_modulus, "
+                    "bulk_modulus, lame_lambda are needed",
+                    given));
   const auto [E, nu, mu, bulk, lambda] = value;
   if (has[0]) positive(names[0], E);
   if (has[1] && !(nu > -1 && nu < 0.5)) refuse(names[1], nu, "must lie in (-1, 1/2)");
@@ -54,19 +61,30 @@ Moduli elastic_constants(const MaterialInput& input) {
   if (has[3]) positive(names[3], bulk);
 
   Moduli m;
-  if (has[0] && has[1]) m = {E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))};
-  else if (has[0] && has[2]) m = from_young_and_shear(E, mu);
-  else if (has[0] && has[3]) m = from_shear_and_bulk(3 * bulk * E / (9 * bulk - E), bulk);
-  else if (has[0]) m = from_young_and_lambda(E, lambda);
-  else if (has[1] && has[2]) m = {2 * mu * nu / (1 - 2 * nu), mu};
-  else if (has[1] && has[3]) m = {3 * bulk * nu / (1 + nu), 3 * bulk * (1 - 2 * nu) / (2 * (1 + nu))};
-  else if (has[1]) m = from_poisson_and_lambda(nu, lambda);
-  else if (has[2] && has[3]) m = from_shear_and_bulk(mu, bulk);
-  else if (has[2]) m = {lambda, mu};
-  else m = {lambda, 1.5 * (bulk - lambda)};
+  if (has[0] && has[1])
+    m = {E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))};
+  else if (has[0] && has[2])
+    m = from_young_and_shear(E, mu);
+  else if (has[0] && has[3])
+    m = from_shear_and_bulk(3 * bulk * E / (9 * bulk - E), bulk);
+  else if (has[0])
+    m = from_young_and_lambda(E, lambda);
+  else if (has[1] && has[2])
+    m = {2 * mu * nu / (1 - 2 * nu), mu};
+  else if (has[1] && has[3])
+    m = {3 * bulk * nu / (1 + nu), 3 * bulk * (1 - 2 * nu) / (2 * (1 + nu))};
+  else if (has[1])
+    m = from_poisson_and_lambda(nu, lambda);
+  else if (has[2] && has[3])
+    m = from_shear_and_bulk(mu, bulk);
+  else if (has[2])
+    m = {lambda, mu};
+  else
+    m = {lambda, 1.5 * (bulk - lambda)};
 
   if (!(m.mu > 0) || !std::isfinite(m.mu)) refuse("shear_modulus", m.mu, "(from the two constants given) must be > 0 and finite");
-  if (!(m.bulk() > 0) || !std::isfinite(m.bulk())) refuse("bulk_modulus", m.bulk(), "(from the two constants given) must be > 0 and finite");
+  if (!(m.bulk() > 0) || !std::isfinite(m.bulk()))
+    refuse("bulk_modulus", m.bulk(), "(from the two constants given) must be > 0 and finite");
   return m;
 }
 

@@ -83,6 +83,13 @@ void ParameterValues::set(std::string key, ParameterValue value, SourcePosition 
   entries_.insert_or_assign(std::move(key), Entry{std::move(value), std::move(position), given});
 }
 
+void ParameterValues::mark_expression(std::string_view key) { entries_.find(key)->second.expression = true; }
+
+bool ParameterValues::is_expression(std::string_view key) const noexcept {
+  const auto entry = entries_.find(key);
+  return entry != entries_.end() && entry->second.expression;
+}
+
 std::vector<std::string> ParameterValues::keys() const {
   std::vector<std::string> names;
   for (const auto& [key, entry] : entries_) names.push_back(key);

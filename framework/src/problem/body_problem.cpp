@@ -29,6 +29,12 @@ FieldView BodyProblem::declare(const std::string& name, int components) {
   return entry->second;
 }
 
+std::span<double> BodyProblem::declare_numbers(const std::string& name, std::size_t count) {
+  std::vector<double>& numbers = numbers_[name];
+  if (numbers.size() < count) numbers.resize(count, 0.0);
+  return numbers;
+}
+
 std::span<const double> BodyProblem::mass() {
   if (!mass_.empty()) return mass_;
   mass_.assign(stride(), 0.0);
@@ -155,6 +161,13 @@ std::vector<std::byte> BodyProblem::snapshot() const {
   scalar(last_step_);
   scalar(step_);
   scalar(energies_);
+  scalar(static_cast<std::uint64_t>(numbers_.size()));
+  for (const auto& [name, values] : numbers_) {
+    scalar(static_cast<std::uint64_t>(name.size()));
+    append(bytes, name.data(), name.size());
+    scalar(static_cast<std::uint64_t>(values.size()));
+    append(bytes, values.data(), values.size() * sizeof(double));
+  }
   const auto field = [&](const std::string& name, const Field& f) {
     scalar(static_cast<std::uint64_t>(name.size()));
     append(bytes, name.data(), name.size());
@@ -175,12 +188,23 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   last_step_ = in.value<double>();
   step_ = in.value<std::int64_t>();
   energies_ = in.value<Energies>();
-  eigenvector_ = Field();
-  while (!in.done()) {
+  const auto text = [&] {
     const auto length = in.value<std::uint64_t>();
     if (length > 256) throw InputError("the saved state is damaged");
     std::string name(length, ' ');
     in.take(name.data(), length);
+    return name;
+  };
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    const std::string name = text();
+    const auto count = in.value<std::uint64_t>();
+    if (count > 1u << 20) throw InputError("the saved state is damaged");
+    const std::span<double> values = declare_numbers(name, count);
+    in.take(values.data(), count * sizeof(double));
+  }
+  eigenvector_ = Field();
+  while (!in.done()) {
+    const std::string name = text();
     const auto components = in.value<std::int64_t>();
     if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
     Field f = body_.make_field(static_cast<int>(components));

@@ -75,7 +75,10 @@ ParameterValues TomlReader::read(const toml::table& table, const SourcePosition&
   for (const Parameter& parameter : parameters.parameters()) {
     const std::string key = join_path(path, parameter.name);
     if (const toml::node* node = table.get(parameter.name)) {
-      if (auto read = value(parameter, *node, key)) values.set(parameter.name, std::move(*read), position(*node));
+      if (auto read = value(parameter, *node, key)) {
+        values.set(parameter.name, std::move(*read), position(*node));
+        if (parameter.type == ParameterType::expression && node->is_string()) values.mark_expression(parameter.name);
+      }
     } else if (parameter.required) {
       errors.add(at, key, fmt::format("found nothing; allowed: {}", allowed(parameter)));
     } else if (!parameter.default_text.empty() && std::find(unused.begin(), unused.end(), parameter.name) == unused.end()) {

@@ -1,5 +1,6 @@
 #pragma once
-/// Forward differentiation: a number with one derivative. Dual<Pack> carries eight points at once, Dual<Dual<T>> second derivatives.
+/// Forward differentiation: a number with one derivative. Dual<Pack> carries eight points at once, Dual<Dual<T>> second
+/// derivatives.
 
 #include <concepts>
 #include <type_traits>
@@ -17,15 +18,13 @@ struct Dual {
   Dual(T v, T d) noexcept : value(v), derivative(d) {}
   /// A constant.
   template <class U>
-    requires(std::convertible_to<U, T> && !std::same_as<U, Dual>)
-  Dual(U constant) noexcept : value(static_cast<T>(constant)), derivative(0.0) {}
+  requires(std::convertible_to<U, T> && !std::same_as<U, Dual>) Dual(U constant)
+  noexcept : value(static_cast<T>(constant)), derivative(0.0) {}
 
   friend Dual operator+(Dual a, Dual b) noexcept { return {a.value + b.value, a.derivative + b.derivative}; }
   friend Dual operator-(Dual a, Dual b) noexcept { return {a.value - b.value, a.derivative - b.derivative}; }
   friend Dual operator-(Dual a) noexcept { return {-a.value, -a.derivative}; }
-  friend Dual operator*(Dual a, Dual b) noexcept {
-    return {a.value * b.value, a.value * b.derivative + a.derivative * b.value};
-  }
+  friend Dual operator*(Dual a, Dual b) noexcept { return {a.value * b.value, a.value * b.derivative + a.derivative * b.value}; }
   friend Dual operator/(Dual a, Dual b) noexcept {
     const T quotient = a.value / b.value;
     return {quotient, (a.derivative - quotient * b.derivative) / b.value};
@@ -41,40 +40,81 @@ template <class U, class T>
 concept ConstantFor = std::convertible_to<U, T> && !std::same_as<std::remove_cvref_t<U>, Dual<T>>;
 
 // Constants apart: the compiler may not drop the products with their zero derivatives by itself.
-template <class T, ConstantFor<T> U> Dual<T> operator+(Dual<T> a, U b) noexcept { return {a.value + T(b), a.derivative}; }
-template <class T, ConstantFor<T> U> Dual<T> operator+(U a, Dual<T> b) noexcept { return {T(a) + b.value, b.derivative}; }
-template <class T, ConstantFor<T> U> Dual<T> operator-(Dual<T> a, U b) noexcept { return {a.value - T(b), a.derivative}; }
-template <class T, ConstantFor<T> U> Dual<T> operator-(U a, Dual<T> b) noexcept { return {T(a) - b.value, -b.derivative}; }
-template <class T, ConstantFor<T> U> Dual<T> operator*(Dual<T> a, U b) noexcept { return {a.value * b, a.derivative * b}; }
-template <class T, ConstantFor<T> U> Dual<T> operator*(U a, Dual<T> b) noexcept { return {a * b.value, a * b.derivative}; }
-template <class T, ConstantFor<T> U> Dual<T> operator/(Dual<T> a, U b) noexcept { return {a.value / b, a.derivative / b}; }
+template <class T, ConstantFor<T> U>
+Dual<T> operator+(Dual<T> a, U b) noexcept {
+  return {a.value + T(b), a.derivative};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator+(U a, Dual<T> b) noexcept {
+  return {T(a) + b.value, b.derivative};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator-(Dual<T> a, U b) noexcept {
+  return {a.value - T(b), a.derivative};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator-(U a, Dual<T> b) noexcept {
+  return {T(a) - b.value, -b.derivative};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator*(Dual<T> a, U b) noexcept {
+  return {a.value * b, a.derivative * b};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator*(U a, Dual<T> b) noexcept {
+  return {a * b.value, a * b.derivative};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> operator/(Dual<T> a, U b) noexcept {
+  return {a.value / b, a.derivative / b};
+}
 
 // Comparisons look at the value.
-template <class T, class U> auto operator<(Dual<T> a, U b) noexcept { return a.value < b; }
-template <class T, class U> auto operator>(Dual<T> a, U b) noexcept { return a.value > b; }
+template <class T, class U>
+auto operator<(Dual<T> a, U b) noexcept {
+  return a.value < b;
+}
+template <class T, class U>
+auto operator>(Dual<T> a, U b) noexcept {
+  return a.value > b;
+}
 
-template <class M, class T> Dual<T> select(M mask, Dual<T> a, Dual<T> b) noexcept {
+template <class M, class T>
+Dual<T> select(M mask, Dual<T> a, Dual<T> b) noexcept {
   return {select(mask, a.value, b.value), select(mask, a.derivative, b.derivative)};
 }
 
-template <class T> Dual<T> sqrt(Dual<T> x) noexcept {
+template <class T>
+Dual<T> sqrt(Dual<T> x) noexcept {
   const T root = sqrt(x.value);
   return {root, x.derivative * 0.5 / root};
 }
-template <class T> Dual<T> cbrt(Dual<T> x) noexcept {
+template <class T>
+Dual<T> cbrt(Dual<T> x) noexcept {
   const T root = cbrt(x.value);
   return {root, x.derivative * root / (3.0 * x.value)};
 }
-template <class T> Dual<T> log(Dual<T> x) noexcept { return {log(x.value), x.derivative / x.value}; }
-template <class T> Dual<T> log1p(Dual<T> x) noexcept { return {log1p(x.value), x.derivative / (1.0 + x.value)}; }
-template <class T> Dual<T> exp(Dual<T> x) noexcept {
+template <class T>
+Dual<T> log(Dual<T> x) noexcept {
+  return {log(x.value), x.derivative / x.value};
+}
+template <class T>
+Dual<T> log1p(Dual<T> x) noexcept {
+  return {log1p(x.value), x.derivative / (1.0 + x.value)};
+}
+template <class T>
+Dual<T> exp(Dual<T> x) noexcept {
   const T e = exp(x.value);
   return {e, x.derivative * e};
 }
-template <class T> Dual<T> expm1(Dual<T> x) noexcept {
+template <class T>
+Dual<T> expm1(Dual<T> x) noexcept {
   const T e = expm1(x.value);
   return {e, x.derivative * (e + 1.0)};
 }
-template <class T> Dual<T> abs(Dual<T> x) noexcept { return select(x.value < T(0.0), -x, x); }
+template <class T>
+Dual<T> abs(Dual<T> x) noexcept {
+  return select(x.value < T(0.0), -x, x);
+}
 
 }  // namespace perikit

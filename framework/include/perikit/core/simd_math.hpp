@@ -13,36 +13,76 @@
 
 namespace perikit {
 
-template <std::floating_point T> T sqrt(T x) noexcept { return std::sqrt(x); }
-template <std::floating_point T> T abs(T x) noexcept { return std::abs(x); }
-template <std::floating_point T> T min(T a, T b) noexcept { return a < b ? a : b; }
-template <std::floating_point T> T max(T a, T b) noexcept { return a > b ? a : b; }
-template <std::floating_point T> T log(T x) noexcept { return std::log(x); }
-template <std::floating_point T> T log1p(T x) noexcept { return std::log1p(x); }
-template <std::floating_point T> T exp(T x) noexcept { return std::exp(x); }
-template <std::floating_point T> T expm1(T x) noexcept { return std::expm1(x); }
-template <std::floating_point T> T cbrt(T x) noexcept { return std::cbrt(x); }
-template <std::floating_point T> T select(bool m, T a, T b) noexcept { return m ? a : b; }
+template <std::floating_point T>
+T sqrt(T x) noexcept {
+  return std::sqrt(x);
+}
+template <std::floating_point T>
+T abs(T x) noexcept {
+  return std::abs(x);
+}
+template <std::floating_point T>
+T min(T a, T b) noexcept {
+  return a < b ? a : b;
+}
+template <std::floating_point T>
+T max(T a, T b) noexcept {
+  return a > b ? a : b;
+}
+template <std::floating_point T>
+T log(T x) noexcept {
+  return std::log(x);
+}
+template <std::floating_point T>
+T log1p(T x) noexcept {
+  return std::log1p(x);
+}
+template <std::floating_point T>
+T exp(T x) noexcept {
+  return std::exp(x);
+}
+template <std::floating_point T>
+T expm1(T x) noexcept {
+  return std::expm1(x);
+}
+template <std::floating_point T>
+T cbrt(T x) noexcept {
+  return std::cbrt(x);
+}
+template <std::floating_point T>
+T select(bool m, T a, T b) noexcept {
+  return m ? a : b;
+}
 
 namespace detail {
 
-inline Bits bits(Pack a) noexcept { return reinterpret_cast<Bits>(a.v); }
-inline Pack from_bits(Bits b) noexcept { return {reinterpret_cast<Lanes>(b)}; }
+inline Bits bits(Pack a) noexcept {
+  return reinterpret_cast<Bits>(a.v);
+}
+inline Pack from_bits(Bits b) noexcept {
+  return {reinterpret_cast<Lanes>(b)};
+}
 
-inline constexpr std::int64_t one_bits = 0x3ff0000000000000;       // 1.0
-inline constexpr std::int64_t sqrt_half_bits = 0x3fe6a09e667f3bcd; // sqrt(1/2)
-inline constexpr std::int64_t shifter_bits = 0x4338000000000000;   // 1.5 * 2^52: its last bits count units
+inline constexpr std::int64_t one_bits = 0x3ff0000000000000;        // 1.0
+inline constexpr std::int64_t sqrt_half_bits = 0x3fe6a09e667f3bcd;  // sqrt(1/2)
+inline constexpr std::int64_t shifter_bits = 0x4338000000000000;    // 1.5 * 2^52: its last bits count units
 inline constexpr double shifter = 6755399441055744.0;
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-inline constexpr double ln2_high = 0x1.62e42fee00000p-1;            // k * ln2_high is exact for every exponent k
+inline constexpr double ln2_high = 0x1.62e42fee00000p-1;  // k * ln2_high is exact for every exponent k
 inline constexpr double ln2_low = 0x1.a39ef35793c76p-33;
 
 /// Small integers as doubles, and the nearest integer of |x| < 2^51 as a double.
-inline Pack to_double(Bits k) noexcept { return from_bits(k + shifter_bits) - shifter; }
-inline Pack nearest_integer(Pack x) noexcept { return (x + shifter) - shifter; }
+inline Pack to_double(Bits k) noexcept {
+  return from_bits(k + shifter_bits) - shifter;
+}
+inline Pack nearest_integer(Pack x) noexcept {
+  return (x + shifter) - shifter;
+}
 /// 2^k for whole -1022 <= k <= 1023.
-inline Pack power_of_two(Pack k) noexcept { return from_bits((bits(k + shifter) - shifter_bits + 1023) << 52); }
+inline Pack power_of_two(Pack k) noexcept {
+  return from_bits((bits(k + shifter) - shifter_bits + 1023) << 52);
+}
 
 /// log(x) + correction / x for positive finite x; correction / x is at most a rounding error of x.
 inline Pack log_positive(Pack x, Pack correction) noexcept {
@@ -50,7 +90,7 @@ inline Pack log_positive(Pack x, Pack correction) noexcept {
   const Pack scaled = select(subnormal, x * 0x1p54, x);
   const Bits exponent = (bits(scaled) - sqrt_half_bits) >> 52;
   const Pack k = to_double(exponent) + select(subnormal, Pack(-54.0), Pack(0.0));
-  const Pack f = from_bits(bits(scaled) - (exponent << 52)) - 1.0;   // 1 + f in [sqrt(1/2), sqrt 2)
+  const Pack f = from_bits(bits(scaled) - (exponent << 52)) - 1.0;  // 1 + f in [sqrt(1/2), sqrt 2)
   // log(1 + f) = 2 artanh(s), s = f / (2 + f), z = s^2 < 0.0295
   const Pack s = f / (2.0 + f), z = s * s;
   Pack series = 2.0 / 23;
@@ -65,7 +105,8 @@ inline Pack expm1_reduced(Pack x, Pack& k) noexcept {
   const Pack high = x - k * ln2_high, low = k * ln2_low;
   const Pack r = high - low, lost = (high - r) - low;
   Pack series = 1.0 / 87178291200.0;
-  for (const double divisor : {6227020800.0, 479001600.0, 39916800.0, 3628800.0, 362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0})
+  for (const double divisor :
+       {6227020800.0, 479001600.0, 39916800.0, 3628800.0, 362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0})
     series = series * r + 1.0 / divisor;
   return r + (r * r * series + lost * (1.0 + r));
 }
@@ -81,7 +122,7 @@ inline Pack log(Pack x) noexcept {
 /// log(1 + x) without loss for small x.
 inline Pack log1p(Pack x) noexcept {
   const Pack u = 1.0 + x, big = u - 1.0;
-  const Pack lost = (1.0 - (u - big)) + (x - big);   // 1 + x = u + lost exactly
+  const Pack lost = (1.0 - (u - big)) + (x - big);  // 1 + x = u + lost exactly
   const Pack regular = detail::log_positive(u, lost);
   const Pack special = select(u == 0.0, Pack(-detail::infinity), Pack(detail::not_a_number));
   return select(u > 0.0, select(u == detail::infinity, u, regular), special);
@@ -91,7 +132,7 @@ inline Pack exp(Pack x) noexcept {
   const Pack inside = select(x > 710.0, Pack(710.0), select(x < -746.0, Pack(-746.0), x));
   Pack k;
   const Pack mantissa = 1.0 + detail::expm1_reduced(inside, k);
-  const Pack half = detail::nearest_integer(0.5 * k);   // in two factors: 2^k alone may not be representable
+  const Pack half = detail::nearest_integer(0.5 * k);  // in two factors: 2^k alone may not be representable
   const Pack finite = mantissa * detail::power_of_two(half) * detail::power_of_two(k - half);
   return select(x == x, finite, x);
 }
@@ -113,7 +154,7 @@ inline Pack cbrt(Pack x) noexcept {
   const detail::Bits exponent = (detail::bits(scaled) - detail::one_bits) >> 52;
   const Pack e = detail::to_double(exponent), third = detail::nearest_integer(e * (1.0 / 3.0));
   const Pack mantissa = detail::from_bits(detail::bits(scaled) - (exponent << 52));
-  const Pack m = mantissa * detail::power_of_two(e - 3.0 * third);   // in [1/2, 4), |x| = m 2^(3 third)
+  const Pack m = mantissa * detail::power_of_two(e - 3.0 * third);  // in [1/2, 4), |x| = m 2^(3 third)
   // y -> m^(-1/3): y (1 - h)^(-1/3) with h = 1 - m y^3, first from a cubic fit (2.6 %), then to 6e-6 and below rounding
   Pack y = 1.518645700691947 + m * (-0.6744191525243759 + m * (0.19491008005708438 + m * -0.020547832477409447));
   for (int i = 0; i < 2; ++i) {
@@ -130,14 +171,20 @@ inline Pack cbrt(Pack x) noexcept {
 /// x^N for a constant integer N.
 template <int N, class T>
 T integer_power(const T& x) noexcept {
-  if constexpr (N < 0) return T(1.0) / integer_power<-N>(x);
-  else if constexpr (N == 0) return T(1.0);
-  else if constexpr (N == 1) return x;
-  else if constexpr (N % 2 == 0) return integer_power<N / 2>(T(x * x));
-  else return x * integer_power<N - 1>(x);
+  if constexpr (N < 0)
+    return T(1.0) / integer_power<-N>(x);
+  else if constexpr (N == 0)
+    return T(1.0);
+  else if constexpr (N == 1)
+    return x;
+  else if constexpr (N % 2 == 0)
+    return integer_power<N / 2>(T(x * x));
+  else
+    return x * integer_power<N - 1>(x);
 }
 
-/// x^(N/D) for a constant exponent, D = 1, 2 or 3; x > 0 unless D = 1. To 2 units in the last place for exponents in [-1, 1], 3 in
+/// x^(N/D) for a constant exponent, D = 1, 2 or 3; x > 0 unless D = 1. To 2 units in the last place for exponents in [-1, 1], 3
+/// in
 /// [-2, 2].
 template <int N, int D, class T>
 T rational_power(const T& x) noexcept {
@@ -147,15 +194,22 @@ T rational_power(const T& x) noexcept {
     return integer_power<N>(x);
   } else {
     constexpr int q = D == 2 ? (N >= 0 ? N / 2 : -((-N + 1) / 2)) : (N >= 0 ? (N + 1) / 3 : -((-N + 1) / 3));
-    constexpr int rest = N - q * D;   // 0, 1; for thirds also -1
+    constexpr int rest = N - q * D;  // 0, 1; for thirds also -1
     T root;
-    if constexpr (D == 2) root = sqrt(x);
-    else root = cbrt(x);
-    if constexpr (rest == 0) return integer_power<q>(x);
-    else if constexpr (rest > 0 && q < 0) return root / integer_power<-q>(x);
-    else if constexpr (rest > 0) return root * integer_power<q>(x);
-    else if constexpr (q >= 0) return integer_power<q>(x) / root;
-    else return T(1.0) / (root * integer_power<-q>(x));
+    if constexpr (D == 2)
+      root = sqrt(x);
+    else
+      root = cbrt(x);
+    if constexpr (rest == 0)
+      return integer_power<q>(x);
+    else if constexpr (rest > 0 && q < 0)
+      return root / integer_power<-q>(x);
+    else if constexpr (rest > 0)
+      return root * integer_power<q>(x);
+    else if constexpr (q >= 0)
+      return integer_power<q>(x) / root;
+    else
+      return T(1.0) / (root * integer_power<-q>(x));
   }
 }
 

@@ -55,7 +55,9 @@ Vector<T> cross(const Vector<T>& a, const Vector<T>& b) noexcept {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class T>
-T dot(const Vector<T>& a, const Vector<T>& b) noexcept { return a.x * b.x + a.y * b.y + a.z * b.z; }
+T dot(const Vector<T>& a, const Vector<T>& b) noexcept {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 template <class T>
 Vector<T> times(const Tensor<T, Solid>& m, const Vector<T>& v) noexcept {
   return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z, m[6] * v.x + m[7] * v.y + m[8] * v.z};
@@ -75,7 +77,7 @@ Spectral<T, Line> spectral(const Tensor<T, Line>& a) noexcept {
 template <class T>
 Spectral<T, Plane> spectral(const Tensor<T, Plane>& a) noexcept {
   T largest = max(max(abs(a[0]), abs(a[3])), abs(a[1]));
-  largest = select(largest > T(0.0), largest, T(1.0));   // squares of tiny strains must not underflow
+  largest = select(largest > T(0.0), largest, T(1.0));  // squares of tiny strains must not underflow
   T cosine, sine;
   const T t = detail::jacobi_rotation<T>(a[0] / largest, a[1] / largest, a[3] / largest, cosine, sine);
   return {{a[0] - t * a[1], a[3] + t * a[1], a[4]}, {{cosine, sine, -sine, cosine, T(1.0)}}};
@@ -94,15 +96,16 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   const T radius = sqrt(select(square > T(1e-60), square, T(1.0)));
   const Tensor<T, Solid> unit = (T(1.0) / radius) * d;
 
-  // Eigenvalues of `unit` are 2 cos(theta + 2 k pi/3), cos 3 theta = det/2. c = |cos| of the isolated one solves 4c^3 - 3c = |det|/2,
-  // c in [sqrt(3)/2, 1], where Newton's slope is never below 6.
+  // Eigenvalues of `unit` are 2 cos(theta + 2 k pi/3), cos 3 theta = det/2. c = |cos| of the isolated one solves 4c^3 - 3c =
+  // |det|/2, c in [sqrt(3)/2, 1], where Newton's slope is never below 6.
   const T half_det = determinant(unit) * T(0.5), r = min(abs(half_det), T(1.0));
   T c = T(0.8660254) + r * (T(0.1666667) - r * T(0.0326921));
   for (int i = 0; i < (std::same_as<T, long double> ? 4 : 3); ++i)
     c = c - (c * (T(4.0) * c * c - T(3.0)) - r) / (T(12.0) * c * c - T(3.0));
   const Tensor<T, Solid> shifted = add_diagonal(unit, select(half_det < T(0.0), c + c, -(c + c)));
 
-  const V row0{shifted[0], shifted[1], shifted[2]}, row1{shifted[3], shifted[4], shifted[5]}, row2{shifted[6], shifted[7], shifted[8]};
+  const V row0{shifted[0], shifted[1], shifted[2]}, row1{shifted[3], shifted[4], shifted[5]},
+      row2{shifted[6], shifted[7], shifted[8]};
   V v = cross(row0, row1);
   const V second = cross(row0, row2), third = cross(row1, row2);
   T length = dot(v, v);
@@ -111,8 +114,8 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   length = max(length, second_length);
   v = choose(third_length > length, third, v);
   length = max(length, third_length);
-  // length >= 3/4 unless the deviator is nothing but rounding errors, where every rotation will do
-  const auto distinct = length > T(0.01);
+  // length >= 12 unless the deviator is nothing but rounding errors, where every rotation will do
+  const auto distinct = length > T(1.0);
   v = choose(distinct, v, V{T(1.0), T(0.0), T(0.0)});
   const T inverse_length = T(1.0) / sqrt(select(distinct, length, T(1.0)));
   v = {v.x * inverse_length, v.y * inverse_length, v.z * inverse_length};

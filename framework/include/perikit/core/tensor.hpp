@@ -13,22 +13,35 @@
 
 namespace perikit {
 
-struct Solid { static constexpr int components = 9, dimension = 3; };   ///< xx xy xz yx yy yz zx zy zz
-struct Plane { static constexpr int components = 5, dimension = 2; };   ///< xx xy yx yy zz
-struct Line { static constexpr int components = 3, dimension = 1; };    ///< xx yy zz
+struct Solid {
+  static constexpr int components = 9, dimension = 3;
+};  ///< xx xy xz yx yy yz zx zy zz
+struct Plane {
+  static constexpr int components = 5, dimension = 2;
+};  ///< xx xy yx yy zz
+struct Line {
+  static constexpr int components = 3, dimension = 1;
+};  ///< xx yy zz
 
 /// Place of component ij, -1 where it is always zero.
 template <class S>
 constexpr int component(int i, int j) noexcept {
-  if constexpr (S::dimension == 3) return 3 * i + j;
-  else if constexpr (S::dimension == 2) return i == 2 || j == 2 ? (i == j ? 4 : -1) : 2 * i + j;
-  else return i == j ? i : -1;
+  if constexpr (S::dimension == 3)
+    return 3 * i + j;
+  else if constexpr (S::dimension == 2)
+    return i == 2 || j == 2 ? (i == j ? 4 : -1) : 2 * i + j;
+  else
+    return i == j ? i : -1;
 }
 
 template <class S>
-constexpr int row(int k) noexcept { return S::dimension == 3 ? k / 3 : S::dimension == 2 ? k / 2 : k; }
+constexpr int row(int k) noexcept {
+  return S::dimension == 3 ? k / 3 : S::dimension == 2 ? k / 2 : k;
+}
 template <class S>
-constexpr int column(int k) noexcept { return S::dimension == 3 ? k % 3 : S::dimension == 2 ? (k == 4 ? 2 : k % 2) : k; }
+constexpr int column(int k) noexcept {
+  return S::dimension == 3 ? k % 3 : S::dimension == 2 ? (k == 4 ? 2 : k % 2) : k;
+}
 
 template <class T, class S>
 struct Tensor {
@@ -42,8 +55,12 @@ struct Tensor {
   T& operator()(int i, int j) noexcept { return c[component<S>(i, j)]; }
   const T& operator()(int i, int j) const noexcept { return c[component<S>(i, j)]; }
 
-  friend Tensor operator+(const Tensor& a, const Tensor& b) noexcept { return map([&](int k) { return a[k] + b[k]; }); }
-  friend Tensor operator-(const Tensor& a, const Tensor& b) noexcept { return map([&](int k) { return a[k] - b[k]; }); }
+  friend Tensor operator+(const Tensor& a, const Tensor& b) noexcept {
+    return map([&](int k) { return a[k] + b[k]; });
+  }
+  friend Tensor operator-(const Tensor& a, const Tensor& b) noexcept {
+    return map([&](int k) { return a[k] - b[k]; });
+  }
   template <std::convertible_to<T> U>
   friend Tensor operator*(const U& s, const Tensor& a) noexcept {
     return map([&](int k) { return s * a[k]; });
@@ -52,7 +69,10 @@ struct Tensor {
   /// Components f(k). (Not a loop over a default-constructed tensor: that one would be cleared in memory first.)
   template <class F>
   static Tensor map(F&& f) noexcept {
-    return [&]<std::size_t... k>(std::index_sequence<k...>) { return Tensor{{f(int(k))...}}; }(std::make_index_sequence<size>{});
+    return [&]<std::size_t... k>(std::index_sequence<k...>) {
+      return Tensor{{f(int(k))...}};
+    }
+    (std::make_index_sequence<size>{});
   }
   /// Components f(i, j).
   template <class F>
@@ -76,7 +96,9 @@ Tensor<T, S> transpose(const Tensor<T, S>& a) noexcept {
 }
 
 template <class T, class S>
-T trace(const Tensor<T, S>& a) noexcept { return a(0, 0) + a(1, 1) + a(2, 2); }
+T trace(const Tensor<T, S>& a) noexcept {
+  return a(0, 0) + a(1, 1) + a(2, 2);
+}
 
 /// a + s I.
 template <class T, class S, class U>
@@ -87,15 +109,17 @@ Tensor<T, S> add_diagonal(Tensor<T, S> a, const U& s) noexcept {
 
 /// a - tr(a)/3 I.
 template <class T, class S>
-Tensor<T, S> deviator(const Tensor<T, S>& a) noexcept { return add_diagonal(a, trace(a) * (-1.0 / 3.0)); }
+Tensor<T, S> deviator(const Tensor<T, S>& a) noexcept {
+  return add_diagonal(a, trace(a) * (-1.0 / 3.0));
+}
 
 namespace detail {
 /// sum over k of a(i, k) b(k, j), over products that can differ from zero; A and B give the components.
 template <class S, class A, class B>
 auto contract(int i, int j, A&& a, B&& b) noexcept {
   auto r = a(i, i) * b(i, j);
-  PERIKIT_UNROLL for (int k = 0; k < 3; ++k)
-    if (k != i && component<S>(i, k) >= 0 && component<S>(k, j) >= 0) r = r + a(i, k) * b(k, j);
+  PERIKIT_UNROLL for (int k = 0; k < 3; ++k) if (k != i && component<S>(i, k) >= 0 && component<S>(k, j) >= 0) r =
+      r + a(i, k) * b(k, j);
   return r;
 }
 }  // namespace detail
@@ -108,7 +132,10 @@ Tensor<T, S> operator*(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
 /// a^T b.
 template <class T, class S>
 Tensor<T, S> transpose_times(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
-  return Tensor<T, S>::build([&](int i, int j) { return detail::contract<S>(i, j, [&](int k, int l) { return a(l, k); }, b); });
+  return Tensor<T, S>::build([&](int i, int j) {
+    return detail::contract<S>(
+        i, j, [&](int k, int l) { return a(l, k); }, b);
+  });
 }
 
 /// a : b, the sum of all products of components.
@@ -128,8 +155,10 @@ Tensor<T, S> symmetric_part(const Tensor<T, S>& a) noexcept {
 /// a^T a, exactly symmetric.
 template <class T, class S>
 Tensor<T, S> gram(const Tensor<T, S>& a) noexcept {
-  return Tensor<T, S>::build_symmetric(
-      [&](int i, int j) { return detail::contract<S>(i, j, [&](int k, int l) { return a(l, k); }, a); });
+  return Tensor<T, S>::build_symmetric([&](int i, int j) {
+    return detail::contract<S>(
+        i, j, [&](int k, int l) { return a(l, k); }, a);
+  });
 }
 
 /// F^T F - I of F = I + H, without forming F: small strains keep their digits. Exactly symmetric.
@@ -163,7 +192,8 @@ Tensor<T, S> cofactor(const Tensor<T, S>& a) noexcept {
       return a(k, m) * a(l, n) - a(k, n) * a(l, m);
     });
   } else if constexpr (S::dimension == 2) {
-    return {{a(1, 1) * a(2, 2), -(a(1, 0) * a(2, 2)), -(a(0, 1) * a(2, 2)), a(0, 0) * a(2, 2), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)}};
+    return {{a(1, 1) * a(2, 2), -(a(1, 0) * a(2, 2)), -(a(0, 1) * a(2, 2)), a(0, 0) * a(2, 2),
+             a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)}};
   } else {
     return {{a[1] * a[2], a[2] * a[0], a[0] * a[1]}};
   }
@@ -183,7 +213,9 @@ T determinant(const Tensor<T, S>& a) noexcept {
 
 /// det(I + H) - 1 from the invariants of H.
 template <class T, class S>
-T jacobian_minus_one(const Tensor<T, S>& H) noexcept { return trace(H) + (second_invariant(H) + determinant(H)); }
+T jacobian_minus_one(const Tensor<T, S>& H) noexcept {
+  return trace(H) + (second_invariant(H) + determinant(H));
+}
 
 /// cof(I + H) - I = tr(H) I - H^T + cof(H).
 template <class T, class S>

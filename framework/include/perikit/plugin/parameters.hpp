@@ -151,6 +151,7 @@ class ParameterValues {
   InputError error(std::string_view key, std::string_view message) const;
 
   void set(std::string key, ParameterValue value, SourcePosition position = {}, bool given = true);
+  void mark_expression(std::string_view key);
   void set_path(std::string path) { path_ = std::move(path); }      ///< e.g. "kinematics.base"
   const std::string& path() const noexcept { return path_; }
   void set_table_position(SourcePosition p) { table_position_ = std::move(p); }
@@ -162,6 +163,7 @@ class ParameterValues {
     ParameterValue value;
     SourcePosition position;
     bool given = true;
+    bool expression = false;
   };
   std::map<std::string, Entry, std::less<>> entries_;
   std::string path_;

@@ -27,6 +27,7 @@ class BodyProblem final : public Problem {
   FieldView internal_force() noexcept override { return internal_force_; }
   FieldView external_force() noexcept override { return declare("external_force", dimension()); }
   FieldView declare(const std::string& name, int components) override;
+  std::span<double> declare_numbers(const std::string& name, std::size_t count) override;
   double& time() noexcept override { return time_; }
   std::int64_t& step() noexcept override { return step_; }
   Energies& energies() noexcept override { return energies_; }
@@ -105,6 +106,7 @@ class BodyProblem final : public Problem {
   mutable Field free_mask_;
   Field displacement_, internal_force_;
   std::map<std::string, Field> declared_;
+  std::map<std::string, std::vector<double>> numbers_;
   Field eigenvector_;
   AlignedVector<double> mass_;
   double uniform_mass_ = -1;

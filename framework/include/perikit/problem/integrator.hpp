@@ -70,6 +70,8 @@ class Problem {
   virtual FieldView external_force() noexcept = 0;  ///< [N]; allocated on first use
   /// A further run variable of the integrator that snapshots must hold.
   virtual FieldView declare(const std::string& name, int components) = 0;
+  /// Further numbers of the integrator that snapshots must hold, zero at first.
+  virtual std::span<double> declare_numbers(const std::string& name, std::size_t count) = 0;
   virtual double& time() noexcept = 0;
   virtual std::int64_t& step() noexcept = 0;
   virtual Energies& energies() noexcept = 0;

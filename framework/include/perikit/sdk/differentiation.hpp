@@ -9,11 +9,17 @@
 namespace perikit {
 
 template <class Law, class T, class S, class K>
-concept HasEnergy = requires(const Law& law, const Tensor<T, S>& H, const K& k) { { law.psi(H, k) } -> std::same_as<T>; };
+concept HasEnergy = requires(const Law& law, const Tensor<T, S>& H, const K& k) {
+  { law.psi(H, k) } -> std::same_as<T>;
+};
 template <class Law, class T, class S, class K>
-concept HasStress = requires(const Law& law, const Tensor<T, S>& H, const K& k) { { law.P(H, k) } -> std::same_as<Tensor<T, S>>; };
+concept HasStress = requires(const Law& law, const Tensor<T, S>& H, const K& k) {
+  { law.P(H, k) } -> std::same_as<Tensor<T, S>>;
+};
 template <class Law, class T, class S, class K>
-concept HasTangent = requires(const Law& law, const Tensor<T, S>& H, const K& k) { law.tangent(H, k)(H); };
+concept HasTangent = requires(const Law& law, const Tensor<T, S>& H, const K& k) {
+  law.tangent(H, k)(H);
+};
 
 /// H + epsilon dH.
 template <class T, class S>
@@ -33,8 +39,10 @@ Tensor<T, S> stress_from_energy(const Law& law, const Tensor<T, S>& H, const K& 
 
 template <class Law, class T, class S, class K>
 Tensor<T, S> stress(const Law& law, const Tensor<T, S>& H, const K& k) noexcept {
-  if constexpr (HasStress<Law, T, S, K>) return law.P(H, k);
-  else return stress_from_energy(law, H, k);
+  if constexpr (HasStress<Law, T, S, K>)
+    return law.P(H, k);
+  else
+    return stress_from_energy(law, H, k);
 }
 
 /// dH -> A : dH at H.

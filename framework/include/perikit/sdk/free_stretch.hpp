@@ -26,9 +26,10 @@ Pack contraction_ratio(const Law& law, const K& k) noexcept {
   return q[0] / inner(free_direction<Pack, S>(), q);
 }
 
-/// H with its free components such that the free stress vanishes to rounding. Lanes that are not `good` on entry keep H = 0; lanes
-/// without a solution are taken from `good`. Newton in the logarithm of the stretch, where rubber laws are nearly linear, started
-/// from the exact solution for a Kirchhoff stress linear in the logarithmic strain, kept inside a bracket; each lane stops on its own.
+/// H with its free components such that the free stress vanishes to rounding. Lanes that are not `good` on entry keep H = 0;
+/// lanes without a solution are taken from `good`. Newton in the logarithm of the stretch, where rubber laws are nearly linear,
+/// started from the exact solution for a Kirchhoff stress linear in the logarithmic strain, kept inside a bracket; each lane
+/// stops on its own.
 template <bool small_strain, class Law, class S, class K>
 Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k, Pack ratio, PackMask& good) noexcept {
   constexpr int max_iterations = 80;
@@ -55,8 +56,8 @@ Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k
       step = -residual / stiffness;
       next = h + step;
     } else {
-      const Pack x = 1.0 + h, slope = residual + x * stiffness;   // d(x residual)/dy over x
-      const PackMask low = residual < 0.0, high = residual > 0.0;
+      const Pack x = 1.0 + h, slope = residual + x * stiffness;  // d(x residual)/dy over x
+      const PackMask low = residual<0.0, high = residual> 0.0;
       lower = select(low & active, y, lower);
       upper = select(high & active, y, upper);
       const Pack newton = min(max(-residual / slope, Pack(-1.0)), Pack(1.0));
@@ -68,7 +69,7 @@ Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k
       y = select(active, y + step, y);
     }
     h = select(active, next, h);
-    active &= abs(step) > 1e-10 * size;   // convergence is quadratic: the step just taken is the last that matters
+    active &= abs(step) > 1e-8 * size;  // convergence is quadratic: the step just taken is the last that matters
   }
   good &= !active;
   return with_free_part(H, select(good, h, Pack(0.0)));

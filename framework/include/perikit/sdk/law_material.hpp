@@ -7,7 +7,8 @@
 ///     Moduli small_strain(const double* k) const noexcept;
 ///     template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept;             // one of these
 ///     template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept;    // or both
-///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left out
+///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left
+///     out
 ///   };
 ///   auto material = std::make_unique<LawMaterial<MyLaw>>();
 ///
@@ -38,11 +39,16 @@ class LawMaterial final : public Material {
 
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
     switch (space) {
-      case Space::solid: return run<Solid, false>(batch);
-      case Space::plane_strain: return run<Plane, false>(batch);
-      case Space::plane_stress: return run<Plane, true>(batch);
-      case Space::line_strain: return run<Line, false>(batch);
-      case Space::line_stress: return run<Line, true>(batch);
+      case Space::solid:
+        return run<Solid, false>(batch);
+      case Space::plane_strain:
+        return run<Plane, false>(batch);
+      case Space::plane_stress:
+        return run<Plane, true>(batch);
+      case Space::line_strain:
+        return run<Line, false>(batch);
+      case Space::line_stress:
+        return run<Line, true>(batch);
     }
     return {0};
   }
@@ -75,7 +81,7 @@ class LawMaterial final : public Material {
       PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
       return total == 0.0;
     } else {
-      const Pack j = jacobian_minus_one(H);   // not finite if any component is not
+      const Pack j = jacobian_minus_one(H);  // not finite if any component is not
       return (j > -1.0) & (j < std::numeric_limits<double>::infinity());
     }
   }
@@ -97,7 +103,7 @@ class LawMaterial final : public Material {
       if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law_, H, k, ratio, good);
       good &= admissible(H);
 
-      Pack probe = 0.0;   // turns to NaN where an output is not finite
+      Pack probe = 0.0;  // turns to NaN where an output is not finite
       if (b.psi) {
         Pack psi = 0.0;
         if constexpr (HasEnergy<Law, Pack, S, Constants>) psi = law_.psi(H, k);
@@ -114,16 +120,20 @@ class LawMaterial final : public Material {
       }
       if (b.dP || b.A) tangents<S, free_stretch>(b, p, H, k);
       good &= probe == 0.0;
-      if (any(!good)) [[unlikely]] clear(b, S::components, p, good, status);
+      if (any(!good)) [[unlikely]]
+        clear(b, S::components, p, good, status);
     }
     return status;
   }
 
   template <class S, bool free_stretch>
-  [[gnu::noinline, gnu::flatten]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H, const Constants& k) const noexcept {
+  [[gnu::noinline, gnu::flatten]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
+                                                const Constants& k) const noexcept {
     const auto action = [&] {
-      if constexpr (free_stretch) return condensed_tangent(law_, H, k);
-      else return tangent(law_, H, k);
+      if constexpr (free_stretch)
+        return condensed_tangent(law_, H, k);
+      else
+        return tangent(law_, H, k);
     }();
     if (b.dP) store(action(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
     if (!b.A) return;
@@ -135,7 +145,8 @@ class LawMaterial final : public Material {
   }
 
   /// Zeroes the outputs of the lanes that are not good and notes the first of them.
-  [[gnu::noinline, gnu::cold]] static void clear(const MaterialBatch& b, int components, int p, PackMask good, Status& status) noexcept {
+  [[gnu::noinline, gnu::cold]] static void clear(const MaterialBatch& b, int components, int p, PackMask good,
+                                                 Status& status) noexcept {
     for (int lane = 0; lane < pack_width && p + lane < b.n; ++lane) {
       if (good[lane]) continue;
       if (status.ok()) status.inadmissible = p + lane;

@@ -1,0 +1,23 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace perikit::app {
+
+struct Options {
+  std::filesystem::path scene, output;
+  std::vector<std::string> overrides;
+  std::vector<std::filesystem::path> plugin_path;
+  int threads = 0;
+  bool explain = false, quiet = false, trust = false;
+  std::string kind, part;
+  std::function<void(const Options&)> command;
+};
+
+std::string version();
+void add_commands(CLI::App& app, Options& options);
+
+}  // namespace perikit::app

@@ -1,0 +1,88 @@
+#include "describe.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace perikit::app {
+
+namespace {
+
+std::vector<std::string> kind_names() {
+  std::vector<std::string> names;
+  for (const Kind kind : all_kinds) names.emplace_back(name(kind));
+  return names;
+}
+
+Kind parse_kind(const std::string& text) {
+  if (const auto kind = kind_from_name(text)) return *kind;
+  const auto names = kind_names();
+  throw InputError(fmt::format("unknown kind '{}'{}; known: {}", text, did_you_mean(text, names), fmt::join(names, ", ")));
+}
+
+std::string allowed(const Parameter& p) {
+  std::string text;
+  if (!p.choices.empty()) text = fmt::format("one of {}", fmt::join(p.choices, ", "));
+  if (std::isfinite(p.lower)) text += fmt::format("{}{} {:g}", text.empty() ? "" : ", ", p.lower_open ? ">" : ">=", p.lower);
+  if (std::isfinite(p.upper)) text += fmt::format("{}{} {:g}", text.empty() ? "" : ", ", p.upper_open ? "<" : "<=", p.upper);
+  return text;
+}
+
+void indent(std::string& out, const std::string& text) {
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    out += "  " + text.substr(begin, end - begin) + "\n";
+    begin = end + 1;
+  }
+}
+
+}  // namespace
+
+std::string list_parts(Registry& registry, const std::string& kind) {
+  std::string out;
+  const std::vector<Kind> kinds = kind.empty() ? std::vector<Kind>(all_kinds.begin(), all_kinds.end()) : std::vector<Kind>{parse_kind(kind)};
+  for (const Kind k : kinds) {
+    const auto names = registry.names(k);
+    if (kind.empty()) {
+      if (names.empty()) continue;
+      out += fmt::format("{}\n", name(k));
+    }
+    for (const std::string& part : names) out += fmt::format("{}{:<24} {}\n", kind.empty() ? "  " : "", part, registry.describe(k, part).summary);
+  }
+  return out;
+}
+
+std::string describe_part(Registry& registry, const std::string& part) {
+  const std::size_t slash = part.find('/');
+  if (slash == std::string::npos) throw InputError(fmt::format("'{}': expected KIND/NAME, e.g. material/neo_hookean", part));
+  const Kind kind = parse_kind(part.substr(0, slash));
+  const PartDescription& d = registry.describe(kind, part.substr(slash + 1));
+  std::string out = fmt::format("{}/{}: {}\n", name(kind), d.name, d.summary);
+  const auto section = [&](const char* title, const std::string& text) {
+    if (text.empty()) return;
+    out += fmt::format("\n{}\n", title);
+    indent(out, text);
+  };
+  section("Equations", d.equations);
+  section("Source", d.source);
+  section("Limits", d.limits);
+  if (!d.parameters.parameters().empty()) out += "\nParameters\n";
+  for (const Parameter& p : d.parameters.parameters()) {
+    const std::string range = allowed(p);
+    out += fmt::format("  {:<20} [{}] {}{}{}\n", p.name, p.unit.empty() ? "-" : p.unit, p.text,
+                       p.required ? " Required." : p.default_text.empty() ? "" : fmt::format(" Default {}.", p.default_text),
+                       range.empty() ? "" : fmt::format(" Allowed: {}.", range));
+  }
+  for (const ParameterGroup& g : d.parameters.groups()) {
+    out += fmt::format("  {} {} of: {}\n", g.count >= 0 ? "exactly" : "at most", std::abs(g.count), fmt::join(g.names, ", "));
+  }
+  out += "\nExample\n";
+  for (const std::string& example : d.examples) {
+    std::string table = fmt::format("[{}]\ntype = \"{}\"\n{}", name(kind), d.name, example);
+    indent(out, table);
+  }
+  return out;
+}
+
+}  // namespace perikit::app

@@ -1,0 +1,62 @@
+/// The command line: perikit run | check | list | describe.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdlib>
+
+#include "commands.hpp"
+#include "perikit/core/errors.hpp"
+#include "perikit/run/simulation.hpp"
+
+namespace {
+
+enum Exit { done = 0, run_failed = 1, input_refused = 2 };
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Waiting threads must sleep: spinning ones make a busy machine several times slower. The runtime reads this when it starts,
+  // which is before main; so the program starts itself again once.
+  if (!std::getenv("OMP_WAIT_POLICY")) {
+    setenv("OMP_WAIT_POLICY", "passive", 1);
+    execv("/proc/self/exe", argv);
+  }
+  using namespace perikit;
+  CLI::App app{"perikit: runtime-loaded parts for correspondence peridynamics", "perikit"};
+  app.set_version_flag("--version", app::version());
+  app.require_subcommand(1);
+  app::Options options;
+  app::add_commands(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& e) {
+    return app.exit(e);
+  } catch (const CLI::CallForAllHelp& e) {
+    return app.exit(e);
+  } catch (const CLI::CallForVersion& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    app.exit(e);
+    return input_refused;
+  }
+  std::signal(SIGINT, [](int) { request_stop(); });
+  std::signal(SIGTERM, [](int) { request_stop(); });
+  try {
+    options.command(options);
+    return done;
+  } catch (const InputError& e) {
+    fmt::print(stderr, "{}\n", e.what());
+    return input_refused;
+  } catch (const RunError& e) {
+    fmt::print(stderr, "the run failed: {}\n", e.what());
+    return run_failed;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "the run failed: not enough memory\n");
+    return run_failed;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "internal error: {}\n", e.what());
+    return run_failed;
+  }
+}

@@ -1,0 +1,87 @@
+#pragma once
+/// A scene made ready to run, and the observer that records a run into a folder.
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "perikit/output/recorder.hpp"
+#include "perikit/plugin/registry.hpp"
+#include "perikit/problem/body_problem.hpp"
+#include "perikit/run/point_fields.hpp"
+#include "perikit/scene/scene.hpp"
+
+namespace perikit {
+
+class Simulation {
+ public:
+  /// Builds body, model and integrator. Throws InputError for what only building can show (empty sets, missing densities).
+  Simulation(const Scene& scene, const PartFactory& factory);
+
+  const Scene& scene() const noexcept { return scene_; }
+  BodyProblem& problem() noexcept { return *problem_; }
+  Integrator& integrator() noexcept { return *integrator_; }
+  bool dynamic() const noexcept { return traits_.dynamic; }
+  /// Runs to the end. Throws RunError.
+  void run(Observer& observer);
+  /// Points, bonds, memory and the integrator's plan, one per line - what `perikit check` prints.
+  std::string summary();
+  /// What was left out, why, and what it saves - what `--explain` prints.
+  std::string explanation(const Registry& registry) const;
+
+ private:
+  Scene scene_;
+  std::unique_ptr<Integrator> integrator_;
+  IntegratorTraits traits_;
+  std::unique_ptr<BodyProblem> problem_;
+};
+
+/// Writes frames, history and log of a run, and shows progress.
+class RunRecorder final : public Observer {
+ public:
+  /// show_progress: a live line on a terminal, a line now and then elsewhere.
+  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress);
+  ~RunRecorder() override;
+
+  bool wants_sample(std::int64_t step, double time) override;
+  void step_done(const StepReport& report) override;
+  void log(std::string_view message) override;
+  bool cancelled() const noexcept override;
+
+  std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
+  const std::vector<std::string>& history_columns() const noexcept { return columns_; }
+
+ private:
+  bool frame_due(std::int64_t step, double time) const;
+  bool history_due(std::int64_t step) const;
+  bool last(std::int64_t step, double time) const;
+  void write_frame(const StepReport& report);
+  void write_history(const StepReport& report);
+  double reduce(const HistoryDescription& record);
+  void progress(const StepReport& report);
+
+  Simulation& simulation_;
+  std::filesystem::path folder_;
+  bool show_progress_;
+  PointFields fields_;
+  std::vector<std::string> frame_fields_;
+  std::vector<std::string> columns_;
+  std::unique_ptr<FrameWriter> writer_;
+  std::unique_ptr<HistoryWriter> history_;
+  std::vector<double> frame_times_;
+  std::size_t next_time_ = 0;
+  std::int64_t history_every_ = 0;
+  std::int64_t history_rows_ = 0;
+  double end_time_ = 0;
+  std::int64_t steps_expected_ = 0;
+  std::string log_text_;
+  std::chrono::steady_clock::time_point start_, shown_;
+  bool line_open_ = false;
+};
+
+/// Asks a running RunRecorder to stop after the present step; safe in a signal handler.
+void request_stop() noexcept;
+
+}  // namespace perikit

@@ -1,0 +1,53 @@
+#include "perikit/run/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include "perikit/core/parallel.hpp"
+
+namespace perikit {
+
+Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(scene) {
+  if (scene_.threads) set_thread_count(*scene_.threads);
+  integrator_ = factory.integrator(*scene_.integrator);
+  traits_ = integrator_->traits();
+  problem_ = std::make_unique<BodyProblem>(scene_, factory, traits_.quasi_static);
+  if (traits_.dynamic) problem_->mass();
+}
+
+void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer); }
+
+std::string Simulation::summary() {
+  const Body& body = problem_->body();
+  const ModelReport report = problem_->model().report();
+  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points(),
+                                 body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
+  text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
+  if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
+  if (report.singular_families > 0) {
+    text += fmt::format("warning       {} points have a family too poor for a gradient; they carry no strain of their own\n", report.singular_families);
+  }
+  if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points use the gradient of the whole family\n", report.fallbacks);
+  text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
+  const double bytes = static_cast<double>(problem_->bytes());
+  text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.points()));
+  const std::string plan = integrator_->plan(*problem_);
+  if (!plan.empty()) text += fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
+  return text;
+}
+
+std::string Simulation::explanation(const Registry& registry) const {
+  std::vector<SkipNote> notes = problem_->model().report().skips;
+  std::size_t known = 0;
+  for (const Kind kind : all_kinds) known += registry.names(kind).size();
+  notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
+  if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
+  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
+  if (problem_->laws().constant_tangent()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
+  notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
+  notes.push_back({"fields that nobody asked for", "computed when written", fmt::format("{} of {} point fields", PointFields::names().size() - std::min(PointFields::names().size(), std::max<std::size_t>(scene_.output.fields.size(), 3)), PointFields::names().size())});
+  std::string text = "skipped:\n";
+  for (const SkipNote& note : notes) text += fmt::format("  {}: {} - saves {}\n", note.what, note.why, note.saves);
+  return text;
+}
+
+}  // namespace perikit

@@ -1,0 +1,32 @@
+#include "perikit/sdk/plugin.hpp"
+
+namespace {
+
+using namespace perikit;
+
+/// Energy, forces and fields of the initial displacement: no time, no equilibrium.
+class Evaluate final : public Integrator {
+ public:
+  IntegratorTraits traits() const noexcept override { return {}; }
+  std::string plan(Problem&) override { return "one evaluation of the initial displacement"; }
+  void run(Problem& problem, Observer& observer) override {
+    if (problem.any_load()) problem.evaluate_loads(0.0, problem.external_force());
+    const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), problem.internal_force(), &problem.energies().strain);
+    if (!status.ok()) throw RunError(status.description);
+    observer.wants_sample(0, 0.0);
+    observer.step_done({});
+  }
+};
+
+}  // namespace
+
+PERIKIT_PLUGIN(registrar) {
+  registrar.integrator({.name = "evaluate",
+                        .summary = "energy, forces and fields of the initial displacement",
+                        .parameters = {},
+                        .examples = {""},
+                        .equations = "Pi(u0), f(u0) = -dPi/du",
+                        .source = "used for the zero-energy modes of Partmann et al. (section 4.4) and Chowdhury et al. (section 3)",
+                        .limits = "Boundaries are not applied: the displacement is that of [initial]."},
+                       [](const ParameterValues&, const PartFactory&) { return std::make_unique<Evaluate>(); });
+}

@@ -1,0 +1,217 @@
+#include "verlet.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/parallel.hpp"
+#include "perikit/core/simd.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr std::size_t block = 4096;   // points; a multiple of `padding`
+
+template <class Body>
+void over_blocks(std::size_t n, Body&& body) {
+  parallel_for((n + block - 1) / block, [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); });
+}
+
+/// The run's loop variables: where the force of the last step is, and what happens to prescribed and loaded points.
+class Stepper {
+ public:
+  explicit Stepper(Problem& problem)
+      : problem_(problem), u_(problem.displacement()), v_(problem.declare("half_step_velocity", problem.dimension())),
+        force_(problem.internal_force()), mass_(problem.mass().data()), uniform_(problem.uniform_mass()),
+        loaded_(problem.any_load()), external_(loaded_ ? problem.external_force() : FieldView{}) {
+    if (loaded_) problem.evaluate_loads(problem.time(), external_);
+  }
+
+  void evaluate(double* energy, double dt) {
+    const EvaluationStatus status = problem_.evaluate_forces(u_, force_, energy, dt);
+    if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", problem_.step(), problem_.time(), status.description));
+  }
+
+  /// target = source + dt a on all points, and where asked u += drift target.
+  void kick(ConstFieldView source, FieldView target, double dt, double drift = 0) {
+    const double* masses = uniform_ > 0 ? nullptr : mass_;
+    over_blocks(u_.stride, [&](std::size_t begin, std::size_t end) {
+      for (int c = 0; c < problem_.dimension(); ++c) {
+        const double* f = force_.component(c);
+        const double* e = loaded_ ? external_.component(c) : nullptr;
+        const double* from = source.component(c);
+        double* to = target.component(c);
+        double* u = u_.component(c);
+        for (std::size_t p = begin; p < end; p += pack_width) {
+          const Pack total = e ? Pack::load(f + p) + Pack::load(e + p) : Pack::load(f + p);
+          const Pack m = masses ? Pack::load(masses + p) : Pack(uniform_);
+          const Pack v = Pack::load(from + p) + select(m > Pack(0.0), Pack(dt) * total / m, Pack(0.0));
+          v.store(to + p);
+          if (drift != 0) (Pack::load(u + p) + Pack(drift) * v).store(u + p);
+        }
+      }
+    });
+  }
+
+  /// Kick and drift; prescribed components move as prescribed.
+  void advance(double kick_dt, double dt, double t, double t_next) {
+    const auto dofs = problem_.constrained();
+    held_.resize(dofs.size());
+    before_.resize(dofs.size());
+    for (std::size_t k = 0; k < dofs.size(); ++k) {
+      held_[k] = u_.data[dofs[k]];
+      before_[k] = total_force(dofs[k]);
+    }
+    kick(v_, v_, kick_dt, dt);
+    if (dofs.empty()) return;
+    for (std::size_t k = 0; k < dofs.size(); ++k) u_.data[dofs[k]] = held_[k];
+    problem_.prescribe_half_step_velocity(t, t_next, v_);
+    for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
+  }
+
+  /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of the
+  /// prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
+  void add_work(double dt, ConstFieldView old_external) {
+    double work = 0;
+    if (loaded_) {
+      const std::size_t n = external_.size();
+      work = ordered_sum((n + block - 1) / block, [&](std::size_t b) {
+        double sum = 0;
+        for (std::size_t k = b * block; k < std::min(n, (b + 1) * block); ++k) {
+          const double f = old_external.data ? 0.5 * (external_.data[k] + old_external.data[k]) : external_.data[k];
+          sum += f * dt * v_.data[k];
+        }
+        return sum;
+      });
+    }
+    const auto dofs = problem_.constrained();
+    for (std::size_t k = 0; k < dofs.size(); ++k) {
+      const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
+      work += 0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]];
+      speed_[k] = now;
+    }
+    problem_.energies().external_work += work;
+  }
+
+  /// Velocities of the prescribed components at full step t.
+  void prescribed_speed(double t, FieldView scratch) {
+    if (!problem_.any_constraint()) return;
+    problem_.prescribe_velocity(t, scratch);
+    const auto dofs = problem_.constrained();
+    full_.resize(dofs.size());
+    for (std::size_t k = 0; k < dofs.size(); ++k) full_[k] = scratch.data[dofs[k]];
+  }
+  void start_speed() { speed_ = full_; }
+
+  FieldView half() const noexcept { return v_; }
+  FieldView external() const noexcept { return external_; }
+  bool loaded() const noexcept { return loaded_; }
+
+ private:
+  double total_force(std::int64_t dof) const noexcept { return force_.data[dof] + (loaded_ ? external_.data[dof] : 0.0); }
+
+  Problem& problem_;
+  FieldView u_, v_, force_;
+  const double* mass_;
+  double uniform_;
+  bool loaded_;
+  FieldView external_;
+  std::vector<double> held_, before_, speed_, full_;   ///< by constrained component
+};
+
+}  // namespace
+
+double Verlet::stable_step(Problem& problem) const {
+  if (options_.bond_based) return options_.safety * problem.bond_based_time_step();
+  const double eigenvalue = problem.largest_eigenvalue(problem.displacement());
+  return eigenvalue > 0 ? options_.safety * 2 / std::sqrt(eigenvalue) : options_.end_time;
+}
+
+std::string Verlet::plan(Problem& problem) {
+  const double dt = options_.time_step > 0 ? options_.time_step : stable_step(problem);
+  const double steps = std::max(1.0, std::ceil(options_.end_time / dt * (1 - 1e-12)));
+  return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
+                     options_.end_time / steps, options_.end_time, problem.bond_based_time_step());
+}
+
+void Verlet::run(Problem& problem, Observer& observer) {
+  // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
+  const std::span<double> plan = problem.declare_numbers("verlet_plan", 5);
+  double& first = plan[0];     // step at which the plan was made
+  double& start = plan[1];     // and its time
+  double& dt = plan[2];
+  double& last_dt = plan[3];
+  double& counter = plan[4];   // steps of the plan
+  const auto steps_to_end = [&](double step) { return std::max(1.0, std::ceil((options_.end_time - problem.time()) / step * (1 - 1e-12))); };
+  const bool estimated = options_.time_step <= 0;
+  const auto make_plan = [&](double step) {
+    first = static_cast<double>(problem.step());
+    start = problem.time();
+    counter = steps_to_end(step);
+    dt = (options_.end_time - start) / counter;
+  };
+  Stepper stepper(problem);
+  const FieldView v = problem.velocity();
+  Field speeds = problem.any_constraint() ? problem.make_field(problem.dimension()) : Field();
+  Field old_external = stepper.loaded() && problem.loads_depend_on_time() ? problem.make_field(problem.dimension()) : Field();
+  const auto report = [&] {
+    StepReport r;
+    r.step = problem.step();
+    r.time = problem.time();
+    r.time_step = dt;
+    r.end_time = options_.end_time;
+    r.steps_expected = static_cast<std::int64_t>(first + counter);
+    return r;
+  };
+  const bool fresh = dt == 0;
+  if (fresh) {
+    make_plan(estimated ? stable_step(problem) : options_.time_step);
+    observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
+    stepper.prescribed_speed(problem.time(), speeds);
+    if (problem.any_constraint()) problem.prescribe_velocity(problem.time(), v);
+    const bool sample = observer.wants_sample(0, problem.time());
+    stepper.evaluate(sample ? &problem.energies().strain : nullptr, dt);
+    std::copy_n(v.data, v.size(), stepper.half().data);
+    last_dt = 0;
+    observer.step_done(report());
+  } else {
+    stepper.prescribed_speed(problem.time(), speeds);
+  }
+  stepper.start_speed();
+  while (problem.step() < static_cast<std::int64_t>(first + counter) && !observer.cancelled()) {
+    const double t = problem.time();
+    // Half of the last step and half of the next: equal steps make it a whole one.
+    const auto next = static_cast<double>(problem.step() + 1);
+    const double t_next = next == first + counter ? options_.end_time : start + (next - first) * dt;
+    stepper.advance(0.5 * (last_dt + dt), dt, t, t_next);
+    problem.time() = t_next;
+    ++problem.step();
+    const bool sample = observer.wants_sample(problem.step(), t_next);
+    stepper.evaluate(sample ? &problem.energies().strain : nullptr, dt);
+    if (old_external.size() > 0) {
+      std::copy_n(stepper.external().data, old_external.size(), old_external.data());
+      problem.evaluate_loads(t_next, stepper.external());
+    }
+    stepper.prescribed_speed(t_next, speeds);
+    stepper.add_work(dt, old_external);
+    last_dt = dt;
+    if (sample) {
+      stepper.kick(stepper.half(), v, 0.5 * dt);
+      if (problem.any_constraint()) problem.prescribe_velocity(t_next, v);
+    }
+    problem.advance_history(dt);
+    const bool last = problem.step() == static_cast<std::int64_t>(first + counter);
+    if (estimated && !last && !problem.constant_stiffness() && problem.step() % options_.check_every == 0) {
+      const double stable = stable_step(problem);
+      if (stable < dt) {
+        make_plan(stable);
+        observer.log(fmt::format("verlet: step {}: the body became stiffer; {:.0f} more steps of {:.6g} s", problem.step(), counter, dt));
+      }
+    }
+    observer.step_done(report());
+  }
+}
+
+}  // namespace perikit

@@ -1,0 +1,28 @@
+#pragma once
+#include "perikit/sdk/plugin.hpp"
+
+namespace perikit {
+
+struct VerletOptions {
+  double end_time = 0;             ///< [s]
+  double time_step = 0;            ///< [s]; 0: estimated
+  double safety = 0.9;             ///< to the estimated stable step
+  bool bond_based = false;         ///< estimate by P 3.58 instead of the eigenvalue
+  std::int64_t check_every = 500;  ///< steps between estimates of a nonlinear body
+};
+
+/// Velocity Verlet [Partmann et al. 3.60-3.68] in its half-step form: v(t + dt/2) = v(t - dt/2) + dt a(t), u += dt v(t + dt/2).
+/// Velocities at full steps, v(t) = v(t - dt/2) + dt/2 a(t), are formed where a sample is taken.
+class Verlet final : public Integrator {
+ public:
+  explicit Verlet(const VerletOptions& options) : options_(options) {}
+  IntegratorTraits traits() const noexcept override { return {.dynamic = true, .quasi_static = false}; }
+  std::string plan(Problem& problem) override;
+  void run(Problem& problem, Observer& observer) override;
+
+ private:
+  double stable_step(Problem& problem) const;
+  VerletOptions options_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,75 @@
+#include <cmath>
+#include <memory>
+
+#include "perikit/core/simd_math.hpp"
+#include "perikit/sdk/plugin.hpp"
+
+using namespace perikit;
+
+namespace {
+
+/// Each bond's own family: bonds of like length and direction count most.
+class NonSpherical final : public Kinematics {
+ public:
+  NonSpherical(double n1, double n2, BondWeight weight) : n1_(n1), n2_(n2), weight_(weight) {}
+
+  KinematicsTraits traits() const noexcept override {
+    return {.at = EvaluationPoints::weighted, .weight = weight_, .parts = 0};
+  }
+
+  void weights(const FamilyView& family, int q, double* omega) const noexcept override {
+    if (n2_ == 0.0) return weights(family, q, omega, [](Pack) { return Pack(1.0); });
+    if (n2_ == 1.0) return weights(family, q, omega, [](Pack likeness) { return likeness; });
+    if (n2_ == 2.0) return weights(family, q, omega, [](Pack likeness) { return likeness * likeness; });
+    // x^n = exp(n log x); log 0 = -infinity gives 0
+    weights(family, q, omega, [n = Pack(n2_)](Pack likeness) { return exp(n * log(likeness)); });
+  }
+
+ private:
+  /// omega_k = exp(-n1 | |xi_k| - |xi_q| | / delta) power((1 + cos(xi_k, xi_q)) / 2), 0 for broken bonds and in the padding
+  template <class Power>
+  void weights(const FamilyView& family, int q, double* omega, const Power& power) const noexcept {
+    const Pack length_q(family.length[q]), steepness(-n1_ / family.horizon);
+    Pack half_direction[3];
+    for (int e = 0; e < family.dimension; ++e) half_direction[e] = Pack(0.5 * family.xi[e][q] / family.length[q]);
+    for (int k = 0; k < family.bonds; k += pack_width) {
+      const Pack length = Pack::load(family.length + k);
+      Pack half_projection(0.0);
+      for (int e = 0; e < family.dimension; ++e) half_projection += half_direction[e] * Pack::load(family.xi[e] + k);
+      // rounding may leave opposite bonds slightly below 0
+      const Pack likeness = max(0.5 + half_projection / length, Pack(0.0));
+      const Pack value = exp(steepness * abs(length - length_q)) * power(likeness);
+      select(Pack::load(family.omega + k) == Pack(0.0), Pack(0.0), value).store(omega + k);
+    }
+  }
+
+  double n1_, n2_;
+  BondWeight weight_;
+};
+
+PartDescription description() {
+  PartDescription part{.name = "non_spherical",
+                       .summary = "a family of its own for every bond, in which bonds of like length and direction count most",
+                       .parameters = {},
+                       .examples = {"", "n1 = 0.0\nn2 = 2.0"},
+                       .equations = "F_q = (sum_k omega_q(k) V_k y_k (x) xi_k) (sum_k omega_q(k) V_k xi_k (x) xi_k)^-1\n"
+                                    "omega_q(k) = exp(-n1 | |xi_k| - |xi_q| | / delta) (1/2 + 1/2 cos(angle))^n2\n"
+                                    "W_q = V_i V_j / sum_j V_j  (weight = \"volume\"),  V_i omega V_j / sum_j omega V_j  (\"kernel\")",
+                       .source = "Chen, Hu and Chan, Comput. Methods Appl. Mech. Eng. 429 (2024) 117137; "
+                                 "Hu et al., A unified framework of bond-associated correspondence models, eqs. 18-19",
+                       .limits = "the influence function of [family] only says which bonds are alive (and weighs them with \"kernel\"); "
+                                 "work grows with the square of the family; n1 = n2 = 0 has the zero-energy modes of `conventional`"};
+  part.parameters.number("n1", "-", "how fast the influence falls with the difference in bond length").by_default("1.0").at_least(0.0);
+  part.parameters.number("n2", "-", "how fast the influence falls with the angle between bonds").by_default("1.0").at_least(0.0);
+  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  return part;
+}
+
+}  // namespace
+
+PERIKIT_PLUGIN(registrar) {
+  registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
+    return std::make_unique<NonSpherical>(values.number("n1"), values.number("n2"),
+                                          values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+  });
+}

@@ -1,0 +1,90 @@
+#include "tests/contract/fixture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace perikit::contract {
+
+Subject& subject() {
+  static Subject instance;
+  return instance;
+}
+
+std::vector<Example> examples(Kind kind) {
+  std::vector<Example> all;
+  for (const auto& [k, part] : subject().parts) {
+    if (k != kind) continue;
+    for (const std::string& table : subject().registry.describe(kind, part).examples) all.push_back({part, table});
+  }
+  return all;
+}
+
+std::string kinematics_table(const Example& example) { return fmt::format("type = \"{}\"\n{}", example.part, example.table); }
+
+std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
+  const int d = o.dimension;
+  const int n = o.cells > 0 ? o.cells : d == 3 ? 9 : d == 2 ? 13 : 40;
+  // Unequal sides: the axes must not be interchangeable, and the longest one is not a multiple of a SIMD pack.
+  const std::array<int, 3> cells{n - 2 > 1 && d > 1 ? n - 2 : n, d > 1 ? n : 1, d > 2 ? std::max(2, n - 4) : 1};
+  const auto vector = [&](auto&& value) {
+    std::string text = "[";
+    for (int a = 0; a < d; ++a) text += fmt::format("{}{:.17g}", a > 0 ? ", " : "", static_cast<double>(value(a)));
+    return text + "]";
+  };
+  std::string text = "format = 1\n[body]\n";
+  text += fmt::format("dimension = {}\n", d);
+  if (d == 2) text += fmt::format("plane = \"{}\"\nthickness = {:.17g}\n", o.plane, 1.5 * o.scale);
+  if (d == 1) text += fmt::format("line = \"{}\"\narea = {:.17g}\n", o.plane == "stress" ? "stress" : "strain", 1.5 * o.scale * o.scale);
+  text += fmt::format("[body.lattice]\nspacing = {:.17g}\nlower = {}\nupper = {}\n", o.scale, vector([](int) { return 0.0; }),
+                      vector([&](int a) { return o.scale * cells[static_cast<std::size_t>(a)]; }));
+  if (o.cloud) text += "jitter = 0.25\nseed = 7\n";
+  text += fmt::format("[sets]\npart = \"x < {:.17g}\"\n", 0.4 * o.scale * cells[0]);
+  text += fmt::format("[family]\nhorizon_ratio = {}\ninfluence = {}\n", o.horizon_ratio,
+                      o.influence.find('=') == std::string::npos ? "\"" + o.influence + "\"" : "{ " + o.influence + " }");
+  text += "[kinematics]\n" + kinematics + "\n[material]\n" + o.material + "\n";
+  if (o.two_materials) {
+    text += fmt::format("[[region]]\nset = \"part\"\nmaterial = {{ type = \"neo_hookean\", density = 2.0, shear_modulus = {:.17g}, bulk_modulus = {:.17g} }}\n",
+                        0.4 * o.modulus, 1.3 * o.modulus);
+  }
+  if (o.crack && d == 2) {
+    text += fmt::format("[[crack]]\nsegment = [[-1.0, {0:.17g}], [{1:.17g}, {0:.17g}]]\n", 0.5013 * o.scale * cells[1], 0.55 * o.scale * cells[0]);
+  }
+  if (o.crack && d == 3) {
+    const double z = 0.5013 * o.scale * cells[2], x = 0.45 * o.scale * cells[0], y = o.scale * (cells[1] + 1);
+    text += fmt::format("[[crack]]\npolygon = [[-1.0, -1.0, {0:.17g}], [{1:.17g}, -1.0, {0:.17g}], [{1:.17g}, {2:.17g}, {0:.17g}], [-1.0, {2:.17g}, {0:.17g}]]\n", z, x, y);
+  }
+  text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\n", o.skip);
+  return text;
+}
+
+std::unique_ptr<Simulation> build(const std::string& text) {
+  return std::make_unique<Simulation>(parse_scene(text, "contract.toml", subject().registry), subject().registry);
+}
+
+void set_field(const Body& body, FieldView field, const std::function<Point(const Point&)>& value) {
+  for (const std::int32_t p : body.internal()) {
+    const Point v = value(body.position(static_cast<std::size_t>(p)));
+    for (int c = 0; c < field.components; ++c) field.component(c)[p] = v[static_cast<std::size_t>(c)];
+  }
+}
+
+double dot(const Body& body, ConstFieldView a, ConstFieldView b) {
+  double sum = 0;
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < a.components; ++c) sum += a.component(c)[p] * b.component(c)[p];
+  return sum;
+}
+
+double largest(const Body& body, ConstFieldView a) {
+  double most = 0;
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < a.components; ++c) {
+      const double value = std::abs(a.component(c)[p]);
+      most = std::isnan(value) ? INFINITY : std::max(most, value);
+    }
+  return most;
+}
+
+}  // namespace perikit::contract

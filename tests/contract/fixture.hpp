@@ -1,0 +1,70 @@
+#pragma once
+/// Bodies, scenes and random fields that the contract suites share.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "perikit/plugin/registry.hpp"
+#include "perikit/run/simulation.hpp"
+
+namespace perikit::contract {
+
+/// The registry of the suite, and the parts to test (all known ones, or those of the command line).
+struct Subject {
+  Registry registry;
+  std::vector<std::pair<Kind, std::string>> parts;
+};
+Subject& subject();
+
+/// Every part to test of one kind with each of its example tables (at least one run a part).
+struct Example {
+  std::string part;
+  std::string table;   ///< TOML keys without `type`
+};
+std::vector<Example> examples(Kind kind);
+
+/// What a test body looks like. Spacing is 1 unless scaled.
+struct BodyOptions {
+  int dimension = 3;
+  bool cloud = false;         ///< jittered
+  bool crack = false;         ///< about a tenth of the bonds cut
+  bool two_materials = false;
+  std::string influence = "gaussian";
+  std::string material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
+  double scale = 1.0;         ///< of all lengths
+  double modulus = 1.0;       ///< of all moduli
+  int cells = 0;              ///< along the longest axis; 0: small
+  bool skip = true;
+  double horizon_ratio = 2.515;
+  std::string plane = "strain";
+  std::string integrator = "type = \"evaluate\"";
+};
+
+/// Scene text for a kinematics (its table, `type` included).
+std::string scene_text(const BodyOptions& options, const std::string& kinematics);
+std::unique_ptr<Simulation> build(const std::string& text);
+std::string kinematics_table(const Example& example);
+
+/// Uniform in [-1, 1).
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double operator()() { return static_cast<double>(engine_() >> 11) * 0x1.0p-52 - 1.0; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// field(x) at every live point; other entries untouched.
+void set_field(const Body& body, FieldView field, const std::function<Point(const Point&)>& value);
+/// Sum over live points and components of a b.
+double dot(const Body& body, ConstFieldView a, ConstFieldView b);
+/// Largest |component| over live points.
+double largest(const Body& body, ConstFieldView a);
+
+}  // namespace perikit::contract

@@ -1,0 +1,324 @@
+/// What every kinematics must fulfil, with every material space, on lattices and clouds, intact and cracked: the engine's operator
+/// is exact for affine motion, its forces are the derivative of its energy, its tangent the derivative of its forces.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "perikit/core/parallel.hpp"
+#include "tests/contract/fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+struct Case {
+  Example example;
+  BodyOptions body;
+  std::string label() const {
+    return fmt::format("{} ({}) {}D {}{}{}{}", example.part, example.table, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
+                       body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
+  }
+};
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const Example& example : examples(Kind::kinematics)) {
+    for (int d = 1; d <= 3; ++d) {
+      for (const bool cloud : {false, true}) {
+        BodyOptions body;
+        body.dimension = d;
+        body.cloud = cloud;
+        all.push_back({example, body});
+        if (d > 1) {
+          body.crack = true;
+          body.two_materials = true;
+          all.push_back({example, body});
+        }
+        if (d == 2 && !cloud) {
+          body.crack = body.two_materials = false;
+          body.plane = "stress";
+          all.push_back({example, body});
+        }
+      }
+    }
+  }
+  return all;
+}
+
+/// A smooth, finite deformation with noise on top, admissible everywhere.
+void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
+  Random random(seed);
+  std::array<std::array<double, 3>, 3> G{};
+  for (auto& row : G)
+    for (double& g : row) g = 0.08 * random();
+  const double s = body.spacing();
+  set_field(body, u, [&](const Point& x) {
+    Point v{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < static_cast<std::size_t>(body.dimension()); ++b) v[a] += G[a][b] * x[b];
+      v[a] += noise * s * random();
+    }
+    return v;
+  });
+}
+
+/// Poisoned output: whatever a kernel forgets to write shows.
+Field poisoned(const BodyProblem& problem) {
+  Field f = problem.make_field(problem.dimension());
+  f.fill(std::numeric_limits<double>::quiet_NaN());
+  return f;
+}
+
+double energy_of(BodyProblem& problem, ConstFieldView u) {
+  Field f = poisoned(problem);
+  double energy = 0;
+  REQUIRE(problem.evaluate_forces(u, f, &energy).ok());
+  return energy;
+}
+
+Field force_of(BodyProblem& problem, ConstFieldView u) {
+  Field f = poisoned(problem);
+  const EvaluationStatus status = problem.evaluate_forces(u, f, nullptr);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return f;
+}
+
+Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
+  Field v = problem.make_field(u.components);
+  for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
+  return v;
+}
+
+Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
+  Field w = problem.make_field(problem.dimension());
+  Random random(seed);
+  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
+  return w;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    deform(body, problem.displacement(), 11, 0.02);
+    const ConstFieldView u = problem.displacement();
+    const Field w = random_direction(problem, 12), v = random_direction(problem, 13);
+    const Field f = force_of(problem, u);
+    const double scale = largest(body, f) * static_cast<double>(body.points());
+    // Differences of fourth order: their error is far below the tolerance, their rounding error about 1e-12 of the energy.
+    const double h = 2e-3 * body.spacing();
+    const auto difference = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
+    const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
+    CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
+    Field Kw = poisoned(problem), Kv = poisoned(problem);
+    REQUIRE(problem.tangent_action(u, w, Kw).ok());
+    REQUIRE(problem.tangent_action(u, v, Kv).ok());
+    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
+    const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
+    CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
+    CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
+  }
+}
+
+TEST_CASE("kinematics: linear and angular momentum") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    deform(body, problem.displacement(), 21, 0.02);
+    const Field f = force_of(problem, problem.displacement());
+    const double scale = largest(body, f);
+    Point total{}, moment{};
+    double extent = 0;
+    for (const std::int32_t p : body.internal()) {
+      Point y = body.position(static_cast<std::size_t>(p)), force{};
+      for (int a = 0; a < body.dimension(); ++a) {
+        y[static_cast<std::size_t>(a)] += problem.displacement().component(a)[p];
+        force[static_cast<std::size_t>(a)] = f.component(a)[p];
+        total[static_cast<std::size_t>(a)] += force[static_cast<std::size_t>(a)];
+        extent = std::max(extent, std::abs(y[static_cast<std::size_t>(a)]));
+      }
+      moment[0] += y[1] * force[2] - y[2] * force[1];
+      moment[1] += y[2] * force[0] - y[0] * force[2];
+      moment[2] += y[0] * force[1] - y[1] * force[0];
+    }
+    for (std::size_t a = 0; a < 3; ++a) {
+      CHECK_MESSAGE(std::abs(total[a]) <= 1e-11 * scale, "forces do not sum to zero: ", total[a], " of ", scale);
+      CHECK_MESSAGE(std::abs(moment[a]) <= 1e-11 * scale * extent, "moments do not sum to zero: ", moment[a], " of ", scale * extent);
+    }
+  }
+}
+
+TEST_CASE("kinematics: affine motion is exact") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    const double G[3][3] = {{0.1, -0.07, 0.05}, {0.03, -0.06, 0.02}, {-0.04, 0.08, 0.09}};
+    const auto d = static_cast<std::size_t>(body.dimension());
+    set_field(body, problem.displacement(), [&](const Point& x) {
+      Point v{0.3, -0.2, 0.1};
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t b = 0; b < d; ++b) v[a] += G[a][b] * x[b];
+      return v;
+    });
+    PointSamples samples;
+    REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+    const Field condition = problem.model().shape_tensor_condition();
+    double worst = 0, densities = 0, energy = energy_of(problem, problem.displacement());
+    for (const std::int32_t p : body.internal()) {
+      densities += samples.strain_energy_density.data()[p] * body.volume(static_cast<std::size_t>(p));
+      if (!std::isfinite(condition.data()[p]) || condition.data()[p] > 1e4) continue;
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t b = 0; b < d; ++b) {
+          const double value = samples.H.component(static_cast<int>(a * d + b))[p];
+          worst = std::max(worst, std::abs(value - G[a][b]) / std::max(1.0, condition.data()[p]));
+        }
+    }
+    CHECK_MESSAGE(worst <= 1e-12, "displacement gradient of an affine motion is off by ", worst);
+    CHECK_MESSAGE(std::abs(densities - energy) <= 1e-12 * energy, "point energies do not sum to the total: ", densities, " against ", energy);
+    if (!c.body.crack && !c.body.two_materials && c.body.plane == "strain") {
+      // The weights of an intact body sum to its volume: a homogeneous state stores exactly V psi(F).
+      const double per_volume = energy / (body.volume(static_cast<std::size_t>(body.internal()[0])) * static_cast<double>(body.points()));
+      const double expected = samples.strain_energy_density.data()[body.internal()[body.points() / 2]];
+      CHECK_MESSAGE(std::abs(per_volume - expected) <= 1e-11 * expected, "a homogeneous state does not store V psi(F)");
+    }
+  }
+}
+
+TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores the same and its forces rotate") {
+  for (const Case& c : cases()) {
+    if (c.body.dimension == 1) continue;
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    if (!problem.laws().objective()) continue;
+    const Body& body = problem.body();
+    // Rotation about (1, 2, 3)/sqrt(14) in 3D, about z in 2D.
+    double R[3][3];
+    const double angle = 1.1, co = std::cos(angle), si = std::sin(angle);
+    const double axis[3] = {c.body.dimension == 3 ? 1 / std::sqrt(14.0) : 0.0, c.body.dimension == 3 ? 2 / std::sqrt(14.0) : 0.0, c.body.dimension == 3 ? 3 / std::sqrt(14.0) : 1.0};
+    const double cross[3][3] = {{0, -axis[2], axis[1]}, {axis[2], 0, -axis[0]}, {-axis[1], axis[0], 0}};
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) R[a][b] = (a == b ? co : 0.0) + (1 - co) * axis[a] * axis[b] + si * cross[a][b];
+    deform(body, problem.displacement(), 31, 0.02);
+    const FieldView u = problem.displacement();
+    const double energy = energy_of(problem, u);
+    const Field f = force_of(problem, u);
+    Field rotated = problem.make_field(u.components), turned = problem.make_field(u.components);
+    for (const std::int32_t p : body.internal()) {
+      const Point x = body.position(static_cast<std::size_t>(p));
+      for (int a = 0; a < u.components; ++a) {
+        double y = 0, rigid = 0;
+        for (int b = 0; b < u.components; ++b) {
+          y += R[a][b] * (x[static_cast<std::size_t>(b)] + u.component(b)[p]);
+          rigid += R[a][b] * x[static_cast<std::size_t>(b)];
+        }
+        rotated.component(a)[p] = y - x[static_cast<std::size_t>(a)];
+        turned.component(a)[p] = rigid - x[static_cast<std::size_t>(a)];
+      }
+    }
+    CHECK_MESSAGE(std::abs(energy_of(problem, rotated) - energy) <= 1e-11 * energy, "energy changes under rotation");
+    const Field g = force_of(problem, rotated);
+    double worst = 0;
+    for (const std::int32_t p : body.internal())
+      for (int a = 0; a < u.components; ++a) {
+        double expected = 0;
+        for (int b = 0; b < u.components; ++b) expected += R[a][b] * f.component(b)[p];
+        worst = std::max(worst, std::abs(g.component(a)[p] - expected));
+      }
+    CHECK_MESSAGE(worst <= 1e-11 * largest(body, f), "forces do not rotate: ", worst, " of ", largest(body, f));
+    CHECK_MESSAGE(energy_of(problem, turned) <= 1e-20 * energy + 1e-24, "a rigid rotation stores energy");
+    CHECK_MESSAGE(largest(body, force_of(problem, turned)) <= 1e-11 * largest(body, f), "a rigid rotation has forces");
+  }
+}
+
+TEST_CASE("kinematics: a body at rest is bitwise at rest") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    CHECK(energy_of(problem, problem.displacement()) == 0.0);
+    CHECK(largest(problem.body(), force_of(problem, problem.displacement())) == 0.0);
+  }
+}
+
+TEST_CASE("kinematics: neither units nor a factor of the influence function matter") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    BodyOptions other = c.body;
+    other.scale = 1e-3;   // m -> km, say
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    const auto scaled = build(scene_text(other, kinematics_table(c.example)));
+    BodyOptions factor = c.body;
+    BodyOptions plain = c.body;
+    plain.influence = "type = \"expression\", formula = \"exp(-r^2)\"";
+    factor.influence = "type = \"expression\", formula = \"37.5 * exp(-r^2)\"";
+    const auto with_factor = build(scene_text(factor, kinematics_table(c.example)));
+    deform(simulation->problem().body(), simulation->problem().displacement(), 41, 0.02);
+    const auto copy = [&](Simulation& to, double scale) {
+      for (std::size_t k = 0; k < simulation->problem().displacement().size(); ++k) {
+        to.problem().displacement().data[k] = scale * simulation->problem().displacement().data[k];
+      }
+    };
+    copy(*scaled, other.scale);
+    copy(*with_factor, 1.0);
+    const Body& body = simulation->problem().body();
+    const Field f = force_of(simulation->problem(), simulation->problem().displacement());
+    const Field g = force_of(scaled->problem(), scaled->problem().displacement());
+    const Field h = force_of(with_factor->problem(), with_factor->problem().displacement());
+    double units = 0, factors = 0;
+    const double area = other.scale * other.scale;
+    for (const std::int32_t p : body.internal())
+      for (int a = 0; a < f.components(); ++a) {
+        units = std::max(units, std::abs(g.component(a)[p] / area - f.component(a)[p]));
+        factors = std::max(factors, std::abs(h.component(a)[p] - f.component(a)[p]));
+      }
+    CHECK_MESSAGE(units <= 1e-10 * largest(body, f), "forces depend on the unit of length: ", units / largest(body, f));
+    CHECK_MESSAGE(factors <= 1e-10 * largest(body, f), "forces depend on a factor of omega: ", factors / largest(body, f));
+  }
+}
+
+TEST_CASE("kinematics: bitwise the same for one and two threads, and to rounding without savings") {
+  for (const Case& c : cases()) {
+    if (c.body.dimension == 1 && c.body.cloud) continue;
+    INFO(c.label());
+    BodyOptions body = c.body;
+    if (body.dimension == 1) body.cells = 5000;
+    if (body.dimension == 2) body.cells = 60;
+    if (body.dimension == 3) body.cells = c.body.cloud ? 12 : 16;
+    const auto simulation = build(scene_text(body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    deform(problem.body(), problem.displacement(), 51, 0.02);
+    const int threads = thread_count();
+    set_thread_count(1);
+    const Field one = force_of(problem, problem.displacement());
+    const double energy = energy_of(problem, problem.displacement());
+    set_thread_count(2);
+    const Field two = force_of(problem, problem.displacement());
+    const double again = energy_of(problem, problem.displacement());
+    set_thread_count(threads);
+    bool same = energy == again;
+    for (const std::int32_t p : problem.body().internal())
+      for (int a = 0; a < one.components(); ++a) same = same && one.component(a)[p] == two.component(a)[p];
+    CHECK_MESSAGE(same, "the result depends on the number of threads");
+    body.skip = false;
+    const auto plain = build(scene_text(body, kinematics_table(c.example)));
+    std::copy_n(problem.displacement().data, problem.displacement().size(), plain->problem().displacement().data);
+    const Field full = force_of(plain->problem(), plain->problem().displacement());
+    double worst = 0;
+    for (const std::int32_t p : problem.body().internal())
+      for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(one.component(a)[p] - full.component(a)[p]));
+    CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
+  }
+}
