@@ -1,0 +1,3 @@
+#include "perikit/plugin/abi.hpp"
+
+PERIKIT_PLUGIN(registrar) { (void)registrar; }

@@ -1,0 +1,6 @@
+#include "perikit/plugin/abi.hpp"
+
+PERIKIT_PLUGIN(registrar) {
+  (void)registrar;
+  throw 42;
+}
