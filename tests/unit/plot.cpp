@@ -81,6 +81,14 @@ Sample plate(double jitter) {
   return sample;
 }
 
+Sample strip() {
+  Sample sample;
+  for (int j = 0; j < 12; ++j) {
+    for (int i = 0; i < 120; ++i) sample.add(1e-3 * i, 1e-3 * j, 0, {1.1e-3 * i, 1e-3 * j, 0}, 0);
+  }
+  return sample;
+}
+
 Sample string() {
   Sample sample;
   for (int i = 0; i < 200; ++i) sample.add(i, 0, 0, {i + std::sin(0.1 * i), 0, 0}, 0);
@@ -127,6 +135,7 @@ TEST_CASE("bodies of every dimension become pictures") {
   draw(bar(100), "bent bar", options);
   draw(plate(0), "torn plate", options);
   draw(string(), "string", {});
+  draw(strip(), "wide strip", {});
   options.field = "cauchy";
   options.component = "xx";
   options.deformed = 0;
@@ -198,7 +207,8 @@ TEST_CASE("what cannot be drawn is refused with the names that can") {
     change(options);
     CHECK_THROWS_WITH_AS(plot(options), doctest::Contains(message), InputError);
   };
-  refused([](PlotOptions& o) { o.field = "displacment"; }, "cauchy, damage, displacement, volume, material_id, id; did you mean 'displacement'?");
+  refused([](PlotOptions& o) { o.field = "displacment"; },
+          "cauchy, damage, displacement, volume, material_id, id; did you mean 'displacement'?");
   refused([](PlotOptions& o) { o.component = "w"; }, "found 'w'; 'displacement' has x, y, z, magnitude");
   refused([](PlotOptions& o) { o.field = "damage", o.component = "x"; }, "'damage' is a scalar");
   refused([](PlotOptions& o) { o.frame = 7; }, "frame: found 7; must be one of 0 ... 1");

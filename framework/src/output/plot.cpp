@@ -24,7 +24,9 @@ namespace {
 
 constexpr std::string_view history_prefix = "history:";
 
-std::string labelled(const std::string& label, const std::string& unit) { return unit.empty() ? label : fmt::format("{} [{}]", label, unit); }
+std::string labelled(const std::string& label, const std::string& unit) {
+  return unit.empty() ? label : fmt::format("{} [{}]", label, unit);
+}
 
 /// Smallest and largest value that is a number, a little apart where they are equal.
 std::array<double, 2> range_of(std::span<const double> values) {
@@ -35,7 +37,8 @@ std::array<double, 2> range_of(std::span<const double> values) {
     upper = std::max(upper, value);
   }
   if (lower > upper) return {0, 1};
-  if (lower == upper) return lower == 0 ? std::array{0.0, 1.0} : std::array{lower - 0.01 * std::abs(lower), upper + 0.01 * std::abs(upper)};
+  if (lower == upper)
+    return lower == 0 ? std::array{0.0, 1.0} : std::array{lower - 0.01 * std::abs(lower), upper + 0.01 * std::abs(upper)};
   return {lower, upper};
 }
 
@@ -49,7 +52,8 @@ int dimension_of(std::span<const double> position) {
 }
 
 /// /frames/<frame>/<field>, else /reference/<field>. Throws InputError naming the fields that are there.
-hdf5::Source::Array read_field(const ResultFile& results, const std::string& group, const std::string& field, std::size_t points) {
+hdf5::Source::Array read_field(const ResultFile& results, const std::string& group, const std::string& field,
+                               std::size_t points) {
   const hdf5::Source& source = results.source();
   std::vector<std::string> known = source.names(group, true);
   for (const char* name : {"volume", "material_id", "id"}) known.emplace_back(name);
@@ -60,7 +64,8 @@ hdf5::Source::Array read_field(const ResultFile& results, const std::string& gro
   const std::string path = source.contains(group + "/" + field) ? group + "/" + field : "/reference/" + field;
   hdf5::Source::Array array = source.read(path);
   if (array.rows() != points) {
-    throw InputError({results.path().string(), 0, 0}, path, fmt::format("found {} points; the body has {}", array.rows(), points));
+    throw InputError({results.path().string(), 0, 0}, path,
+                     fmt::format("found {} points; the body has {}", array.rows(), points));
   }
   return array;
 }
@@ -93,8 +98,9 @@ void plot_history(const PlotOptions& options, const std::string& name, const fs:
   const History history = read_history(file);
   const auto found = std::find(history.columns.begin(), history.columns.end(), name);
   if (found == history.columns.end()) {
-    throw InputError({file.string(), 0, 0}, "field", fmt::format("found 'history:{}'; the columns are {}{}", name,
-                                                                 fmt::join(history.columns, ", "), did_you_mean(name, history.columns)));
+    throw InputError({file.string(), 0, 0}, "field",
+                     fmt::format("found 'history:{}'; the columns are {}{}", name, fmt::join(history.columns, ", "),
+                                 did_you_mean(name, history.columns)));
   }
   if (history.values[0].empty()) throw InputError({file.string(), 0, 0}, "", "holds no rows yet");
   const auto time = std::find(history.columns.begin(), history.columns.end(), "time");
@@ -113,7 +119,8 @@ void plot_history(const PlotOptions& options, const std::string& name, const fs:
 std::string line_script(const PlotOptions& options, const BodyPicture& body) {
   std::vector<std::size_t> order(body.values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return body.reference[3 * a] < body.reference[3 * b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return body.reference[3 * a] < body.reference[3 * b]; });
   std::vector<double> x, y;
   for (const std::size_t p : order) {
     x.push_back(body.drawn[3 * p]);
@@ -125,12 +132,14 @@ std::string line_script(const PlotOptions& options, const BodyPicture& body) {
 }
 
 void check_options(const PlotOptions& options) {
-  if (!std::isfinite(options.deformed)) throw InputError({}, "deformed", fmt::format("found {}; must be finite", options.deformed));
+  if (!std::isfinite(options.deformed))
+    throw InputError({}, "deformed", fmt::format("found {}; must be finite", options.deformed));
   double length = 0;
   for (const double component : options.view) length += component * component;
   if (!(length > 0) || !std::isfinite(length)) throw InputError({}, "view", "must be a direction, not zero or infinite");
   if (options.range && !((*options.range)[0] < (*options.range)[1])) {
-    throw InputError({}, "range", fmt::format("found {} ... {}; the first must be smaller", (*options.range)[0], (*options.range)[1]));
+    throw InputError({}, "range",
+                     fmt::format("found {} ... {}; the first must be smaller", (*options.range)[0], (*options.range)[1]));
   }
 }
 
@@ -170,7 +179,7 @@ fs::path plot(const PlotOptions& options) {
   const fs::path folder = results_folder(options.results);
   if (options.field.starts_with(history_prefix)) {
     const std::string name = options.field.substr(history_prefix.size());
-    const fs::path picture = options.output.empty() ? folder / ("history_" + name + ".png") : options.output;
+    const fs::path picture = options.output.empty() ? folder / fmt::format("history_{}.png", name) : options.output;
     plot_history(options, name, picture);
     return picture;
   }

@@ -10,13 +10,13 @@
 namespace perikit {
 
 struct BodyPicture {
-  int dimension = 3;                       ///< 2 or 3
-  std::span<const double> reference;       ///< positions, rows of 3
-  std::span<const double> drawn;           ///< positions as drawn, rows of 3
-  std::span<const double> volume;          ///< per point
-  std::span<const double> values;          ///< per point
-  std::array<double, 2> range{};           ///< of the colours
-  std::array<double, 3> view{};            ///< 3D: towards the eye
+  int dimension = 3;                  ///< 2 or 3
+  std::span<const double> reference;  ///< positions, rows of 3
+  std::span<const double> drawn;      ///< positions as drawn, rows of 3
+  std::span<const double> volume;     ///< per point
+  std::span<const double> values;     ///< per point
+  std::array<double, 2> range{};      ///< of the colours
+  std::array<double, 3> view{};       ///< 3D: towards the eye
   std::string title, value_label, length_unit;
   std::filesystem::path file;
 };
@@ -25,7 +25,7 @@ std::string body_script(const BodyPicture& picture);
 struct CurvePicture {
   std::span<const double> x, y;
   std::string title, x_label, y_label;
-  std::string y_range;                     ///< gnuplot's "[a:b]", or "[*:*]"
+  std::string y_range;  ///< gnuplot's "[a:b]", or "[*:*]"
   std::filesystem::path file;
 };
 std::string curve_script(const CurvePicture& picture);

@@ -57,7 +57,8 @@ FieldValues field_values(const std::string& field, int width, std::span<const do
   FieldValues result;
   result.label = field;
   std::replace(result.label.begin(), result.label.end(), '_', ' ');
-  const auto known = std::find_if(std::begin(known_fields), std::end(known_fields), [&](const auto& k) { return field == k.name; });
+  const auto known =
+      std::find_if(std::begin(known_fields), std::end(known_fields), [&](const auto& k) { return field == k.name; });
   if (known != std::end(known_fields)) {
     result.label = known->label;
     result.unit = known->unit;
@@ -73,7 +74,8 @@ FieldValues field_values(const std::string& field, int width, std::span<const do
   const std::string name = !component.empty() ? component : stress ? "von_mises" : "magnitude";
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw InputError({}, "component", fmt::format("found '{}'; '{}' has {}{}", name, field, fmt::join(names, ", "), did_you_mean(name, names)));
+    throw InputError({}, "component",
+                     fmt::format("found '{}'; '{}' has {}{}", name, field, fmt::join(names, ", "), did_you_mean(name, names)));
   }
   const auto index = static_cast<std::size_t>(found - names.begin());
   for (std::size_t p = 0; p + static_cast<std::size_t>(width) <= data.size(); p += static_cast<std::size_t>(width)) {

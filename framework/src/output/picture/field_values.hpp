@@ -13,7 +13,8 @@ struct FieldValues {
   std::string unit;            ///< SI unit of known fields, else empty
 };
 
-/// `data`: rows of `width` (1, 3 or 9). An empty component means the usual one (PlotOptions). Throws InputError naming the components.
+/// `data`: rows of `width` (1, 3 or 9). An empty component means the usual one (PlotOptions). Throws InputError naming the
+/// components.
 FieldValues field_values(const std::string& field, int width, std::span<const double> data, const std::string& component);
 
 }  // namespace perikit

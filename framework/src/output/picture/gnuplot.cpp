@@ -31,7 +31,8 @@ TemporaryFile temporary_file() {
 std::string contents(std::FILE* file) {
   std::string text;
   std::vector<char> buffer(1 << 16);
-  for (std::rewind(file); const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), file);) text.append(buffer.data(), count);
+  for (std::rewind(file); const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), file);)
+    text.append(buffer.data(), count);
   return text;
 }
 
@@ -69,8 +70,10 @@ std::string gnuplot_terminal(const std::filesystem::path& picture, int width, in
   const std::string size = fmt::format("size {},{}", width, height);
   std::string terminal;
   if (extension == ".png") {
-    terminal = fmt::format("if (strstrt(GPVAL_TERMINALS, 'pngcairo') > 0) {{ set terminal pngcairo noenhanced {0} {1} }} "
-                           "else {{ set terminal png noenhanced {0} {1} }}", size, font);
+    terminal = fmt::format(
+        "if (strstrt(GPVAL_TERMINALS, 'pngcairo') > 0) {{ set terminal pngcairo noenhanced {0} {1} }} "
+        "else {{ set terminal png noenhanced {0} {1} }}",
+        size, font);
   } else if (extension == ".svg") {
     terminal = fmt::format("set terminal svg noenhanced {} {} background 'white'", size, font);
   } else if (extension == ".pdf") {

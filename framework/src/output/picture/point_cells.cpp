@@ -15,7 +15,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-Vector3d point(std::span<const double> rows, std::size_t p) { return Eigen::Map<const Vector3d>(&rows[3 * p]); }
+Vector3d point(std::span<const double> rows, std::size_t p) {
+  return Eigen::Map<const Vector3d>(&rows[3 * p]);
+}
 
 /// Mean distance to the `dimension` nearest neighbours (even the corner of a lattice has as many at one spacing), for a sample of
 /// points, sorted.
@@ -106,8 +108,8 @@ PointCells make_point_cells(int dimension, std::span<const double> reference, st
   constexpr double torn = 4;  // neighbours that far apart no longer belong together
   const NeighbourSearch search(reference, (result.regular ? 1.6 : 2.2) * result.spacing);
   for (std::size_t p = 0; p < points; ++p) {
-    // Least squares for the local deformation; the weights fade for neighbours across a crack. The small multiple of the identity keeps
-    // directions without neighbours as they are.
+    // Least squares for the local deformation; the weights fade for neighbours across a crack. The small multiple of the identity
+    // keeps directions without neighbours as they are.
     const double keep = 1e-6 * result.spacing * result.spacing;
     Matrix3d shape = keep * Matrix3d::Identity(), moved = shape;
     Vector3d outwards = Vector3d::Zero();

@@ -13,11 +13,16 @@ using Colour = Eigen::Vector3f;  ///< red, green, blue in 0 ... 1
 class Raster {
  public:
   Raster(int width, int height)
-      : width_(width), height_(height), depth_(size(), -std::numeric_limits<float>::infinity()), colour_(size(), Colour::Zero()) {}
+      : width_(width),
+        height_(height),
+        depth_(size(), -std::numeric_limits<float>::infinity()),
+        colour_(size(), Colour::Zero()) {}
 
-  /// centre, a, b: x, y in pixels from the lower left corner, z towards the eye; the corners are centre +- a +- b. Where pieces overlap,
-  /// the one nearer to the eye wins. `dome` > 0 lowers the edges of the piece by that much, so that among equals the nearest centre wins.
-  void fill(const Eigen::Vector3d& centre, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Colour& colour, double dome = 0);
+  /// centre, a, b: x, y in pixels from the lower left corner, z towards the eye; the corners are centre +- a +- b. Where pieces
+  /// overlap, the one nearer to the eye wins. `dome` > 0 lowers the edges of the piece by that much, so that among equals the
+  /// nearest centre wins.
+  void fill(const Eigen::Vector3d& centre, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Colour& colour,
+            double dome = 0);
 
   /// Bytes red, green, blue, alpha, rows from below; blocks of `factor` x `factor` pixels are averaged.
   std::vector<std::uint8_t> rgba(int factor) const;
