@@ -167,7 +167,7 @@ void plot_frame(const PlotOptions& options, const ResultFile& results, std::int6
   body.view = options.view;
   body.title = title.empty() ? time : title + ", " + time;
   body.value_label = labelled(values.label, options.unit.value_or(values.unit));
-  body.length_unit = options.unit ? "" : "m";
+  body.length_unit = std::string(options.unit ? "" : "m");
   body.file = picture;
   run_gnuplot(body.dimension == 1 ? line_script(options, body) : body_script(body), picture);
 }
