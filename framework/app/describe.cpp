@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <cstdlib>
 
 namespace perikit::app {
 
@@ -18,14 +18,6 @@ Kind parse_kind(const std::string& text) {
   if (const auto kind = kind_from_name(text)) return *kind;
   const auto names = kind_names();
   throw InputError(fmt::format("unknown kind '{}'{}; known: {}", text, did_you_mean(text, names), fmt::join(names, ", ")));
-}
-
-std::string allowed(const Parameter& p) {
-  std::string text;
-  if (!p.choices.empty()) text = fmt::format("one of {}", fmt::join(p.choices, ", "));
-  if (std::isfinite(p.lower)) text += fmt::format("{}{} {:g}", text.empty() ? "" : ", ", p.lower_open ? ">" : ">=", p.lower);
-  if (std::isfinite(p.upper)) text += fmt::format("{}{} {:g}", text.empty() ? "" : ", ", p.upper_open ? "<" : "<=", p.upper);
-  return text;
 }
 
 void indent(std::string& out, const std::string& text) {

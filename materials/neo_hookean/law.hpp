@@ -10,7 +10,7 @@ namespace perikit {
 ///   psi = mu/2 (J^(-2/3) tr C - 3) + psi_vol(kappa, J)
 ///   P = mu J^(-2/3) (F - tr(C)/3 F^-T) + J psi_vol'(J) F^-T
 /// Written in H = F - I: with m = tr(C - I)/3, j = J - 1, G = cof F - I,
-///   J (F - tr(C)/3 F^-T) = J F - (1 + m) cof F = J H + (j - m) I - (1 + m) G - [...] with all terms O(H).
+///   J (F - tr(C)/3 F^-T) = J H + (j - m) I - (1 + m) G,  every term of the order of H.
 struct NeoHookean {
   static constexpr MaterialTraits traits{.constants = 2};
   Volumetric volumetric = Volumetric::quadratic;

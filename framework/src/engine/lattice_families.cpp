@@ -193,6 +193,13 @@ void LatticeFamilies::make_patterns(BondWeight weight) {
   }
 }
 
+void LatticeFamilies::inverse_shape(const LatticePattern& pattern, int lane, double* out) const noexcept {
+  const int d = lattice.dimension;
+  const double scale = 1 / (spacing * spacing * volume);
+  for (int a = 0; a < d; ++a)
+    for (int b = a; b < d; ++b) out[symmetric_index(d, lattice.axis[a], lattice.axis[b])] = scale * pattern.inverse[symmetric_index(d, a, b)][lane];
+}
+
 std::size_t LatticeFamilies::bytes() const noexcept {
   return chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
          patterns.size() * (sizeof(LatticePattern) + offsets.size());

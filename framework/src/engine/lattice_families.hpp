@@ -86,6 +86,14 @@ class LatticeFamilies {
   }
   /// Intact bonds of lane l by slot.
   static bool intact(const LatticePattern& p, std::size_t slot, int lane) noexcept { return p.mask[slot] >> lane & 1; }
+  /// Bond vector of a slot, input axes [m].
+  std::array<double, 3> bond(std::size_t slot) const noexcept {
+    std::array<double, 3> xi{};
+    for (std::size_t k = 0; k < 3; ++k) xi[static_cast<std::size_t>(lattice.axis[k])] = offsets[slot][k] * spacing;
+    return xi;
+  }
+  /// K^-1 of a lane with the components of the input axes and the volumes in K [1/m^2 per volume]: what a FamilyView holds.
+  void inverse_shape(const LatticePattern& pattern, int lane, double* out) const noexcept;
   std::size_t bytes() const noexcept;
 
  private:

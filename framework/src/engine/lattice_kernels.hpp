@@ -5,6 +5,7 @@
 ///   S_i  = sum_s omega_s (u_{i+s} - u_i) (x) d_s          H_i = S_i K_i^-1 / spacing
 ///   f_k  = sum_s omega_s Q_{k+s} d_s + Q_k m_k            Q_i = W_i P_i K_i^-1 / spacing,  m_k = sum_s omega_s d_s
 ///
+/// Sums run along the internal axes of the lattice (d, K, Q, m); H and S have the components of the input axes.
 /// (s runs over intact bonds; dead cells hold u = 0 and Q = 0, so that free surfaces need no masks but the first moment m.)
 
 #include "lattice_families.hpp"
@@ -43,7 +44,7 @@ class LatticeOperator {
       for (int k = 0; k < symmetric_components(D); ++k) inverse[k] = Pack::load(pattern.inverse[k] + l) * scale;
       for (int c = 0; c < D; ++c) {
         Pack s[D];
-        for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + e) * s_stride + l);
+        for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + f_.lattice.axis[e]) * s_stride + l);
         Pack own(0.0);
         for (int e = 0; e < D; ++e) {
           Pack q(0.0);
@@ -123,7 +124,7 @@ class LatticeOperator {
         for (int e = 0; e < D; ++e) {
           Pack h(0.0);
           for (int k = 0; k < D; ++k) h += s[k][v] * Pack::load(pattern.inverse[symmetric_index(D, k, e)] + lane);
-          (h * scale).store(H + static_cast<std::size_t>(c * D + e) * stride + v * pack_width);
+          (h * scale).store(H + static_cast<std::size_t>(c * D + f_.lattice.axis[e]) * stride + v * pack_width);
         }
       }
     }

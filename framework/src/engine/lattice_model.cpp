@@ -53,8 +53,9 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
   for (int c = 0; c < D; ++c) slot_xi_[c].assign(size, 1.0);
   for (std::size_t s = 0; s < slots; ++s) {
     double r2 = 0;
+    const auto xi = families_.bond(s);
     for (int c = 0; c < D; ++c) {
-      slot_xi_[c][s] = families_.offsets[s][static_cast<std::size_t>(c)] * families_.spacing;
+      slot_xi_[c][s] = xi[static_cast<std::size_t>(c)];
       r2 += slot_xi_[c][s] * slot_xi_[c][s];
     }
     length[s] = std::sqrt(r2);
@@ -65,9 +66,7 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
   FamilyView view{D, static_cast<int>(slots), body_.horizon(), {slot_xi_[0].data(), slot_xi_[1].data(), slot_xi_[2].data()},
                   length.data(), volume.data(), omega.data(), nullptr, 0};
   double inverse[6];
-  for (int k = 0; k < symmetric_components(D); ++k) {
-    inverse[k] = families_.whole.inverse[k][0] / (families_.spacing * families_.spacing * families_.volume);
-  }
+  families_.inverse_shape(families_.whole, 0, inverse);
   view.inverse_shape = inverse;
   kinematics_->correction(view, g.data(), size);
   for (int c = 0; c < D; ++c) slot_g_[c].assign(g.begin() + static_cast<std::ptrdiff_t>(c * size), g.begin() + static_cast<std::ptrdiff_t>((c + 1) * size));
@@ -183,9 +182,9 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
     const bool intact = LatticeFamilies::intact(pattern, k, l % chunk_points);
     omega[l] = intact ? families_.omega[k] : 0.0;
     volume[l] = intact ? families_.volume : 0.0;
-    for (int e = 0; e < symmetric_components(D); ++e) {
-      inverse[e * batch_points + l] = pattern.inverse[e][l % chunk_points] / (families_.spacing * families_.spacing * families_.volume);
-    }
+    double own[6];
+    families_.inverse_shape(pattern, l % chunk_points, own);
+    for (int e = 0; e < symmetric_components(D); ++e) inverse[e * batch_points + l] = own[e];
   }
   const FamilyView view{D, lanes, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, inverse, batch_points};
   kinematics_->correction(view, g, batch_points);
@@ -260,35 +259,45 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   }
   if (vectors.per_slot) bond_adjoint<D, true>(lanes, vectors, s.P, s.t, s.P);
   else bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
-  // Far ends: scattered slot by slot. Own ends: summed in registers.
+  // Own ends: summed in registers. Far ends: scattered, and only to live cells, which belong to this block's colour.
   const Pack share(mean ? 0.5 : 1.0);
+  for (int k = 0; k < slots; ++k) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    if (pattern.mask[at] != 0) scatter_far(pattern.mask[at], p + families_.shifts[at], k, mean, s, pass.out);
+  }
   for (int l = 0; l < chunk_points; l += pack_width) {
-    for (int c = 0; c < D; ++c) {
+    const auto add_own = [&](const double* from, double* to, Pack factor) {
       Pack own(0.0);
-      for (int k = 0; k < slots; ++k) {
-        const Pack t = Pack::load(s.t + c * batch_points + k * chunk_points + l);
-        own += t;
-        double* far = pass.out.component(c) + p + families_.shifts[slot + static_cast<std::size_t>(k)] + l;
-        (Pack::load(far) - t).store(far);
-      }
-      double* mine = pass.out.component(c) + p + l;
-      (Pack::load(mine) + own).store(mine);
-    }
-    for (int c = 0; c < D * D; ++c) {
-      Pack own(0.0);
-      for (int k = 0; k < slots; ++k) {
-        const Pack stress = share * Pack::load(s.P + c * batch_points + k * chunk_points + l);
-        own += stress;
-        if (mean) {
-          double* far = flux_.component(c) + p + families_.shifts[slot + static_cast<std::size_t>(k)] + l;
-          (Pack::load(far) + stress).store(far);
-        }
-      }
-      double* mine = flux_.component(c) + p + l;
-      (Pack::load(mine) + own).store(mine);
-    }
+      for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
+      (Pack::load(to + p + l) + factor * own).store(to + p + l);
+    };
+    for (int c = 0; c < D; ++c) add_own(s.t + c * batch_points, pass.out.component(c), Pack(1.0));
+    for (int c = 0; c < D * D; ++c) add_own(s.P + c * batch_points, flux_.component(c), share);
   }
   return -1;
+}
+
+template <int D>
+void LatticeModel<D>::scatter_far(std::uint8_t mask, std::int64_t far, int slot, bool mean, const BatchScratch& s, FieldView out) noexcept {
+  const int lane = slot * chunk_points;
+  if (mask == 0xff) {
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      for (int c = 0; c < D; ++c) {
+        double* f = out.component(c) + far + l;
+        (Pack::load(f) - Pack::load(s.t + c * batch_points + lane + l)).store(f);
+      }
+      for (int c = 0; c < D * D && mean; ++c) {
+        double* f = flux_.component(c) + far + l;
+        (Pack::load(f) + Pack(0.5) * Pack::load(s.P + c * batch_points + lane + l)).store(f);
+      }
+    }
+    return;
+  }
+  for (int l = 0; l < chunk_points; ++l) {
+    if (!(mask >> l & 1)) continue;
+    for (int c = 0; c < D; ++c) out.component(c)[far + l] -= s.t[c * batch_points + lane + l];
+    for (int c = 0; c < D * D && mean; ++c) flux_.component(c)[far + l] += 0.5 * s.P[c * batch_points + lane + l];
+  }
 }
 
 template <int D>

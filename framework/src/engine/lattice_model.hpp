@@ -33,6 +33,7 @@ class LatticeModel final : public Model {
   void gradient_block(std::size_t b, Pass& pass);
   void bonds_block(std::size_t b, Pass& pass);
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
+  void scatter_far(std::uint8_t mask, std::int64_t far, int slot, bool mean, const BatchScratch& s, FieldView out) noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void clean(FieldView out) const noexcept;
 

@@ -172,11 +172,11 @@ void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
   m.share.assign(m.family.size, 0.0);
   const Point x = body_.position(p);
   for (std::size_t k = 0; k < m.index.size(); ++k) {
-    double xi[3] = {};
+    std::array<double, 3> xi{};
     double omega = 0;
     if (lattice_) {
       const std::uint16_t s = lattice_bonds_[static_cast<std::size_t>(group.bonds)][k];
-      for (std::size_t c = 0; c < D; ++c) xi[c] = lattice_->offsets[s][c] * lattice_->spacing;
+      xi = lattice_->bond(s);
       omega = lattice_->omega[s];
     } else {
       const Point y = body_.position(static_cast<std::size_t>(m.index[k]));

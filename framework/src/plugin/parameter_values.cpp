@@ -18,7 +18,8 @@ const T& get(const ParameterValues& values, std::string_view key) {
   const ParameterValue* value = values.find(key);
   if (!value) throw std::logic_error(fmt::format("parameter '{}' has no value", joined(values.path(), key)));
   const T* typed = std::get_if<T>(value);
-  if (!typed) throw std::logic_error(fmt::format("parameter '{}' is read as another type than declared", joined(values.path(), key)));
+  if (!typed)
+    throw std::logic_error(fmt::format("parameter '{}' is read as another type than declared", joined(values.path(), key)));
   return *typed;
 }
 
@@ -29,7 +30,9 @@ const ParameterValue* ParameterValues::find(std::string_view key) const noexcept
   return found == entries_.end() ? nullptr : &found->second.value;
 }
 
-bool ParameterValues::has(std::string_view key) const noexcept { return find(key) != nullptr; }
+bool ParameterValues::has(std::string_view key) const noexcept {
+  return find(key) != nullptr;
+}
 
 bool ParameterValues::given(std::string_view key) const noexcept {
   const auto found = entries_.find(key);
@@ -42,10 +45,18 @@ double ParameterValues::number(std::string_view key) const {
   if (value && std::holds_alternative<std::string>(*value)) throw error(key, "found an expression; allowed here: a number");
   return get<double>(*this, key);
 }
-std::int64_t ParameterValues::integer(std::string_view key) const { return get<std::int64_t>(*this, key); }
-bool ParameterValues::boolean(std::string_view key) const { return get<bool>(*this, key); }
-const std::string& ParameterValues::text(std::string_view key) const { return get<std::string>(*this, key); }
-const std::vector<double>& ParameterValues::numbers(std::string_view key) const { return get<std::vector<double>>(*this, key); }
+std::int64_t ParameterValues::integer(std::string_view key) const {
+  return get<std::int64_t>(*this, key);
+}
+bool ParameterValues::boolean(std::string_view key) const {
+  return get<bool>(*this, key);
+}
+const std::string& ParameterValues::text(std::string_view key) const {
+  return get<std::string>(*this, key);
+}
+const std::vector<double>& ParameterValues::numbers(std::string_view key) const {
+  return get<std::vector<double>>(*this, key);
+}
 const std::vector<std::int64_t>& ParameterValues::integers(std::string_view key) const {
   return get<std::vector<std::int64_t>>(*this, key);
 }

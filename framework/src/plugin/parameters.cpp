@@ -17,7 +17,9 @@ std::string range(const Parameter& p) {
   return text;
 }
 
-std::string unit(const Parameter& p) { return p.unit.empty() || p.unit == "-" ? "" : fmt::format(" [{}]", p.unit); }
+std::string unit(const Parameter& p) {
+  return p.unit.empty() || p.unit == "-" ? "" : fmt::format(" [{}]", p.unit);
+}
 
 std::string choices(const Parameter& p) {
   std::string text;
@@ -56,23 +58,36 @@ std::optional<Kind> kind_from_name(std::string_view text) noexcept {
 std::string allowed(const Parameter& p) {
   const std::string variables = p.time ? "x, y, z, t" : "x, y, z";
   switch (p.type) {
-    case ParameterType::number: return "a number" + range(p) + unit(p);
-    case ParameterType::integer: return "an integer" + range(p);
-    case ParameterType::boolean: return "true or false";
-    case ParameterType::text: return "a string";
-    case ParameterType::choice: return choices(p);
+    case ParameterType::number:
+      return "a number" + range(p) + unit(p);
+    case ParameterType::integer:
+      return "an integer" + range(p);
+    case ParameterType::boolean:
+      return "true or false";
+    case ParameterType::text:
+      return "a string";
+    case ParameterType::choice:
+      return choices(p);
     case ParameterType::expression:
       return fmt::format("a number{}{}, or an expression in {}", range(p), unit(p), variables);
     case ParameterType::component:
       return fmt::format("a number{}{}, an expression in {}, or \"free\"", range(p), unit(p), variables);
     case ParameterType::components:
-      return fmt::format("a list, one for each dimension of the body, of numbers{}, expressions in {}, or \"free\"", unit(p), variables);
-    case ParameterType::expressions: return list(p, fmt::format("numbers{} or expressions in {}", unit(p), variables));
-    case ParameterType::numbers: return list(p, "numbers" + range(p) + unit(p));
-    case ParameterType::integers: return list(p, "integers" + range(p));
-    case ParameterType::texts: return list(p, p.choices.empty() ? "strings" : choices(p));
-    case ParameterType::points: return list(p, "points, each a list of coordinates" + unit(p));
-    case ParameterType::part: return fmt::format("the name of a {}, or a table {{ type = \"name\", ... }}", name(p.kind));
+      return fmt::format("a list, one for each dimension of the body, of numbers{}, expressions in {}, or \"free\"", unit(p),
+                         variables);
+    case ParameterType::expressions:
+      return list(p, fmt::format("numbers{} or expressions in {}", unit(p), variables));
+    case ParameterType::numbers:
+      return list(p, "numbers" + range(p) + unit(p));
+    case ParameterType::integers:
+      return list(p, "integers" + range(p));
+    case ParameterType::texts:
+      return list(p, p.choices.empty() ? "strings" : choices(p));
+    case ParameterType::points:
+      return list(p, "points, each a list of coordinates" + unit(p));
+    case ParameterType::part:
+      return fmt::format("the name of {} {}, or a table {{ type = \"name\", ... }}",
+                         p.kind == Kind::integrator || p.kind == Kind::influence ? "an" : "a", name(p.kind));
   }
   return {};
 }

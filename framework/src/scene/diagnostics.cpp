@@ -12,12 +12,16 @@ void Diagnostics::add(SourcePosition position, std::string_view key, std::string
   add(std::move(position), error);
 }
 
-void Diagnostics::add(SourcePosition position, const InputError& error) { entries_.push_back({std::move(position), error.what()}); }
+void Diagnostics::add(SourcePosition position, const InputError& error) {
+  entries_.push_back({std::move(position), error.what()});
+}
 
 void Diagnostics::raise() const {
   if (entries_.empty()) return;
   std::vector<Entry> sorted = entries_;
-  const auto order = [](const Entry& e) { return std::tuple(e.position.file == command_line, e.position.line, e.position.column); };
+  const auto order = [](const Entry& e) {
+    return std::tuple(e.position.file == command_line, e.position.line, e.position.column);
+  };
   std::stable_sort(sorted.begin(), sorted.end(), [&](const Entry& a, const Entry& b) { return order(a) < order(b); });
   std::vector<std::string> messages;
   for (Entry& entry : sorted) messages.push_back(std::move(entry.text));

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "scene/expression_names.hpp"
+#include "scene/toml_text.hpp"
 
 namespace perikit {
 
@@ -29,14 +30,21 @@ mu::Parser make_parser() {
   mu::Parser parser;
   parser.ClearConst();  // _pi and _e: scenes have pi and exp
   parser.DefineConst("pi", std::numbers::pi);
-  parser.DefineFun("floor", +[](double v) { return std::floor(v); });
-  parser.DefineFun("ceil", +[](double v) { return std::ceil(v); });
-  parser.DefineFun("pow", +[](double a, double b) { return std::pow(a, b); });
+  parser.DefineFun(
+      "floor", +[](double v) { return std::floor(v); });
+  parser.DefineFun(
+      "ceil", +[](double v) { return std::ceil(v); });
+  parser.DefineFun(
+      "pow", +[](double a, double b) { return std::pow(a, b); });
   return parser;
 }
 
-bool letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) || c == '_'; }
-bool digit(char c) { return std::isdigit(static_cast<unsigned char>(c)); }
+bool letter(char c) {
+  return std::isalpha(static_cast<unsigned char>(c)) || c == '_';
+}
+bool digit(char c) {
+  return std::isdigit(static_cast<unsigned char>(c));
+}
 
 struct Name {
   std::string text;
@@ -66,8 +74,10 @@ std::vector<Name> names_in(const std::string& text) {
 std::size_t assignment_in(const std::string& text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] != '=') continue;
-    if (i + 1 < text.size() && text[i + 1] == '=') ++i;
-    else if (i == 0 || std::string_view("<>!").find(text[i - 1]) == std::string_view::npos) return i;
+    if (i + 1 < text.size() && text[i + 1] == '=')
+      ++i;
+    else if (i == 0 || std::string_view("<>!").find(text[i - 1]) == std::string_view::npos)
+      return i;
   }
   return std::string::npos;
 }
@@ -75,16 +85,26 @@ std::size_t assignment_in(const std::string& text) {
 std::string reason(const mu::ParserError& error) {
   const std::string where = error.GetPos() >= 0 ? fmt::format(" at character {}", error.GetPos() + 1) : "";
   switch (error.GetCode()) {
-    case mu::ecUNEXPECTED_EOF: return "it ends too early";
-    case mu::ecEMPTY_EXPRESSION: return "it is empty";
-    case mu::ecMISSING_PARENS: return "a closing parenthesis is missing";
-    case mu::ecUNEXPECTED_PARENS: return fmt::format("unexpected '{}'{}", error.GetToken(), where);
-    case mu::ecTOO_MANY_PARAMS: return fmt::format("too many arguments for '{}'{}", error.GetToken(), where);
-    case mu::ecTOO_FEW_PARAMS: return fmt::format("too few arguments for '{}'{}", error.GetToken(), where);
-    case mu::ecMISSING_ELSE_CLAUSE: return "'?' without ':'";
-    case mu::ecMISPLACED_COLON: return "':' without '?'";
-    case mu::ecEXPRESSION_TOO_LONG: return "it is too long";
-    default: return error.GetToken().empty() ? "it cannot be read" + where : fmt::format("unexpected '{}'{}", error.GetToken(), where);
+    case mu::ecUNEXPECTED_EOF:
+      return "it ends too early";
+    case mu::ecEMPTY_EXPRESSION:
+      return "it is empty";
+    case mu::ecMISSING_PARENS:
+      return "a closing parenthesis is missing";
+    case mu::ecUNEXPECTED_PARENS:
+      return fmt::format("unexpected '{}'{}", error.GetToken(), where);
+    case mu::ecTOO_MANY_PARAMS:
+      return fmt::format("too many arguments for '{}'{}", error.GetToken(), where);
+    case mu::ecTOO_FEW_PARAMS:
+      return fmt::format("too few arguments for '{}'{}", error.GetToken(), where);
+    case mu::ecMISSING_ELSE_CLAUSE:
+      return "'?' without ':'";
+    case mu::ecMISPLACED_COLON:
+      return "':' without '?'";
+    case mu::ecEXPRESSION_TOO_LONG:
+      return "it is too long";
+    default:
+      return error.GetToken().empty() ? "it cannot be read" + where : fmt::format("unexpected '{}'{}", error.GetToken(), where);
   }
 }
 
@@ -114,7 +134,8 @@ Expression::Expression(const std::string& text, const Constants& constants, bool
   parser_->position = std::move(position);
   parser_->key = std::move(key);
   const auto refuse = [&](const std::string& why) {
-    return InputError(parser_->position, parser_->key, fmt::format("found the expression \"{}\": {}", text, why));
+    return InputError(parser_->position, parser_->key,
+                      fmt::format("found the expression {}: {}", toml_string(excerpt(text)), why));
   };
 
   mu::Parser& parser = parser_->parser;

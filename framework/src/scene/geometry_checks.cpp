@@ -24,7 +24,7 @@ std::string crack_fault(const std::vector<std::array<double, 3>>& vertices) {
   if (!(size > 0.0)) return "all vertices at one place";
   if (vertices.size() == 2) return {};
 
-  Eigen::Vector3d area = Eigen::Vector3d::Zero();   // twice the area vector, relative to size^2
+  Eigen::Vector3d area = Eigen::Vector3d::Zero();  // twice the area vector, relative to size^2
   for (std::size_t i = 0; i < vertices.size(); ++i) area += ((at(i) - at(0)) / size).cross((at(i + 1) - at(0)) / size);
   if (area.norm() < 1e-9) return "vertices on one line";
   for (std::size_t i = 0; i < vertices.size(); ++i) {

@@ -43,8 +43,10 @@ std::optional<std::size_t> index_in(const toml::array& array, const std::string&
 std::vector<std::string> split(const std::string& path) {
   std::vector<std::string> keys(1);
   for (const char c : path) {
-    if (c == '.') keys.emplace_back();
-    else keys.back() += c;
+    if (c == '.')
+      keys.emplace_back();
+    else
+      keys.back() += c;
   }
   return keys;
 }
@@ -66,7 +68,7 @@ void apply_override(toml::table& root, const std::string& assignment, Diagnostic
   }
   const std::string text = assignment.substr(equals + 1);
   std::optional<toml::table> value = parsed(text);
-  if (!value) value = parsed(toml_string(text));
+  if (!value) value = parsed(toml_string(trimmed(text)));
   if (!value) {
     errors.add(here, path, "found text that is not UTF-8; allowed: a TOML value, or a string");
     return;
@@ -80,8 +82,9 @@ void apply_override(toml::table& root, const std::string& assignment, Diagnostic
     if (const auto* array = parent->as_array()) {
       const auto found = index_in(*array, keys[i]);
       if (!found) {
-        errors.add(here, path, fmt::format("found the index \"{}\" into {}; allowed: {}", keys[i], walked,
-                                           array->empty() ? "none, it is empty" : fmt::format("0 to {}", array->size() - 1)));
+        errors.add(here, path,
+                   fmt::format("found the index \"{}\" into {}; allowed: {}", keys[i], walked,
+                               array->empty() ? "none, it is empty" : fmt::format("0 to {}", array->size() - 1)));
         return;
       }
       index = *found;

@@ -9,10 +9,18 @@ namespace perikit {
 
 namespace {
 
-std::string scalar(double v) { return toml_number(v); }
-std::string scalar(std::int64_t v) { return fmt::format("{}", v); }
-std::string scalar(bool v) { return v ? "true" : "false"; }
-std::string scalar(const std::string& v) { return toml_string(v); }
+std::string scalar(double v) {
+  return toml_number(v);
+}
+std::string scalar(std::int64_t v) {
+  return fmt::format("{}", v);
+}
+std::string scalar(bool v) {
+  return v ? "true" : "false";
+}
+std::string scalar(const std::string& v) {
+  return toml_string(v);
+}
 std::string scalar(const std::variant<double, std::string>& v) {
   return std::visit([](const auto& one) { return scalar(one); }, v);
 }
@@ -47,7 +55,8 @@ void ResolvedWriter::part(const PartValues& part) {
   lines(part_table(parts_.describe(part.kind, part.type), part.kind, section), part.values);
 }
 
-std::string ResolvedWriter::inline_table(const ParameterTable& parameters, const ParameterValues& values, const std::string& type) {
+std::string ResolvedWriter::inline_table(const ParameterTable& parameters, const ParameterValues& values,
+                                         const std::string& type) {
   std::string text = type.empty() ? "" : "type = " + toml_string(type);
   for (const Parameter& parameter : parameters.parameters()) {
     const ParameterValue* v = values.find(parameter.name);
@@ -62,8 +71,10 @@ std::string ResolvedWriter::value(const ParameterValue& value) {
   }
   return std::visit(
       [](const auto& v) -> std::string {
-        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::shared_ptr<const PartValues>>) return {};
-        else return scalar(v);
+        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::shared_ptr<const PartValues>>)
+          return {};
+        else
+          return scalar(v);
       },
       value);
 }

@@ -20,7 +20,8 @@ std::string read_text(const std::filesystem::path& file) {
   };
   std::error_code failure;
   const auto status = std::filesystem::status(file, failure);
-  if (!std::filesystem::exists(status)) throw refuse(failure && failure != std::errc::no_such_file_or_directory ? failure.message() : "does not exist");
+  if (!std::filesystem::exists(status))
+    throw refuse(failure && failure != std::errc::no_such_file_or_directory ? failure.message() : "does not exist");
   if (std::filesystem::is_directory(status)) throw refuse("is a folder");
   if (!std::filesystem::is_regular_file(status)) throw refuse("is not a regular file");
   std::ifstream stream(file, std::ios::binary);

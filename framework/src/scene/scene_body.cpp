@@ -51,8 +51,9 @@ void SceneReader::read_body(const toml::table& root) {
   }
 
   if (body->contains("lattice") == body->contains("points")) {
-    reader_.errors.add(description.position, "body", fmt::format("found {}; allowed: exactly 1 of [body.lattice], [body.points]",
-                                                                 body->contains("lattice") ? "lattice, points" : "none of them"));
+    reader_.errors.add(description.position, "body",
+                       fmt::format("found {}; allowed: exactly 1 of [body.lattice], [body.points]",
+                                   body->contains("lattice") ? "lattice, points" : "none of them"));
   }
   read_lattice(*body);
   read_points(*body);
@@ -74,7 +75,8 @@ void SceneReader::read_lattice(const toml::table& body) {
   if (values.has("jitter")) lattice.jitter = values.number("jitter");
   if (values.has("seed")) lattice.seed = values.integer("seed");
   if (values.has("inside")) {
-    lattice.inside = Expression(values.expression("inside"), scene_.constants, false, values.position("inside"), "body.lattice.inside");
+    lattice.inside =
+        Expression(values.expression("inside"), scene_.constants, false, values.position("inside"), "body.lattice.inside");
   }
   bool sound = true;
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(reader_.dimension); ++axis) {
@@ -99,7 +101,8 @@ void SceneReader::read_points(const toml::table& body) {
   ParameterValues values = reader_.read(*section, table, "body.points");
   if (values.has("file")) {
     const std::string kind = std::filesystem::path(values.text("file")).extension().string();
-    if (kind == ".csv" || kind == ".h5") scene_.body.points_file = existing_file(values, "file");
+    if (kind == ".csv" || kind == ".h5")
+      scene_.body.points_file = existing_file(values, "file");
     else {
       reader_.errors.add(values.position("file"), "body.points.file",
                          fmt::format("found {}; allowed: a file that ends in .csv or .h5", toml_string(values.text("file"))));
@@ -140,30 +143,28 @@ void SceneReader::read_cracks(const toml::table& root) {
   const ParameterTable table = crack_parameters();
   for (const toml::table* crack : sections(root, "crack", "crack")) {
     const std::string path = fmt::format("crack.{}", scene_.cracks.size());
-    const ParameterValues values = reader_.read(*crack, table, path);
-    writer_.header("crack", true);
-    writer_.lines(table, values);
     CrackDescription description;
     description.position = reader_.position(*crack);
-    const std::string fitting = reader_.dimension == 2 ? "segment" : "polygon";
+    bool fits = true;
     for (const std::string key : {"segment", "polygon"}) {
-      if (!values.has(key)) continue;
-      if (reader_.dimension == 1 || (reader_.dimension > 1 && key != fitting)) {
+      if (!crack->contains(key) || reader_.dimension == 0 || reader_.dimension == (key == "segment" ? 2 : 3)) continue;
+      fits = false;
+      reader_.refuse(
+          *crack->get(key), join_path(path, key),
+          fmt::format("found a {} in a body of dimension {}; allowed: segment in 2D, polygon in 3D", key, reader_.dimension));
+    }
+    if (fits) {
+      const ParameterValues values = reader_.read(*crack, table, path);
+      writer_.header("crack", true);
+      writer_.lines(table, values);
+      for (const std::string key : {"segment", "polygon"}) {
+        if (!values.has(key)) continue;
+        for (const auto& vertex : values.points(key)) description.vertices.push_back(coordinates(vertex));
+        const std::string fault = crack_fault(description.vertices);
+        if (fault.empty()) continue;
         reader_.errors.add(values.position(key), join_path(path, key),
-                           fmt::format("found a {} in a body of dimension {}; allowed: segment in 2D, polygon in 3D", key, reader_.dimension));
-        continue;
-      }
-      for (const auto& vertex : values.points(key)) {
-        if (reader_.dimension > 0 && vertex.size() != static_cast<std::size_t>(reader_.dimension)) {
-          reader_.errors.add(values.position(key), join_path(path, key),
-                             fmt::format("found a point with {} coordinates; allowed: {}", vertex.size(), reader_.dimension));
-        }
-        description.vertices.push_back(coordinates(vertex));
-      }
-      const std::string fault = crack_fault(description.vertices);
-      if (!fault.empty()) {
-        reader_.errors.add(values.position(key), join_path(path, key), fmt::format("found {}; allowed: {}", fault,
-                           key == "segment" ? "two different ends" : "a plane polygon with an area"));
+                           fmt::format("found {}; allowed: {}", fault,
+                                       key == "segment" ? "two different ends" : "a plane polygon with an area"));
       }
     }
     scene_.cracks.push_back(std::move(description));

@@ -54,13 +54,15 @@ void SceneReader::read_loads(const toml::table& root) {
     description.position = reader_.position(*load);
     description.set = set_of(values);
     using Type = LoadDescription::Type;
-    for (const auto& [key, type] : {std::pair{"force", Type::force}, {"body_force", Type::body_force}, {"traction", Type::traction}}) {
+    for (const auto& [key, type] :
+         {std::pair{"force", Type::force}, {"body_force", Type::body_force}, {"traction", Type::traction}}) {
       if (!values.has(key)) continue;
       description.type = type;
       description.components = expressions(values, key, true);
     }
     if (load->contains("traction") && !load->contains("face")) {
-      reader_.errors.add(description.position, path + ".face", "found nothing beside traction; allowed: " + allowed(*table.find("face")));
+      reader_.errors.add(description.position, path + ".face",
+                         "found nothing beside traction; allowed: " + allowed(*table.find("face")));
     }
     if (values.has("face")) {
       description.face = values.text("face");
@@ -69,7 +71,8 @@ void SceneReader::read_loads(const toml::table& root) {
                            fmt::format("found \"{}\" without traction; allowed: only with traction", description.face));
       } else if (reader_.dimension > 0 && description.face[1] - 'x' >= reader_.dimension) {
         reader_.errors.add(values.position("face"), path + ".face",
-                           fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", description.face, reader_.dimension));
+                           fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", description.face,
+                                       reader_.dimension));
       }
     }
     scene_.loads.push_back(std::move(description));
@@ -90,13 +93,16 @@ void SceneReader::read_output(const toml::table& root) {
   if (values.has("every")) description.every = values.integer("every");
   if (values.has("times")) description.times = values.numbers("times");
   if (std::adjacent_find(description.times.begin(), description.times.end(), std::greater_equal<>()) != description.times.end()) {
-    reader_.errors.add(values.position("times"), "output.times", "found times that do not ascend; allowed: each above the one before");
+    reader_.errors.add(values.position("times"), "output.times",
+                       "found times that do not ascend; allowed: each above the one before");
   }
   if (values.has("history_every")) description.history_every = values.integer("history_every");
   if (values.has("checkpoint_every")) description.checkpoint_every = values.integer("checkpoint_every");
   if (values.has("fields")) description.fields = values.texts("fields");
   for (std::size_t i = 0; i < description.fields.size(); ++i) {
-    if (std::count(description.fields.begin(), description.fields.begin() + static_cast<std::ptrdiff_t>(i), description.fields[i]) == 0) continue;
+    if (std::count(description.fields.begin(), description.fields.begin() + static_cast<std::ptrdiff_t>(i),
+                   description.fields[i]) == 0)
+      continue;
     reader_.errors.add(values.position("fields"), fmt::format("output.fields.{}", i),
                        fmt::format("found \"{}\" twice; allowed: each field once", description.fields[i]));
   }
@@ -112,15 +118,19 @@ void SceneReader::read_history(const toml::table& output) {
     writer_.header("output.history", true);
     writer_.lines(table, values);
     const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
-    HistoryDescription description{text("name"), set_of(values), text("quantity"), text("component"), text("reduce"), reader_.position(*record)};
+    HistoryDescription description{text("name"),      set_of(values), text("quantity"),
+                                   text("component"), text("reduce"), reader_.position(*record)};
     const auto refuse = [&](const char* key, const std::string& message) {
       reader_.errors.add(values.position(key), join_path(path, key), message);
     };
 
     if (values.has("name")) {
       const std::string& name = description.name;
-      const bool fits_csv = !name.empty() && std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == ',' || c == '"'; });
-      if (!fits_csv) refuse("name", fmt::format("found {}; allowed: a column name without commas, quotes and control characters", toml_string(name)));
+      const bool fits_csv = !name.empty() && std::none_of(name.begin(), name.end(),
+                                                          [](unsigned char c) { return c < 0x20 || c == ',' || c == '"'; });
+      if (!fits_csv)
+        refuse("name",
+               fmt::format("found {}; allowed: a column name without commas, quotes and control characters", toml_string(name)));
       else if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
         refuse("name", fmt::format("found \"{}\" again; allowed: names that no other column of history.csv has", name));
       }
@@ -130,10 +140,12 @@ void SceneReader::read_history(const toml::table& output) {
       const std::vector<std::string> allowed = field_components(description.quantity, reader_.dimension);
       const bool known = std::find(allowed.begin(), allowed.end(), description.component) != allowed.end();
       if (allowed.empty() && values.has("component")) {
-        refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", description.component, description.quantity));
+        refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", description.component,
+                                        description.quantity));
       } else if (!allowed.empty() && !known && (values.has("component") || !record->contains("component"))) {
-        refuse("component", fmt::format("found {}; allowed: {}", values.has("component") ? toml_string(description.component) : "nothing",
-                                        fmt::join(allowed, ", ")));
+        refuse("component",
+               fmt::format("found {}; allowed: {}", values.has("component") ? toml_string(description.component) : "nothing",
+                           fmt::join(allowed, ", ")));
       }
     }
     scene_.output.history.push_back(std::move(description));

@@ -14,8 +14,9 @@ namespace perikit {
 
 namespace {
 
-const std::vector<std::string> section_names{"constants", "body",  "sets",    "family",   "kinematics", "material",   "region", "damage",
-                                             "crack",     "initial", "boundary", "load", "integrator", "output", "run"};
+const std::vector<std::string> section_names{"constants", "body",   "sets",       "family", "kinematics",
+                                             "material",  "region", "damage",     "crack",  "initial",
+                                             "boundary",  "load",   "integrator", "output", "run"};
 
 bool identifier(std::string_view name) {
   return !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
@@ -61,7 +62,8 @@ void SceneReader::refuse_reserved(toml::table& root) {
     if (root.contains(word)) refuse(root, word, word);
   }
   if (auto* bodies = root["body"].as_array()) {
-    reader_.refuse(*bodies, "body", "found a list of bodies; [[body]] is reserved for a later version; allowed: one table [body]");
+    reader_.refuse(*bodies, "body",
+                   "found a list of bodies; [[body]] is reserved for a later version; allowed: one table [body]");
   }
   if (auto* regions = root["region"].as_array()) {
     for (std::size_t i = 0; i < regions->size(); ++i) {
@@ -105,16 +107,18 @@ void SceneReader::read_constants(const toml::table& root) {
   for (const auto& [key, node] : *constants) {
     const std::string name(key.str()), path = join_path("constants", name);
     if (!identifier(name)) {
-      reader_.errors.add(reader_.position(key.source()), path,
-                         fmt::format("found the name {}; allowed: letters, digits and _, not starting with a digit", toml_string(name)));
+      reader_.errors.add(
+          reader_.position(key.source()), path,
+          fmt::format("found the name {}; allowed: letters, digits and _, not starting with a digit", toml_string(name)));
     } else if (std::find(taken.begin(), taken.end(), name) != taken.end()) {
-      reader_.errors.add(reader_.position(key.source()), path,
-                         fmt::format("found the name \"{}\", which expressions use already; allowed: any but {}", name, fmt::join(taken, ", ")));
+      reader_.errors.add(
+          reader_.position(key.source()), path,
+          fmt::format("found the name \"{}\", which expressions use already; allowed: any but {}", name, fmt::join(taken, ", ")));
     } else if (const auto value = reader_.value(number, node, path)) {
       scene_.constants[name] = std::get<double>(*value);
       writer_.line(name, toml_number(std::get<double>(*value)));
     } else {
-      scene_.constants[name] = 0.0;   // known, so that its uses are not reported as well
+      scene_.constants[name] = 0.0;  // known, so that its uses are not reported as well
     }
   }
   reader_.constants = scene_.constants;
@@ -134,12 +138,15 @@ void SceneReader::read_sets(const toml::table& root) {
     set.position = reader_.position(node);
     const std::string path = join_path("sets", set.name);
     if (set.name == "all") {
-      reader_.errors.add(reader_.position(key.source()), path, "found a set named \"all\"; that set exists and holds every point; allowed: another name");
+      reader_.errors.add(reader_.position(key.source()), path,
+                         "found a set named \"all\"; that set exists and holds every point; allowed: another name");
       continue;
     }
-    if (set.name.empty() || std::any_of(set.name.begin(), set.name.end(), [](unsigned char c) { return c < 0x20 || c == '/' || c == 0x7f; })) {
+    if (set.name.empty() ||
+        std::any_of(set.name.begin(), set.name.end(), [](unsigned char c) { return c < 0x20 || c == '/' || c == 0x7f; })) {
       reader_.errors.add(reader_.position(key.source()), path,
-                         fmt::format("found the name {}; allowed: names that are not empty, without / and control characters", toml_string(set.name)));
+                         fmt::format("found the name {}; allowed: names that are not empty, without / and control characters",
+                                     toml_string(set.name)));
       continue;
     }
     set_names_.push_back(set.name);
@@ -158,7 +165,9 @@ void SceneReader::read_sets(const toml::table& root) {
       if (values.has("points")) set.points = values.integers("points");
       writer_.line(set.name, writer_.inline_table(table, values));
     } else {
-      reader_.refuse(node, path, fmt::format("found {}; allowed: an expression in x, y, z, {{ nearest = [...] }} or {{ points = [...] }}", found(node)));
+      reader_.refuse(
+          node, path,
+          fmt::format("found {}; allowed: an expression in x, y, z, {{ nearest = [...] }} or {{ points = [...] }}", found(node)));
     }
     scene_.sets.push_back(std::move(set));
   }
@@ -169,7 +178,8 @@ void SceneReader::read_parts(const toml::table& root) {
   for (const Parameter& parameter : model.parameters()) {
     const toml::node* node = root.get(parameter.name);
     if (!node) {
-      if (parameter.required) reader_.errors.add(reader_.position(root), parameter.name, "found nothing; allowed: " + allowed(parameter));
+      if (parameter.required)
+        reader_.errors.add(reader_.position(root), parameter.name, "found nothing; allowed: " + allowed(parameter));
       continue;
     }
     const auto part = reader_.part(parameter.kind, *node, parameter.name);
@@ -180,28 +190,34 @@ void SceneReader::read_parts(const toml::table& root) {
         scene_.kinematics = part;
         if (part->values.has("stabilization")) scene_.stabilization = part->values.shared_part("stabilization");
         break;
-      case Kind::material: scene_.material = part; break;
+      case Kind::material:
+        scene_.material = part;
+        break;
       case Kind::damage:
         scene_.damage = part;
         if (part->values.has("no_fail")) scene_.no_fail = part->values.texts("no_fail");
         for (const std::string& set : scene_.no_fail) check_set(set, part->values.position("no_fail"), "damage.no_fail");
         break;
-      default: scene_.integrator = part;
+      default:
+        scene_.integrator = part;
     }
   }
 }
 
-const toml::table* SceneReader::section(const toml::table& parent, const std::string& key, const std::string& path, bool required) {
+const toml::table* SceneReader::section(const toml::table& parent, const std::string& key, const std::string& path,
+                                        bool required) {
   const toml::node* node = parent.get(key);
   if (node && node->is_table()) return node->as_table();
   if (node && !(path == "body" && node->is_array())) {
     reader_.refuse(*node, path, fmt::format("found {}; allowed: a table [{}]", found(*node), path));
   }
-  if (!node && required) reader_.errors.add(reader_.position(parent), path, fmt::format("found nothing; allowed: a table [{}]", path));
+  if (!node && required)
+    reader_.errors.add(reader_.position(parent), path, fmt::format("found nothing; allowed: a table [{}]", path));
   return nullptr;
 }
 
-std::vector<const toml::table*> SceneReader::sections(const toml::table& parent, const std::string& key, const std::string& path) {
+std::vector<const toml::table*> SceneReader::sections(const toml::table& parent, const std::string& key,
+                                                      const std::string& path) {
   const toml::node* node = parent.get(key);
   if (!node) return {};
   std::vector<const toml::table*> tables;
@@ -218,8 +234,9 @@ std::vector<const toml::table*> SceneReader::sections(const toml::table& parent,
 
 void SceneReader::check_set(const std::string& name, const SourcePosition& position, const std::string& key) {
   if (std::find(set_names_.begin(), set_names_.end(), name) != set_names_.end()) return;
-  reader_.errors.add(position, key, fmt::format("found the unknown set {}; allowed: {}{}", toml_string(name), fmt::join(set_names_, ", "),
-                                                did_you_mean(name, set_names_)));
+  reader_.errors.add(position, key,
+                     fmt::format("found the unknown set {}; allowed: {}{}", toml_string(name), fmt::join(set_names_, ", "),
+                                 did_you_mean(name, set_names_)));
 }
 
 std::string SceneReader::set_of(const ParameterValues& values) {
@@ -231,7 +248,8 @@ std::string SceneReader::set_of(const ParameterValues& values) {
 std::vector<Expression> SceneReader::expressions(const ParameterValues& values, const std::string& key, bool with_time) const {
   std::vector<Expression> list;
   for (const auto& value : values.expressions(key)) {
-    list.emplace_back(value, scene_.constants, with_time, values.position(key), fmt::format("{}.{}.{}", values.path(), key, list.size()));
+    list.emplace_back(value, scene_.constants, with_time, values.position(key),
+                      fmt::format("{}.{}.{}", values.path(), key, list.size()));
   }
   return list;
 }
@@ -240,8 +258,11 @@ std::vector<std::optional<Expression>> SceneReader::components(const ParameterVa
   std::vector<std::optional<Expression>> list;
   for (const auto& value : values.expressions(key)) {
     const auto* text = std::get_if<std::string>(&value);
-    if (text && *text == "free") list.emplace_back(std::nullopt);
-    else list.emplace_back(Expression(value, scene_.constants, true, values.position(key), fmt::format("{}.{}.{}", values.path(), key, list.size())));
+    if (text && *text == "free")
+      list.emplace_back(std::nullopt);
+    else
+      list.emplace_back(Expression(value, scene_.constants, true, values.position(key),
+                                   fmt::format("{}.{}.{}", values.path(), key, list.size())));
   }
   return list;
 }
@@ -258,8 +279,9 @@ std::optional<std::filesystem::path> SceneReader::existing_file(ParameterValues&
   const auto status = std::filesystem::status(file, failure);
   if (!std::filesystem::is_regular_file(status)) {
     const char* what = std::filesystem::is_directory(status) ? "is a folder" : "does not exist";
-    reader_.errors.add(position, join_path(values.path(), key),
-                       fmt::format("found {}, but {} {}; allowed: an existing file", toml_string(values.text(key)), file.string(), what));
+    reader_.errors.add(
+        position, join_path(values.path(), key),
+        fmt::format("found {}, but {} {}; allowed: an existing file", toml_string(values.text(key)), file.string(), what));
     return std::nullopt;
   }
   values.set(key, file.string(), position);

@@ -8,10 +8,21 @@ namespace {
 
 constexpr auto unbounded = std::numeric_limits<std::size_t>::max();
 
-const std::vector<std::string> point_fields{"displacement",  "velocity",    "acceleration", "internal_force",
-                                            "external_force", "reaction",    "strain_energy_density", "deformation_gradient",
-                                            "first_piola",   "cauchy",      "von_mises",    "jacobian",
-                                            "damage",        "shape_tensor_condition", "material_id"};
+const std::vector<std::string> point_fields{"displacement",
+                                            "velocity",
+                                            "acceleration",
+                                            "internal_force",
+                                            "external_force",
+                                            "reaction",
+                                            "strain_energy_density",
+                                            "deformation_gradient",
+                                            "first_piola",
+                                            "cauchy",
+                                            "von_mises",
+                                            "jacobian",
+                                            "damage",
+                                            "shape_tensor_condition",
+                                            "material_id"};
 
 }  // namespace
 
@@ -19,7 +30,8 @@ ParameterTable head_parameters() {
   ParameterTable table;
   table.integer("format", "Version of the scene vocabulary.").require().at_least(1).at_most(1);
   table.string("title", "Written into the results.").by_default("\"\"");
-  table.add(ParameterType::texts, "plugins", "-", "Extra libraries, relative to the scene file; opened only with --trust.").by_default("[]");
+  table.add(ParameterType::texts, "plugins", "-", "Extra libraries, relative to the scene file; opened only with --trust.")
+      .by_default("[]");
   return table;
 }
 
@@ -51,17 +63,23 @@ ParameterTable body_parameters(int dimension) {
 ParameterTable lattice_parameters() {
   ParameterTable table;
   table.number("spacing", "m", "Distance of neighbouring points.").require().positive();
-  table.add(ParameterType::numbers, "lower", "m", "Lower corner; the first point lies half a spacing inside.").require().one_per_axis();
+  table.add(ParameterType::numbers, "lower", "m", "Lower corner; the first point lies half a spacing inside.")
+      .require()
+      .one_per_axis();
   table.add(ParameterType::numbers, "upper", "m", "Upper corner.").require().one_per_axis();
   table.expression("inside", "-", "Points are kept where this is true.");
-  table.number("jitter", "-", "Random shift of the points, as a fraction of the spacing.").at_least(0).at_most(0.5).by_default("0.0");
+  table.number("jitter", "-", "Random shift of the points, as a fraction of the spacing.")
+      .at_least(0)
+      .at_most(0.5)
+      .by_default("0.0");
   table.integer("seed", "Seed of the random shift.").at_least(0).by_default("1");
   return table;
 }
 
 ParameterTable points_parameters() {
   ParameterTable table;
-  table.string("file", "A .csv with the header x,y,z,volume, or an .h5 with datasets of these names; relative to the scene file.").require();
+  table.string("file", "A .csv with the header x,y,z,volume, or an .h5 with datasets of these names; relative to the scene file.")
+      .require();
   return table;
 }
 
@@ -92,7 +110,9 @@ ParameterTable region_parameters() {
 ParameterTable crack_parameters() {
   ParameterTable table;
   table.add(ParameterType::points, "segment", "m", "2D: the two ends of the crack.").length(2, 2).one_per_axis();
-  table.add(ParameterType::points, "polygon", "m", "3D: the corners of a plane crack, in order.").length(3, unbounded).one_per_axis();
+  table.add(ParameterType::points, "polygon", "m", "3D: the corners of a plane crack, in order.")
+      .length(3, unbounded)
+      .one_per_axis();
   table.exactly(1, {"segment", "polygon"});
   return table;
 }
@@ -130,11 +150,17 @@ ParameterTable output_parameters() {
   ParameterTable table;
   table.integer("frames", "Number of frames, evenly spaced in time.").at_least(1).by_default("20");
   table.integer("every", "A frame every so many steps.").at_least(1);
-  table.add(ParameterType::numbers, "times", "s", "A frame at the first step at or after each of these times, ascending.").at_least(0).length(1, unbounded);
+  table.add(ParameterType::numbers, "times", "s", "A frame at the first step at or after each of these times, ascending.")
+      .at_least(0)
+      .length(1, unbounded);
   table.integer("history_every", "Steps between samples; 0: as the integrator suggests.").at_least(0).by_default("0");
   table.integer("checkpoint_every", "Steps between checkpoints; 0: none.").at_least(0).by_default("0");
-  table.add(ParameterType::texts, "fields", "-", "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if any).")
-      .length(1, unbounded).choices = point_fields;
+  table
+      .add(ParameterType::texts, "fields", "-",
+           "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if "
+           "any).")
+      .length(1, unbounded)
+      .choices = point_fields;
   table.at_most_of(1, {"frames", "every", "times"});
   return table;
 }
@@ -184,24 +210,23 @@ const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
     ParameterTable top = head_parameters();
     const ParameterTable model = model_parameters();
     for (const Parameter& part : model.parameters()) top.add(part.type, part.name, part.unit, part.text) = part;
-    return std::vector<std::pair<std::string, ParameterTable>>{
-        {"", top},
-        {"constants", {}},
-        {"body", body_parameters(0)},
-        {"body.lattice", lattice_parameters()},
-        {"body.points", points_parameters()},
-        {"sets", set_parameters()},
-        {"family", family_parameters()},
-        {"kinematics", common_part_parameters(Kind::kinematics)},
-        {"region", region_parameters()},
-        {"damage", common_part_parameters(Kind::damage)},
-        {"crack", crack_parameters()},
-        {"initial", initial_parameters()},
-        {"boundary", boundary_parameters()},
-        {"load", load_parameters()},
-        {"output", output_parameters()},
-        {"output.history", history_parameters()},
-        {"run", run_parameters()}};
+    return std::vector<std::pair<std::string, ParameterTable>>{{"", top},
+                                                               {"constants", {}},
+                                                               {"body", body_parameters(0)},
+                                                               {"body.lattice", lattice_parameters()},
+                                                               {"body.points", points_parameters()},
+                                                               {"sets", set_parameters()},
+                                                               {"family", family_parameters()},
+                                                               {"kinematics", common_part_parameters(Kind::kinematics)},
+                                                               {"region", region_parameters()},
+                                                               {"damage", common_part_parameters(Kind::damage)},
+                                                               {"crack", crack_parameters()},
+                                                               {"initial", initial_parameters()},
+                                                               {"boundary", boundary_parameters()},
+                                                               {"load", load_parameters()},
+                                                               {"output", output_parameters()},
+                                                               {"output.history", history_parameters()},
+                                                               {"run", run_parameters()}};
   }();
   return sections;
 }

@@ -5,9 +5,9 @@
 
 namespace perikit {
 
-ParameterTable head_parameters();                     ///< format, title, plugins
-ParameterTable model_parameters();                    ///< the parts at the top level
-ParameterTable body_parameters(int dimension);        ///< keys that fit the dimension; 0: all
+ParameterTable head_parameters();               ///< format, title, plugins
+ParameterTable model_parameters();              ///< the parts at the top level
+ParameterTable body_parameters(int dimension);  ///< keys that fit the dimension; 0: all
 ParameterTable lattice_parameters();
 ParameterTable points_parameters();
 ParameterTable set_parameters();

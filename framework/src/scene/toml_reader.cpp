@@ -13,10 +13,7 @@
 namespace perikit {
 
 std::string found(const toml::node& node) {
-  if (const auto* v = node.as_string()) {
-    const std::string& text = v->get();
-    return "the string " + toml_string(text.size() <= 60 ? text : text.substr(0, 60) + "...");
-  }
+  if (const auto* v = node.as_string()) return "the string " + toml_string(excerpt(v->get()));
   if (const auto* v = node.as_integer()) return fmt::format("the integer {}", v->get());
   if (const auto* v = node.as_floating_point()) return fmt::format("the number {}", toml_number(v->get()));
   if (const auto* v = node.as_boolean()) return fmt::format("the boolean {}", v->get());
@@ -102,14 +99,17 @@ std::vector<std::string> TomlReader::check_group(const ParameterGroup& group, co
   for (const std::string& name : group.names) {
     const Parameter* parameter = parameters.find(name);
     if (table.contains(name) || !parameter || parameter->default_text.empty()) continue;
-    if (used < limit) ++used;
-    else without_room.push_back(name);
+    if (used < limit)
+      ++used;
+    else
+      without_room.push_back(name);
   }
   if (used > limit || (group.count > 0 && used < limit)) {
     const std::string what =
         given.empty() ? "none of them" : fmt::format("{}{}", fmt::join(given, ", "), used < limit ? " only" : "");
-    errors.add(at, path, fmt::format("found {}; allowed: {} {} of {}", what, group.count > 0 ? "exactly" : "at most", limit,
-                                     fmt::join(group.names, ", ")));
+    errors.add(at, path,
+               fmt::format("found {}; allowed: {} {} of {}", what, group.count > 0 ? "exactly" : "at most", limit,
+                           fmt::join(group.names, ", ")));
   }
   return without_room;
 }
@@ -119,14 +119,16 @@ std::shared_ptr<const PartValues> TomlReader::part(Kind kind, const toml::node& 
   if (const auto* type = node.as_string()) return part(kind, type->get(), {}, path, path, position(node));
   const toml::table* table = node.as_table();
   if (!table) {
-    refuse(node, path, fmt::format("found {}; allowed: the name of a {} or a table {{ type = \"name\", ... }}; known: {}",
-                                   found(node), name(kind), names));
+    Parameter part_parameter;
+    part_parameter.type = ParameterType::part;
+    part_parameter.kind = kind;
+    refuse(node, path, fmt::format("found {}; allowed: {}; known: {}", found(node), allowed(part_parameter), names));
     return nullptr;
   }
   const toml::node* type = table->get("type");
   if (!type || !type->is_string()) {
     refuse(type ? *type : node, join_path(path, "type"),
-           fmt::format("found {}; allowed: the name of a {}; known: {}", type ? found(*type) : "nothing", name(kind), names));
+           fmt::format("found {}; allowed: the name of one; known: {}", type ? found(*type) : "nothing", names));
     return nullptr;
   }
   return part(kind, type->as_string()->get(), *table, path, join_path(path, "type"), position(*type));

@@ -19,8 +19,8 @@ class TomlReader {
   TomlReader(PartCatalogue& parts, std::string file) : parts_(parts), file_(std::move(file)) {}
 
   Diagnostics errors;
-  Constants constants;   ///< known to expressions
-  int dimension = 0;     ///< of the body; 0: not known, lengths are not checked
+  Constants constants;  ///< known to expressions
+  int dimension = 0;    ///< of the body; 0: not known, lengths are not checked
 
   SourcePosition position(const toml::source_region& source) const;
   SourcePosition position(const toml::node& node) const { return position(node.source()); }
@@ -55,11 +55,12 @@ class TomlReader {
   std::optional<std::variant<double, std::string>> expression(const Parameter& parameter, const toml::node& node,
                                                               const std::string& path);
   template <class T, class ReadElement>
-  std::optional<ParameterValue> list(const Parameter& parameter, const toml::node& node, const std::string& path, ReadElement element);
+  std::optional<ParameterValue> list(const Parameter& parameter, const toml::node& node, const std::string& path,
+                                     ReadElement element);
 
   PartCatalogue& parts_;
   std::string file_;
-  std::optional<SourcePosition> default_position_;   ///< while a default is read: errors point at its table
+  std::optional<SourcePosition> default_position_;  ///< while a default is read: errors point at its table
 };
 
 /// What stands there, for messages: `the string "abc"`, `the integer 3`, `a table`.

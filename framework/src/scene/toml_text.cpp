@@ -11,13 +11,25 @@ std::string toml_string(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
     const auto code = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') quoted += fmt::format("\\{}", c);
-    else if (c == '\n') quoted += "\\n";
-    else if (c == '\t') quoted += "\\t";
-    else if (code < 0x20 || code == 0x7f) quoted += fmt::format("\\u{:04X}", code);
-    else quoted += c;
+    if (c == '"' || c == '\\')
+      quoted += fmt::format("\\{}", c);
+    else if (c == '\n')
+      quoted += "\\n";
+    else if (c == '\t')
+      quoted += "\\t";
+    else if (code < 0x20 || code == 0x7f)
+      quoted += fmt::format("\\u{:04X}", code);
+    else
+      quoted += c;
   }
   return quoted + '"';
+}
+
+std::string excerpt(const std::string& text) {
+  std::size_t end = 80;
+  if (text.size() <= end) return text;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end) + "...";
 }
 
 std::string toml_number(double value) {

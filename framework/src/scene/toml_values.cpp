@@ -20,12 +20,23 @@ bool in_range(const Parameter& p, double v) {
 Parameter element_of(const Parameter& list) {
   Parameter element = list;
   switch (list.type) {
-    case ParameterType::numbers: element.type = ParameterType::number; break;
-    case ParameterType::integers: element.type = ParameterType::integer; break;
-    case ParameterType::expressions: element.type = ParameterType::expression; break;
-    case ParameterType::components: element.type = ParameterType::component; break;
-    case ParameterType::points: element.type = ParameterType::numbers; break;
-    default: element.type = list.choices.empty() ? ParameterType::text : ParameterType::choice;
+    case ParameterType::numbers:
+      element.type = ParameterType::number;
+      break;
+    case ParameterType::integers:
+      element.type = ParameterType::integer;
+      break;
+    case ParameterType::expressions:
+      element.type = ParameterType::expression;
+      break;
+    case ParameterType::components:
+      element.type = ParameterType::component;
+      break;
+    case ParameterType::points:
+      element.type = ParameterType::numbers;
+      break;
+    default:
+      element.type = list.choices.empty() ? ParameterType::text : ParameterType::choice;
   }
   if (list.type == ParameterType::points) element.length(0, std::numeric_limits<std::size_t>::max());
   return element;
@@ -35,12 +46,13 @@ Parameter element_of(const Parameter& list) {
 
 void TomlReader::refuse_value(const Parameter& parameter, const toml::node& node, const std::string& path) {
   std::string hint;
-  if (const auto* text = node.as_string(); text && !parameter.choices.empty()) hint = did_you_mean(text->get(), parameter.choices);
+  if (const auto* text = node.as_string(); text && !parameter.choices.empty())
+    hint = did_you_mean(text->get(), parameter.choices);
   refuse(node, path, fmt::format("found {}; allowed: {}{}", found(node), allowed(parameter), hint));
 }
 
 std::optional<double> TomlReader::number(const Parameter& parameter, const toml::node& node, const std::string& path) {
-  std::optional<double> number;   // toml++'s value<double>() would take more than these two
+  std::optional<double> number;  // toml++'s value<double>() would take more than these two
   if (const auto* v = node.as_floating_point()) number = v->get();
   if (const auto* v = node.as_integer()) number = static_cast<double>(v->get());
   if (number && std::isfinite(*number) && in_range(parameter, *number)) return number;
@@ -89,11 +101,12 @@ std::optional<ParameterValue> TomlReader::list(const Parameter& parameter, const
     refuse_value(parameter, node, path);
     return std::nullopt;
   }
-  const bool each_axis = parameter.type == ParameterType::components ||
-                         (parameter.per_axis && parameter.type != ParameterType::points);
+  const bool each_axis =
+      parameter.type == ParameterType::components || (parameter.per_axis && parameter.type != ParameterType::points);
   const std::size_t size = array->size();
   if (each_axis && dimension > 0 && size != static_cast<std::size_t>(dimension)) {
-    refuse(node, path, fmt::format("found a list of {}; allowed: a list of {}, one for each dimension of the body", size, dimension));
+    refuse(node, path,
+           fmt::format("found a list of {}; allowed: a list of {}, one for each dimension of the body", size, dimension));
     return std::nullopt;
   }
   if (size < parameter.min_length || size > parameter.max_length) {
@@ -122,18 +135,25 @@ std::optional<ParameterValue> TomlReader::value(const Parameter& p, const toml::
     return std::visit([](const auto& v) { return ParameterValue(v); }, *read);
   };
   switch (p.type) {
-    case ParameterType::number: return as_value(number(p, node, path));
-    case ParameterType::integer: return as_value(integer(p, node, path));
+    case ParameterType::number:
+      return as_value(number(p, node, path));
+    case ParameterType::integer:
+      return as_value(integer(p, node, path));
     case ParameterType::text:
-    case ParameterType::choice: return as_value(text(p, node, path));
+    case ParameterType::choice:
+      return as_value(text(p, node, path));
     case ParameterType::expression:
-    case ParameterType::component: return read_expression();
+    case ParameterType::component:
+      return read_expression();
     case ParameterType::expressions:
-    case ParameterType::components: return list<std::variant<double, std::string>>(p, node, path, one_expression);
-    case ParameterType::numbers: return list<double>(p, node, path, one_number);
+    case ParameterType::components:
+      return list<std::variant<double, std::string>>(p, node, path, one_expression);
+    case ParameterType::numbers:
+      return list<double>(p, node, path, one_number);
     case ParameterType::integers:
       return list<std::int64_t>(p, node, path, [this](const auto&... at) { return integer(at...); });
-    case ParameterType::texts: return list<std::string>(p, node, path, [this](const auto&... at) { return text(at...); });
+    case ParameterType::texts:
+      return list<std::string>(p, node, path, [this](const auto&... at) { return text(at...); });
     case ParameterType::points:
       return list<std::vector<double>>(p, node, path, [&](const Parameter& point, const toml::node& at, const std::string& key) {
         auto read = list<double>(point, at, key, one_number);

@@ -94,7 +94,8 @@ struct Scene {
   std::vector<SetDescription> sets;
   double horizon = 0;                        ///< [m]; 0: horizon_ratio given
   double horizon_ratio = 0;                  ///< to the lattice spacing (or mean spacing of a cloud)
-  std::shared_ptr<const PartValues> influence, kinematics, stabilization, material, damage, integrator;   ///< may be null: stabilization, damage
+  std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
+  std::shared_ptr<const PartValues> stabilization, damage;   ///< null where the scene has none
   std::vector<RegionDescription> regions;
   std::vector<CrackDescription> cracks;
   std::vector<std::string> no_fail;          ///< [damage] no_fail
@@ -117,7 +118,8 @@ struct SceneOptions {
 /// Throws InputErrors with every error found, each with file, line, column, key, what was found and what is allowed.
 Scene read_scene(const std::filesystem::path& file, PartCatalogue& parts, const SceneOptions& options = {});
 /// The same from memory; `file` is only used in messages and for relative paths.
-Scene parse_scene(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts, const SceneOptions& options = {});
+Scene parse_scene(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts,
+                  const SceneOptions& options = {});
 
 /// Checked values of one part from TOML text of its table without `type` - for contract suites and tests.
 /// Throws InputErrors.

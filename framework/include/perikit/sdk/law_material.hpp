@@ -26,6 +26,14 @@
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/free_stretch.hpp"
 
+// Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
+// checks in the inlined bodies would take minutes to compile.
+#if defined(__SANITIZE_ADDRESS__)
+#define PERIKIT_FLATTEN
+#else
+#define PERIKIT_FLATTEN [[gnu::flatten]]
+#endif
+
 namespace perikit {
 
 template <class Law>
@@ -86,9 +94,8 @@ class LawMaterial final : public Material {
     }
   }
 
-  // flatten: the tensors of a point live in registers only where nothing is called
   template <class S, bool free_stretch>
-  [[gnu::flatten]] Status run(const MaterialBatch& b) const noexcept {
+  PERIKIT_FLATTEN Status run(const MaterialBatch& b) const noexcept {
     Status status;
     Constants k = load_constants(b, 0);
     Pack ratio = 0.0;
@@ -127,7 +134,7 @@ class LawMaterial final : public Material {
   }
 
   template <class S, bool free_stretch>
-  [[gnu::noinline, gnu::flatten]] void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
+  [[gnu::noinline]] PERIKIT_FLATTEN void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
                                                 const Constants& k) const noexcept {
     const auto action = [&] {
       if constexpr (free_stretch)
