@@ -23,7 +23,8 @@ endfunction()
 function(perikit_add_plugin name)
   add_library(${name} MODULE ${ARGN})
   target_link_libraries(${name} PRIVATE perikit::perikit)
-  target_link_options(${name} PRIVATE -Wl,-z,defs)
+  # Every plugin asks the loader for its libperikit.so.<ABI>, even one that uses no symbol of it.
+  target_link_options(${name} PRIVATE -Wl,-z,defs -Wl,--no-as-needed)
   perikit_compile_options(${name})
   # Built with the rpath it is installed with: an installed plugin is byte for byte the one that its manifest was written for.
   set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ".so" CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON

@@ -67,7 +67,7 @@ struct Registry::Implementation {
   /// The manifest of exactly this file, if there is one. A stale one says nothing; an unreadable one is refused by name.
   std::optional<Manifest> manifest_of(const fs::path& library) {
     const fs::path file = manifest_path(library);
-    if (!fs::exists(file)) return std::nullopt;
+    if (std::error_code failed; !fs::exists(file, failed)) return std::nullopt;
     try {
       Manifest manifest = read_manifest(file);
       if (manifest.matches(library)) return manifest;
