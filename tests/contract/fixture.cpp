@@ -70,6 +70,22 @@ void set_field(const Body& body, FieldView field, const std::function<Point(cons
   }
 }
 
+void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
+  Noise random(seed);
+  std::array<std::array<double, 3>, 3> G{};
+  for (auto& row : G)
+    for (double& g : row) g = 0.08 * random();
+  const double s = body.spacing();
+  set_field(body, u, [&](const Point& x) {
+    Point v{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < static_cast<std::size_t>(body.dimension()); ++b) v[a] += G[a][b] * x[b];
+      v[a] += noise * s * random();
+    }
+    return v;
+  });
+}
+
 double dot(const Body& body, ConstFieldView a, ConstFieldView b) {
   double sum = 0;
   for (const std::int32_t p : body.internal())
