@@ -43,6 +43,8 @@ struct BodyOptions {
   double horizon_ratio = 2.515;
   std::string plane = "strain";
   std::string integrator = "type = \"evaluate\"";
+  std::string sets;           ///< further lines of [sets]
+  std::string conditions;     ///< further sections: initial, boundaries, loads
 };
 
 /// Scene text for a kinematics (its table, `type` included).
