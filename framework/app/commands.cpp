@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "bench.hpp"
 #include "describe.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
@@ -82,6 +83,22 @@ void describe(const Options& options) {
   fmt::print("{}", describe_part(*registry, options.part));
 }
 
+void draw(const Options& options) {
+  PlotOptions plot_options = options.plot;
+  if (options.frame >= 0) plot_options.frame = options.frame;
+  if (!options.unit.empty()) plot_options.unit = options.unit;
+  if (options.view.size() == 3) plot_options.view = {options.view[0], options.view[1], options.view[2]};
+  if (options.range.size() == 2) plot_options.range = {{options.range[0], options.range[1]}};
+  plot_options.output = options.output;
+  fmt::print("{}\n", plot(plot_options).string());
+}
+
+void measure(const Options& options) {
+  const auto registry = open_registry(options);
+  if (options.threads > 0) set_thread_count(options.threads);
+  bench(*registry, options.kinematics, options.dimension, options.cells);
+}
+
 }  // namespace
 
 std::string version() { return PERIKIT_VERSION; }
@@ -105,6 +122,21 @@ void add_commands(CLI::App& app, Options& options) {
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
+  CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", draw);
+  plot_command->add_option("results", options.plot.results, "Folder of a run, or its results.h5")->required();
+  plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")->capture_default_str();
+  plot_command->add_option("--component", options.plot.component, "x, y, z, magnitude; xx ... zz, von_mises, trace, determinant");
+  plot_command->add_option("--frame", options.frame, "Frame index; default: the last one");
+  plot_command->add_option("--deformed", options.plot.deformed, "Factor of the displacement that is added to the positions");
+  plot_command->add_option("--view", options.view, "3D: direction from the body to the eye")->expected(3);
+  plot_command->add_option("--range", options.range, "Ends of the colour scale")->expected(2);
+  plot_command->add_option("--unit", options.unit, "Unit to show, where the scene is not in SI");
+  plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf");
+  CLI::App* bench_command = add("bench", "Speed of the kernels beside the limits of this machine", measure);
+  bench_command->add_option("--kinematics", options.kinematics, "Which; default: all known ones");
+  bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
+  bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
+  bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
   add("describe", "Describe a part: parameters, equations, source, limits", describe)->add_option("part", options.part, "KIND/NAME")->required();
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "perikit/output/plot.hpp"
+
 namespace perikit::app {
 
 struct Options {
@@ -14,6 +16,12 @@ struct Options {
   int threads = 0;
   bool explain = false, quiet = false, trust = false;
   std::string kind, part;
+  PlotOptions plot;
+  std::int64_t frame = -1;
+  std::string unit;
+  std::vector<double> view, range;
+  std::vector<std::string> kinematics;
+  int dimension = 3, cells = 32;
   std::function<void(const Options&)> command;
 };
 

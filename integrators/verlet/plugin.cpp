@@ -22,7 +22,7 @@ PERIKIT_PLUGIN(registrar) {
         VerletOptions options;
         options.end_time = values.number("end_time");
         if (values.has("time_step")) options.time_step = values.number("time_step");
-        options.safety = values.number("safety");
+        if (values.has("safety")) options.safety = values.number("safety");
         options.bond_based = values.text("estimate") == "bond_based";
         options.check_every = values.integer("check_every");
         return std::make_unique<Verlet>(options);

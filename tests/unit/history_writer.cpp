@@ -43,7 +43,8 @@ TEST_CASE("a value that is not finite is an error that names its column, not a r
   const auto file = folder.path / "history.csv";
   HistoryWriter writer(file, columns);
   writer.row(std::vector{0.0, 1.0});
-  CHECK_THROWS_WITH_AS(writer.row(std::vector{0.5, std::nan("")}), doctest::Contains("column 'tip_uy' is nan where time = 0.5"), RunError);
+  CHECK_THROWS_WITH_AS(writer.row(std::vector{0.5, std::nan("")}), doctest::Contains("column 'tip_uy' is nan where time = 0.5"),
+                       RunError);
   CHECK_THROWS_AS(writer.row(std::vector{0.5, std::numeric_limits<double>::infinity()}), RunError);
   CHECK_THROWS_AS(writer.row(std::vector{0.5}), RunError);
   CHECK(read_text(file) == "time,tip_uy\n0,1\n");
@@ -70,7 +71,8 @@ TEST_CASE("names that would break the table are refused") {
   const TemporaryFolder folder;
   CHECK_THROWS_AS(HistoryWriter(folder.path / "h.csv", {"time", "a,b"}), InputError);
   CHECK_THROWS_AS(HistoryWriter(folder.path / "h.csv", {"time", ""}), InputError);
-  CHECK_THROWS_WITH_AS(HistoryWriter(folder.path / "h.csv", {"time", "pull", "pull"}), doctest::Contains("appears twice"), InputError);
+  CHECK_THROWS_WITH_AS(HistoryWriter(folder.path / "h.csv", {"time", "pull", "pull"}), doctest::Contains("appears twice"),
+                       InputError);
 }
 
 TEST_CASE("a row that does not fit on the disk leaves no torn line") {
@@ -84,7 +86,8 @@ TEST_CASE("a row that does not fit on the disk leaves no torn line") {
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{before_text.size() + 3, before.rlim_max};
   ::setrlimit(RLIMIT_FSIZE, &small);
-  CHECK_THROWS_WITH_AS(writer.row(std::vector{1.0 / 3.0, 1.0}), doctest::Contains("history.csv: cannot write: File too large"), RunError);
+  CHECK_THROWS_WITH_AS(writer.row(std::vector{1.0 / 3.0, 1.0}), doctest::Contains("history.csv: cannot write: File too large"),
+                       RunError);
   ::setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   CHECK(read_text(file) == before_text);

@@ -34,7 +34,8 @@ std::string fault(const std::string& text, int dimension = 3) {
 }  // namespace
 
 TEST_CASE("columns in any order, comments, blank lines, CRLF, a byte order mark, a last line without end") {
-  const PointCloud cloud = read("\xEF\xBB\xBF# from a mesh\r\n\r\nvolume, z ,\"x\",y\r\n1e-3,3,1,+2\r\n \t\r\n 2, -6 , 4,5 # last");
+  const PointCloud cloud =
+      read("\xEF\xBB\xBF# from a mesh\r\n\r\nvolume, z ,\"x\",y\r\n1e-3,3,1,+2\r\n \t\r\n 2, -6 , 4,5 # last");
   REQUIRE(cloud.volume == std::vector<double>{1e-3, 2});
   CHECK(cloud.position[0] == std::array<double, 3>{1, 2, 3});
   CHECK(cloud.position[1] == std::array<double, 3>{4, 5, -6});
@@ -43,7 +44,8 @@ TEST_CASE("columns in any order, comments, blank lines, CRLF, a byte order mark,
 TEST_CASE("lower dimensions need no further components, and allow only zeros there") {
   CHECK(read("x,volume\n1,2\n", 1).position[0] == std::array<double, 3>{1, 0, 0});
   CHECK(read("x,y,z,volume\n1,2,0,4\n", 2).position[0] == std::array<double, 3>{1, 2, 0});
-  CHECK(fault("x,y,z,volume\n1,2,3,4\n", 2) == "cloud.csv:2:5: z: found 3; must be 0 (or no column at all) in a body of dimension 2");
+  CHECK(fault("x,y,z,volume\n1,2,3,4\n", 2) ==
+        "cloud.csv:2:5: z: found 3; must be 0 (or no column at all) in a body of dimension 2");
 }
 
 TEST_CASE("faults name file, line, column and what was found") {
@@ -62,7 +64,8 @@ TEST_CASE("faults name file, line, column and what was found") {
   CHECK(fault("x,volume\nnan,2\n", 1) == "cloud.csv:2:1: x: found nan; must be finite");
   CHECK(fault("x,volume\n1,-inf\n", 1) == "cloud.csv:2:3: volume: found -inf; must be finite");
   CHECK(fault("x,volume\n1,2\n1,0\n", 1) == "cloud.csv:3:3: volume: found 0; must be > 0");
-  CHECK_THROWS_WITH_AS(read_points("/no/such/cloud.csv", 3), "/no/such/cloud.csv: cannot be read: No such file or directory", InputError);
+  CHECK_THROWS_WITH_AS(read_points("/no/such/cloud.csv", 3), "/no/such/cloud.csv: cannot be read: No such file or directory",
+                       InputError);
   CHECK_THROWS_WITH_AS(read_points("/", 3), doctest::Contains("Is a directory"), InputError);
 }
 

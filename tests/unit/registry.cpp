@@ -15,7 +15,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-fs::path built(const std::string& name) { return fs::path(PERIKIT_TEST_PLUGIN_FOLDER) / name / (name + ".so"); }
+fs::path built(const std::string& name) {
+  return fs::path(PERIKIT_TEST_PLUGIN_FOLDER) / name / (name + ".so");
+}
 
 std::string bytes(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -88,8 +90,8 @@ TEST_CASE("a truncated library is refused at every length") {
   const Folder folder;
   const std::string whole = bytes(built("good"));
   REQUIRE(whole.size() > 4096);
-  for (const std::size_t length : {std::size_t{5}, std::size_t{20}, std::size_t{64}, std::size_t{200}, whole.size() / 4, whole.size() / 2,
-                                   3 * whole.size() / 4, whole.size() - 100, whole.size() - 1}) {
+  for (const std::size_t length : {std::size_t{5}, std::size_t{20}, std::size_t{64}, std::size_t{200}, whole.size() / 4,
+                                   whole.size() / 2, 3 * whole.size() / 4, whole.size() - 100, whole.size() - 1}) {
     CAPTURE(length);
     check_refused(folder.write("half_" + std::to_string(length) + ".so", whole.substr(0, length)), "truncated");
   }
@@ -147,7 +149,8 @@ TEST_CASE("a duplicate is refused with both files named, and whole") {
 TEST_CASE("a duplicate named by manifests is refused without opening either") {
   const Folder folder;
   write_manifest(folder.copy("good", "a.so"), {{Kind::influence, "sound", "first"}});
-  write_manifest(folder.copy("duplicate", "b.so"), {{Kind::influence, "before_sound", "own"}, {Kind::influence, "sound", "second"}});
+  write_manifest(folder.copy("duplicate", "b.so"),
+                 {{Kind::influence, "before_sound", "own"}, {Kind::influence, "sound", "second"}});
   Registry registry;
   registry.add_folder(folder.path);
   CHECK(registry.opened().empty());
@@ -162,7 +165,8 @@ TEST_CASE("a library is opened only when one of its parts is asked for, once") {
   const fs::path library = folder.copy("good", "good.so");
   write_manifest(library, {{Kind::influence, "sound", "omega = 1"}});
   folder.copy("bad_factories", "other.so");
-  write_manifest(folder.path / "other.so", {{Kind::influence, "null", ""}, {Kind::influence, "throws", ""}, {Kind::influence, "explains", ""}});
+  write_manifest(folder.path / "other.so",
+                 {{Kind::influence, "null", ""}, {Kind::influence, "throws", ""}, {Kind::influence, "explains", ""}});
   Registry registry;
   registry.add_folder(folder.path);
   CHECK(registry.refused().empty());
@@ -196,8 +200,9 @@ TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and t
   }
   SUBCASE("manifest unreadable") {
     const std::string wrong_kind = std::string(good).replace(good.find("'influence'"), 11, "'elephants'");
-    for (const std::string& content : {std::string("format = "), std::string("\0\xff\xfe", 3), std::string(), std::string("format = 1"),
-                                       std::string("format = 7"), good.substr(0, good.size() / 2), wrong_kind, std::string(2 << 20, '#')}) {
+    for (const std::string& content :
+         {std::string("format = "), std::string("\0\xff\xfe", 3), std::string(), std::string("format = 1"),
+          std::string("format = 7"), good.substr(0, good.size() / 2), wrong_kind, std::string(2 << 20, '#')}) {
       folder.write("good.parts", content);
       Registry registry;
       registry.add_folder(folder.path);
@@ -263,5 +268,6 @@ TEST_CASE("search path: given folders, the environment, the folder beside the li
   CHECK(path[1] == "/one");
   CHECK(path[2] == "/two");
   if (fs::is_directory(PERIKIT_PLUGIN_FOLDER)) CHECK(path.back() == fs::weakly_canonical(PERIKIT_PLUGIN_FOLDER));
-  CHECK(error_of([] { Registry().add_folder("/no/such/folder"); }).find("/no/such/folder: this plugin folder cannot be read") == 0);
+  CHECK(error_of([] { Registry().add_folder("/no/such/folder"); }).find("/no/such/folder: this plugin folder cannot be read") ==
+        0);
 }

@@ -47,7 +47,9 @@ void add(PointCloud& cloud, const Row& row) {
   cloud.volume.push_back(row[volume_column]);
 }
 
-bool required(int column, int dimension) { return column == volume_column || column < dimension; }
+bool required(int column, int dimension) {
+  return column == volume_column || column < dimension;
+}
 
 std::string wanted_columns(int dimension) {
   std::vector<std::string> names;
@@ -123,7 +125,8 @@ class CsvReader {
       if (cell.size() > 1 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
       const auto known = std::find(column_names.begin(), column_names.end(), cell);
       if (known == column_names.end()) {
-        refuse(where, "", fmt::format("found column '{}'; allowed are x,y,z,volume{}", cell, did_you_mean(cell, column_names)), line_);
+        refuse(where, "", fmt::format("found column '{}'; allowed are x,y,z,volume{}", cell, did_you_mean(cell, column_names)),
+               line_);
       }
       const int column = static_cast<int>(known - column_names.begin());
       if (std::find(order_.begin(), order_.end(), column) != order_.end()) {
@@ -133,8 +136,10 @@ class CsvReader {
     }
     for (int c = 0; c < 4; ++c) {
       if (required(c, dimension_) && std::find(order_.begin(), order_.end(), c) == order_.end()) {
-        refuse(line_start(), "", fmt::format("no column '{}' in '{}'; must be {}", column_names[static_cast<std::size_t>(c)],
-                                             trimmed(content_), wanted_columns(dimension_)), line_);
+        refuse(line_start(), "",
+               fmt::format("no column '{}' in '{}'; must be {}", column_names[static_cast<std::size_t>(c)], trimmed(content_),
+                           wanted_columns(dimension_)),
+               line_);
       }
     }
   }
@@ -166,7 +171,8 @@ class CsvReader {
     if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-') digits.remove_prefix(1);
     double value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error == std::errc::result_out_of_range) refuse(cell.data(), column, fmt::format("found {}; beyond double precision", cell), line_);
+    if (error == std::errc::result_out_of_range)
+      refuse(cell.data(), column, fmt::format("found {}; beyond double precision", cell), line_);
     if (error != std::errc() || end != digits.data() + digits.size()) {
       refuse(cell.data(), column, fmt::format("found '{}'; must be a number", cell), line_);
     }
@@ -205,7 +211,8 @@ PointCloud read_hdf5(const std::filesystem::path& file, int dimension) {
   PointCloud cloud;
   for (std::size_t i = 0; i < volume.size(); ++i) {
     const Row row{columns[0][i], columns[1][i], columns[2][i], volume[i]};
-    if (const std::optional<Fault> fault = fault_of(row, dimension)) refuse(fault->column, fmt::format("point {}: {}", i, fault->message));
+    if (const std::optional<Fault> fault = fault_of(row, dimension))
+      refuse(fault->column, fmt::format("point {}: {}", i, fault->message));
     add(cloud, row);
   }
   return cloud;

@@ -34,7 +34,9 @@ Descriptor::~Descriptor() {
   if (value_ >= 0) ::close(value_);
 }
 
-int Descriptor::release() noexcept { return std::exchange(value_, -1); }
+int Descriptor::release() noexcept {
+  return std::exchange(value_, -1);
+}
 
 void throw_system_error(const std::filesystem::path& file, const std::string& action, int code) {
   throw RunError(fmt::format("{}: {}: {}", file.string(), action, std::generic_category().message(code)));

@@ -19,7 +19,7 @@ namespace {
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (!error && !fs::is_directory(folder)) error = std::make_error_code(std::errc::not_a_directory);
+  if (!error && !fs::is_directory(folder, error) && !error) error = std::make_error_code(std::errc::not_a_directory);
   if (error) throw_system_error(folder, "cannot create the folder", error.value());
 }
 
@@ -32,7 +32,10 @@ void remove_file(const fs::path& file) {
 /// Frames from `first_frame` on, and temporaries that a killed run left behind.
 void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
   std::vector<fs::path> stale;
-  for (const fs::directory_entry& entry : fs::directory_iterator(frames)) {
+  std::error_code error;
+  fs::directory_iterator entries(frames, error);
+  if (error) throw_system_error(frames, "cannot list the folder", error.value());
+  for (const fs::directory_entry& entry : entries) {
     const std::string name = entry.path().filename().string();
     const bool frame = entry.path().extension() == ".h5" && frame_index(entry.path().stem().string()) >= first_frame;
     if (frame || (name.starts_with('.') && name.ends_with(".h5.part"))) stale.push_back(entry.path());
@@ -140,7 +143,8 @@ void FrameWriter::write(double time, std::int64_t step, std::span<const OutputFi
     for (const OutputField& field : fields) {
       if (field.data.size() != self.points * static_cast<std::size_t>(field.width)) {
         throw RunError(fmt::format("{}: field '{}' has {} values; {} points of width {} need {}", file.string(), field.name,
-                                   field.data.size(), self.points, field.width, self.points * static_cast<std::size_t>(field.width)));
+                                   field.data.size(), self.points, field.width,
+                                   self.points * static_cast<std::size_t>(field.width)));
       }
       image.dataset(field.name, field.data, field.width);
       listed.push_back({field.name, field.width});
@@ -153,6 +157,8 @@ void FrameWriter::write(double time, std::int64_t step, std::span<const OutputFi
   ++self.frames;
 }
 
-std::int64_t FrameWriter::frames() const noexcept { return implementation_->frames; }
+std::int64_t FrameWriter::frames() const noexcept {
+  return implementation_->frames;
+}
 
 }  // namespace perikit

@@ -1,14 +1,13 @@
 #include "output/hdf5_file.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <system_error>
 #include <utility>
-
-#include <unistd.h>
 
 #include "perikit/core/errors.hpp"
 
@@ -17,7 +16,9 @@ namespace perikit::hdf5 {
 namespace {
 
 /// HDF5 prints its error stack by itself unless told not to; ours are thrown.
-void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void silence() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 Handle checked(hid_t id, Handle::Close close, const std::string& what) {
   if (id < 0) throw RunError(fmt::format("HDF5 cannot create {}", what));
@@ -109,7 +110,9 @@ void Image::external_link(const std::string& path, const std::string& file) {
   check(H5Lcreate_external(file.c_str(), "/", file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT), path);
 }
 
-bool Image::contains(const std::string& path) const { return H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0; }
+bool Image::contains(const std::string& path) const {
+  return H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0;
+}
 
 std::span<const std::byte> Image::bytes() {
   check(H5Fflush(file_.get(), H5F_SCOPE_LOCAL), "a file in memory");
@@ -147,15 +150,16 @@ std::vector<std::string> Source::names(const std::string& group, bool datasets_o
   if (datasets_only) {
     std::erase_if(names, [&](const std::string& name) {
       H5O_info_t info;
-      return H5Oget_info_by_name2(handle.get(), name.c_str(), &info, H5O_INFO_BASIC, H5P_DEFAULT) < 0 || info.type != H5O_TYPE_DATASET;
+      return H5Oget_info_by_name2(handle.get(), name.c_str(), &info, H5O_INFO_BASIC, H5P_DEFAULT) < 0 ||
+             info.type != H5O_TYPE_DATASET;
     });
   }
   return names;
 }
 
 bool Source::contains(const std::string& path) const {
-  return path == "/" || (H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0 &&
-                         H5Oexists_by_name(file_.get(), path.c_str(), H5P_DEFAULT) > 0);
+  return path == "/" ||
+         (H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0 && H5Oexists_by_name(file_.get(), path.c_str(), H5P_DEFAULT) > 0);
 }
 
 Handle Source::dataset(const std::string& path) const {
@@ -181,7 +185,8 @@ Source::Array Source::read(const std::string& path) const {
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(path, "must hold numbers");
   array.data.resize(array.rows() * static_cast<std::size_t>(array.width()));
-  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0) refuse(path, "cannot be read");
+  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
+    refuse(path, "cannot be read");
   return array;
 }
 
@@ -193,13 +198,15 @@ Handle Source::attribute(const std::string& group, const std::string& name) cons
 
 double Source::real(const std::string& group, const std::string& name) const {
   double value = 0;
-  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_DOUBLE, &value) < 0) refuse(group, fmt::format("'{}' is not a number", name));
+  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_DOUBLE, &value) < 0)
+    refuse(group, fmt::format("'{}' is not a number", name));
   return value;
 }
 
 std::int64_t Source::integer(const std::string& group, const std::string& name) const {
   std::int64_t value = 0;
-  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_INT64, &value) < 0) refuse(group, fmt::format("'{}' is not a number", name));
+  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_INT64, &value) < 0)
+    refuse(group, fmt::format("'{}' is not a number", name));
   return value;
 }
 

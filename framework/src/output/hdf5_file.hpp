@@ -29,9 +29,9 @@ class Handle {
   Close close_ = nullptr;
 };
 
-/// A new file that lives in memory until `bytes` is stored by the caller: so every file takes the same way to the disk, errors of the
-/// disk come with the system's reason, and HDF5 is never left with a file that it cannot flush.
-/// Methods throw RunError (out of memory, or a name that is already there).
+/// A new file that lives in memory until `bytes` is stored by the caller: so every file takes the same way to the disk, errors of
+/// the disk come with the system's reason, and HDF5 is never left with a file that it cannot flush. Methods throw RunError (out
+/// of memory, or a name that is already there).
 class Image {
  public:
   Image();

@@ -16,15 +16,19 @@ namespace perikit {
 
 namespace {
 
-std::string header_line(const std::vector<std::string>& columns) { return fmt::format("{}\n", fmt::join(columns, ",")); }
+std::string header_line(const std::vector<std::string>& columns) {
+  return fmt::format("{}\n", fmt::join(columns, ","));
+}
 
 void check_columns(const std::filesystem::path& file, const std::vector<std::string>& columns) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const bool repeated = std::find(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(i), columns[i]) !=
                           columns.begin() + static_cast<std::ptrdiff_t>(i);
-    if (repeated) throw InputError({file.string(), 0, 0}, columns[i], "this column appears twice; every column needs its own name");
+    if (repeated)
+      throw InputError({file.string(), 0, 0}, columns[i], "this column appears twice; every column needs its own name");
     if (columns[i].empty() || columns[i].find_first_of(",\"#\r\n") != std::string::npos) {
-      throw InputError({file.string(), 0, 0}, columns[i], "a column's name must hold a text without comma, quote, # and line break");
+      throw InputError({file.string(), 0, 0}, columns[i],
+                       "a column's name must hold a text without comma, quote, # and line break");
     }
   }
 }
@@ -35,14 +39,16 @@ std::string kept_text(const std::filesystem::path& file, const std::string& head
   if (!stream) throw_system_error(file, "cannot read", errno);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!text.starts_with(header)) {
-    throw InputError({file.string(), 1, 1}, "", fmt::format("cannot be continued: found the columns {}; must be {}",
-                                                            text.substr(0, text.find('\n')), header.substr(0, header.size() - 1)));
+    throw InputError({file.string(), 1, 1}, "",
+                     fmt::format("cannot be continued: found the columns {}; must be {}", text.substr(0, text.find('\n')),
+                                 header.substr(0, header.size() - 1)));
   }
   std::size_t end = header.size();
   for (std::int64_t row = 0; row < rows; ++row) {
     const std::size_t line_end = text.find('\n', end);
     if (line_end == std::string::npos) {
-      throw InputError({file.string(), 0, 0}, "", fmt::format("cannot be continued: found {} rows; must be at least {}", row, rows));
+      throw InputError({file.string(), 0, 0}, "",
+                       fmt::format("cannot be continued: found {} rows; must be at least {}", row, rows));
     }
     end = line_end + 1;
   }
@@ -77,12 +83,13 @@ HistoryWriter::~HistoryWriter() {
 void HistoryWriter::row(std::span<const double> values) {
   Implementation& self = *implementation_;
   if (values.size() != self.columns.size()) {
-    throw RunError(fmt::format("{}: found {} values; there are {} columns", self.file.string(), values.size(), self.columns.size()));
+    throw RunError(
+        fmt::format("{}: found {} values; there are {} columns", self.file.string(), values.size(), self.columns.size()));
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::isfinite(values[i])) continue;
-    throw RunError(fmt::format("{}: column '{}' is {} where {} = {}", self.file.string(), self.columns[i], values[i], self.columns[0],
-                               values[0]));
+    throw RunError(fmt::format("{}: column '{}' is {} where {} = {}", self.file.string(), self.columns[i], values[i],
+                               self.columns[0], values[0]));
   }
   const std::string line = fmt::format("{}\n", fmt::join(values, ","));
   if (const int code = write_all(self.descriptor.get(), std::as_bytes(std::span(line)))) {

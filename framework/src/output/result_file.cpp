@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <system_error>
 
 #include "perikit/core/errors.hpp"
 
@@ -10,13 +11,20 @@ namespace perikit {
 
 namespace {
 
+bool is_folder(const std::filesystem::path& path) {
+  std::error_code no_access;
+  return std::filesystem::is_directory(path, no_access);
+}
+
 std::filesystem::path results_h5(const std::filesystem::path& results) {
-  return std::filesystem::is_directory(results) ? results / "results.h5" : results;
+  return is_folder(results) ? results / "results.h5" : results;
 }
 
 }  // namespace
 
-std::string frame_name(std::int64_t index) { return fmt::format("{:08}", index); }
+std::string frame_name(std::int64_t index) {
+  return fmt::format("{:08}", index);
+}
 
 std::int64_t frame_index(const std::string& name) {
   const bool digits = name.size() == 8 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -24,7 +32,7 @@ std::int64_t frame_index(const std::string& name) {
 }
 
 std::filesystem::path results_folder(const std::filesystem::path& results) {
-  return std::filesystem::is_directory(results) ? results : results.parent_path();
+  return is_folder(results) ? results : results.parent_path();
 }
 
 ResultFile::ResultFile(const std::filesystem::path& results) : path_(results_h5(results)), source_(path_) {

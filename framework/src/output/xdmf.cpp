@@ -11,11 +11,20 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
     }
   }
   return result;
@@ -23,8 +32,8 @@ std::string escaped(const std::string& text) {
 
 std::string data_item(const std::string& file, const std::string& name, std::size_t points, int width, const char* number) {
   const std::string shape = width > 1 ? fmt::format("{} {}", points, width) : fmt::format("{}", points);
-  return fmt::format("<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"8\" Dimensions=\"{}\">{}:/{}</DataItem>", number, shape,
-                     file, escaped(name));
+  return fmt::format("<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"8\" Dimensions=\"{}\">{}:/{}</DataItem>", number,
+                     shape, file, escaped(name));
 }
 
 std::string attribute(const std::string& file, const std::string& name, std::size_t points, int width, const char* number) {

@@ -1,10 +1,10 @@
 #include "plugin/manifest.hpp"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <array>
 #include <fstream>
-#include <toml++/toml.h>
 
 #include "perikit/plugin/abi.hpp"
 
@@ -54,12 +54,15 @@ bool Manifest::matches(const fs::path& library) const {
   return fs::file_size(library, unreadable) == size && !unreadable && checksum == perikit::checksum(library);
 }
 
-fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
+fs::path manifest_path(const fs::path& library) {
+  return fs::path(library).replace_extension(".parts");
+}
 
 Manifest read_manifest(const fs::path& file) try {
   std::error_code unreadable;
   if (!fs::is_regular_file(file, unreadable)) throw InputError({file.string()}, "", "not a regular file");
-  if (fs::file_size(file, unreadable) > largest_manifest || unreadable) throw InputError({file.string()}, "", "too large for a manifest");
+  if (fs::file_size(file, unreadable) > largest_manifest || unreadable)
+    throw InputError({file.string()}, "", "too large for a manifest");
   const toml::table table = toml::parse_file(file.string());
   if (const auto format = required<std::int64_t>(table, "format", file); format != manifest_format) {
     throw InputError({file.string()}, "format", fmt::format("{}; this program reads {}", format, manifest_format));
@@ -85,12 +88,9 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
   for (const NamedPart& part : parts) {
     list.push_back(toml::table{{"kind", name(part.kind)}, {"name", part.name}, {"summary", part.summary}});
   }
-  const toml::table table{{"format", manifest_format},
-                          {"abi", PERIKIT_ABI_VERSION},
-                          {"build_id", PERIKIT_BUILD_ID},
-                          {"size", static_cast<std::int64_t>(fs::file_size(library))},
-                          {"checksum", checksum(library)},
-                          {"part", std::move(list)}};
+  const toml::table table{{"format", manifest_format},     {"abi", PERIKIT_ABI_VERSION},
+                          {"build_id", PERIKIT_BUILD_ID},  {"size", static_cast<std::int64_t>(fs::file_size(library))},
+                          {"checksum", checksum(library)}, {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
   const fs::path temporary = file.string() + ".new";
   std::ofstream out(temporary);

@@ -32,7 +32,8 @@ std::string fault(const ParameterTable& table) {
 
 std::string fault(const PartDescription& description) {
   if (!is_snake_case(description.name)) return "the name must be snake_case (a-z, 0-9, _)";
-  if (description.summary.empty() || description.summary.find('\n') != std::string::npos) return "the summary must be one line of text";
+  if (description.summary.empty() || description.summary.find('\n') != std::string::npos)
+    return "the summary must be one line of text";
   if (description.examples.empty()) return "at least one example is needed (\"\" where nothing is required)";
   return fault(description.parameters);
 }
@@ -46,7 +47,9 @@ void PartCollector::add(RegisteredPart part) {
   };
   if (const std::string reason = fault(description); !reason.empty()) refuse(reason);
   if (!std::visit([](const auto& f) { return static_cast<bool>(f); }, factory)) refuse("no factory");
-  const auto same = [&](const auto& other) { return other->kind() == part.kind() && other->description.name == description.name; };
+  const auto same = [&](const auto& other) {
+    return other->kind() == part.kind() && other->description.name == description.name;
+  };
   if (std::ranges::any_of(parts, same)) refuse("registered twice");
   if (const auto owner = owner_(part.kind(), description.name); !owner.empty()) {
     refuse(fmt::format("duplicate: {} already brings it", owner.string()));

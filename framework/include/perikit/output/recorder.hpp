@@ -53,6 +53,8 @@ class HistoryWriter {
   /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows.
   HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows = -1);
   ~HistoryWriter();
+  /// One value per column. Throws RunError naming the column where a value is not finite (the row is not written), or where the disk
+  /// is full (the file then ends with the row before).
   void row(std::span<const double> values);
 
  private:
@@ -63,7 +65,7 @@ class HistoryWriter {
 /// Writes text to `file` by temporary name, fsync and rename. Throws RunError.
 void write_file_atomically(const std::filesystem::path& file, const std::string& text);
 
-/// Last frame of an earlier run: point fields in input order. Throws InputError when it cannot be read or the number of points differs.
+/// Last frame of an earlier run (`results_h5` may also name its folder): point fields in input order. Throws InputError when it cannot be read or the number of points differs.
 struct LoadedFrame {
   double time = 0;
   std::int64_t step = 0;

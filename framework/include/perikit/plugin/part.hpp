@@ -33,13 +33,13 @@ class PartFactory {
 
 /// Everything about a part but its code.
 struct PartDescription {
-  std::string name;                      ///< snake_case, unique within its kind
-  std::string summary;                   ///< one line
-  ParameterTable parameters;
-  std::vector<std::string> examples;     ///< TOML tables without `type`, at least one: "order = 1"; "" when nothing is required
-  std::string equations;                 ///< a few lines of plain text
-  std::string source;                    ///< citation
-  std::string limits;                    ///< where it must not be used
+  std::string name{};                    ///< snake_case, unique within its kind
+  std::string summary{};                 ///< one line
+  ParameterTable parameters{};
+  std::vector<std::string> examples{};   ///< TOML tables without `type`, at least one: "order = 1"; "" when nothing is required
+  std::string equations{};               ///< a few lines of plain text
+  std::string source{};                  ///< citation
+  std::string limits{};                  ///< where it must not be used
 };
 
 template <class Interface>

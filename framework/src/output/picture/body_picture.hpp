@@ -1,0 +1,33 @@
+#pragma once
+/// gnuplot scripts for the pictures of bodies and curves.
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace perikit {
+
+struct BodyPicture {
+  int dimension = 3;                  ///< 2 or 3
+  std::span<const double> reference;  ///< positions, rows of 3
+  std::span<const double> drawn;      ///< positions as drawn, rows of 3
+  std::span<const double> volume;     ///< per point
+  std::span<const double> values;     ///< per point
+  std::array<double, 2> range{};      ///< of the colours
+  std::array<double, 3> view{};       ///< 3D: towards the eye
+  std::string title, value_label, length_unit;
+  std::filesystem::path file;
+};
+std::string body_script(const BodyPicture& picture);
+
+struct CurvePicture {
+  std::span<const double> x, y;
+  std::string title, x_label, y_label;
+  std::string y_range;  ///< gnuplot's "[a:b]", or "[*:*]"
+  std::filesystem::path file;
+};
+std::string curve_script(const CurvePicture& picture);
+
+}  // namespace perikit
