@@ -45,9 +45,10 @@ std::string waves(int d) {
 }
 
 /// A moving end, and a load that changes.
-std::string driven(int d) {
-  return "[[boundary]]\nset = \"left\"\ndisplacement = " + vector(d, "\"0.05*(1 - cos(0.5*t))\"", "0") +
-         "\n[[load]]\nset = \"right\"\nforce = " + vector(d, "\"0.1*sin(0.7*t)\"", "-0.05") + "\n";
+std::string driven(int d, double factor = 1.0) {
+  return fmt::format("[[boundary]]\nset = \"left\"\ndisplacement = {}\n[[load]]\nset = \"right\"\nforce = {}\n",
+                     vector(d, fmt::format("\"{}*(1 - cos(0.5*t))\"", 0.05 * factor), "0"),
+                     vector(d, fmt::format("\"{}*sin(0.7*t)\"", 0.1 * factor), fmt::format("{}", -0.05 * factor)));
 }
 
 std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrator) {
@@ -92,7 +93,7 @@ TEST_CASE("integrator: the energy of free vibration does not drift") {
     body.conditions = waves(2);
     const double h = stable_step(body) / 3;
     for (const Example& integrator : dynamic_integrators(3000 * h, h)) {
-      INFO(integrator.part, cloud ? " cloud" : " lattice");
+      INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
       const Watch watch = run(*simulation);
       const std::size_t n = watch.energies.size(), third = n / 3;
@@ -131,9 +132,9 @@ TEST_CASE("integrator: equal steps, none longer than asked for, hit the end time
 
 TEST_CASE("integrator: prescribed motions are exact") {
   BodyOptions body = body_of(2);
-  body.conditions = "[initial]\ndisplacement = [\"0.01*x\", 0]\nvelocity = [\"0.2*(x > 6)\", 0]\n"
+  body.conditions = "[initial]\ndisplacement = [\"0.01*x\", 0]\nvelocity = [\"0.02*(x > 6)\", 0]\n"
                     "[[boundary]]\nset = \"left\"\ndisplacement = [\"0.01*x*cos(0.4*t)\", 0.0]\n"
-                    "[[boundary]]\nset = \"right\"\nvelocity = [\"0.2 - 0.03*t\", \"free\"]\n";
+                    "[[boundary]]\nset = \"right\"\nvelocity = [\"0.02 - 0.0004*t\", \"free\"]\n";
   const double h = stable_step(body) / 2, end = 60 * h;
   for (const Example& integrator : dynamic_integrators(end, h)) {
     INFO(integrator.part);
@@ -151,8 +152,8 @@ TEST_CASE("integrator: prescribed motions are exact") {
       }
       for (const std::int32_t p : state_of.set("right")) {
         const double x = state_of.position(static_cast<std::size_t>(p))[0];
-        moved = std::max(moved, std::abs(problem.displacement().component(0)[p] - 0.01 * x - 0.2 * t + 0.015 * t * t));
-        speed = std::max(speed, std::abs(problem.velocity().component(0)[p] - 0.2 + 0.03 * t));
+        moved = std::max(moved, std::abs(problem.displacement().component(0)[p] - 0.01 * x - 0.02 * t + 0.0002 * t * t));
+        speed = std::max(speed, std::abs(problem.velocity().component(0)[p] - 0.02 + 0.0004 * t));
       }
     };
     simulation->run(watch);
@@ -168,7 +169,7 @@ TEST_CASE("integrator: a constant load gives a free body its momentum, and work 
     body.conditions = waves(2) + "[[load]]\nset = \"right\"\nforce = [0.03, -0.02]\n";
     const double h = stable_step(body) / 2, end = 150 * h;
     for (const Example& integrator : dynamic_integrators(end, h)) {
-      INFO(integrator.part, cloud ? " cloud" : " lattice");
+      INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
       BodyProblem& problem = simulation->problem();
       const auto momentum = [&](int c) {
@@ -191,8 +192,9 @@ TEST_CASE("integrator: a constant load gives a free body its momentum, and work 
 
 TEST_CASE("integrator: reactions carry loads and inertia") {
   BodyOptions body = body_of(2);
-  body.conditions = waves(2) + "[[boundary]]\nset = \"left\"\ndisplacement = [\"1e-4*t^2\", \"free\"]\n[[boundary]]\nset = \"right\"\nvelocity = [\"0.01*t\", 0]\n"
-                               "[[load]]\nset = \"all\"\nbody_force = [\"0.001*cos(t)\", 0.002]\n";
+  // Both ends accelerate alike: inertia is no small part of the reactions, however long the way.
+  body.conditions = "[[boundary]]\nset = \"left\"\ndisplacement = [\"5e-7*t^2\", \"free\"]\n[[boundary]]\nset = \"right\"\nvelocity = [\"1e-6*t\", 0]\n"
+                    "[[load]]\nset = \"all\"\nbody_force = [\"1e-6*cos(t)\", 2e-6]\n";
   const double h = stable_step(body) / 2, end = 2000 * h;
   for (const Example& integrator : dynamic_integrators(end, h)) {
     INFO(integrator.part);
@@ -209,8 +211,8 @@ TEST_CASE("integrator: reactions carry loads and inertia") {
         worst = std::max(worst, std::abs(reaction.component(c)[p] + others - problem.mass()[static_cast<std::size_t>(p)] * acceleration));
       }
     };
-    check("left", 0, 2e-4);
-    check("right", 0, 0.01);
+    check("left", 0, 1e-6);
+    check("right", 0, 1e-6);
     check("right", 1, 0.0);
     CHECK_MESSAGE(worst <= 1e-8 * scale, "reaction is not m a - internal - external: ", worst, " of ", scale);
     const ConstFieldView free = problem.free_mask();
@@ -231,13 +233,13 @@ TEST_CASE("integrator: a run that continues from a saved state is bitwise the ru
   for (const bool cloud : {false, true})
     for (const bool estimated : {false, true}) {
       BodyOptions body = body_of(2, cloud);
-      body.conditions = waves(2) + driven(2);
-      const double h = stable_step(body) / 2, end = 1300 * h;
+      body.conditions = waves(2) + driven(2, 0.1);
+      const double h = stable_step(body) / 2, end = (estimated ? 1300 : 130) * h;
       const std::string end_text = fmt::format("{:.17g}", end);
-      for (const Example& integrator : estimated ? integrators(is_dynamic, {{"end_time", end_text}}) : dynamic_integrators(end / 10, h)) {
+      for (const Example& integrator : estimated ? integrators(is_dynamic, {{"end_time", end_text}}) : dynamic_integrators(end, h)) {
         // An example's own step has nothing to do with this body.
         if (estimated && integrator.table.find("time_step") != std::string::npos) continue;
-        INFO(integrator.part, " ", integrator.table, cloud ? " cloud" : " lattice");
+        INFO(integrator.part, " ", integrator.table, std::string(cloud ? " cloud" : " lattice"));
         const auto whole = build_run(body, integrator), first = build_run(body, integrator), second = build_run(body, integrator);
         const std::int64_t steps = run(*whole).reports.back().step, half = steps / 2;
         run(*first, half);
@@ -247,7 +249,7 @@ TEST_CASE("integrator: a run that continues from a saved state is bitwise the ru
         CHECK(second->problem().snapshot() == saved);
         const Watch rest = run(*second);
         CHECK_MESSAGE(rest.reports.front().step == half + 1, "a continued run begins with step ", rest.reports.front().step, " after ", half);
-        CHECK(second->problem().time() == end * (estimated ? 1.0 : 0.1));
+        CHECK(second->problem().time() == end);
         CHECK_MESSAGE(state(*second) == state(*whole), "the continued run differs by ", difference(state(*second), state(*whole)));
         // The same simulation can also go on in memory.
         run(*first);
@@ -264,7 +266,7 @@ TEST_CASE("integrator: bitwise the same for one and two threads") {
     body.cells = 110;
     body.conditions = waves(2) + driven(2);
     for (const Example& integrator : dynamic_integrators(6.0, 0.3)) {
-      INFO(integrator.part, cloud ? " cloud" : " lattice");
+      INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const int threads = thread_count();
       std::vector<double> states[2];
       for (const int n : {1, 2}) {
@@ -293,7 +295,7 @@ TEST_CASE("integrator: an inadmissible deformation ends the run where it arises"
     } catch (const RunError& error) {
       message = error.what();
     }
-    for (const char* word : {"point", "step", "time", "baqp", "neo_hookean"}) CHECK_MESSAGE(message.find(word) != std::string::npos, "no '", word, "' in: ", message);
+    for (const std::string word : {"point", "step", "time", "baqp", "neo_hookean"}) CHECK_MESSAGE(message.find(word) != std::string::npos, "no '", word, "' in: ", message);
   }
 }
 
@@ -303,7 +305,7 @@ TEST_CASE("integrator: an evaluation leaves the initial displacement alone and s
     body.conditions = "[initial]\ndisplacement = [\"0.02*x + 0.01*sin(y)\", \"-0.01*x*y\"]\n[[boundary]]\nset = \"left\"\ndisplacement = [5, 5]\n"
                       "[[load]]\nset = \"right\"\nforce = [0.25, 0]\n";
     for (const Example& integrator : integrators(only_evaluates, {})) {
-      INFO(integrator.part, cloud ? " cloud" : " lattice");
+      INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
       BodyProblem& problem = simulation->problem();
       const std::vector<double> before = displacement(*simulation);
