@@ -27,6 +27,8 @@ struct Case {
 std::vector<Case> cases() {
   std::vector<Case> all;
   for (const Example& example : examples(Kind::kinematics)) {
+    const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
+    const bool selective = subject().registry.kinematics(*part)->traits().selective;
     for (int d = 1; d <= 3; ++d) {
       for (const bool cloud : {false, true}) {
         BodyOptions body;
@@ -38,7 +40,7 @@ std::vector<Case> cases() {
           body.two_materials = true;
           all.push_back({example, body});
         }
-        if (d == 2 && !cloud) {
+        if (d == 2 && !cloud && !selective) {
           body.crack = body.two_materials = false;
           body.plane = "stress";
           all.push_back({example, body});

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "perikit/core/simd.hpp"
+#include "selective_map.hpp"
 
 namespace perikit {
 
@@ -19,14 +20,23 @@ void ScratchPool::prepare(const Laws& laws) {
 }
 
 int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
+  const int d = dimension(laws_.space()), lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  const bool tangent = work_ == Work::tangent;
+  const SelectiveArrays map{s.Ht, s.Hbar, tangent ? s.dHt : nullptr, s.dHbar};
+  if (selective_) {
+    std::memcpy(s.Ht, s.H, sizeof(double) * static_cast<std::size_t>(d * d) * batch_points);
+    if (tangent) std::memcpy(s.dHt, s.dH, sizeof(double) * static_cast<std::size_t>(d * d) * batch_points);
+    selective_map(laws_.space(), lanes, map, s.H, s.dH);
+  }
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
   batch.points = points;
   if (energy_ || work_ == Work::sample) batch.psi = s.psi;
-  if (work_ == Work::tangent) {
+  if (tangent) {
     batch.dH = s.dH;
     batch.dP = P;
+    if (selective_) batch.P = s.other;
   } else {
     batch.P = P;
   }
@@ -42,11 +52,14 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const do
     *energy += total;
   }
   if (work_ == Work::sample) return -1;
-  const int d = dimension(laws_.space());
-  const double sign = work_ == Work::tangent ? -1.0 : 1.0;
+  if (selective_) selective_pull_back(laws_.space(), lanes, map, tangent ? s.other : P, P, P, s.bar);
+  const double sign = tangent ? -1.0 : 1.0;
   for (int l = 0; l < n; l += pack_width) {
     const Pack w = Pack::load(weight + l) * Pack(sign);
-    for (int c = 0; c < d * d; ++c) (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
+    for (int c = 0; c < d * d; ++c) {
+      (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
+      if (selective_) (w * Pack::load(s.bar + c * batch_points + l)).store(s.bar + c * batch_points + l);
+    }
   }
   return -1;
 }

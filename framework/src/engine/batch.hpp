@@ -27,6 +27,12 @@ struct BatchScratch {
   alignas(64) double du[3 * batch_points];
   alignas(64) double dw[3 * batch_points];
   alignas(64) double t[3 * batch_points];
+  // Selective map: gradients before it, gradients of the owners (to be filled in by the engine), stress on them (result).
+  alignas(64) double Ht[9 * batch_points];
+  alignas(64) double dHt[9 * batch_points];
+  alignas(64) double Hbar[9 * batch_points];
+  alignas(64) double dHbar[9 * batch_points];
+  alignas(64) double bar[9 * batch_points];
   alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
   alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
   alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
@@ -60,13 +66,13 @@ class ScratchPool {
 
 class BatchWork {
  public:
-  BatchWork(const Laws& laws, Work work, bool energy) : laws_(laws), work_(work), energy_(energy) {}
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective) : laws_(laws), work_(work), energy_(energy), selective_(selective) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
-  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  /// s.P <- sum of W P (force) or -W A:dH (tangent); with the selective map also s.bar, the stress on Hbar. Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
   int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
@@ -77,6 +83,7 @@ class BatchWork {
   const Laws& laws_;
   Work work_;
   bool energy_;
+  bool selective_;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.

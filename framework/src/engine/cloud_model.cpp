@@ -14,7 +14,7 @@ namespace perikit {
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
     : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.skip),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(find_families(body_.rows(), body_.points(), D, body_.horizon())), condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
   build_families(*parts.influence);
@@ -242,6 +242,14 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       for (int c = 0; c < D; ++c) s.du[c * batch_points + l] = s.dw[c * batch_points + l] = 0.0;
       for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
     }
+    if (traits_.selective) {
+      for (int c = 0; c < D; ++c)
+        for (int e = 0; e < D; ++e)
+          for (int l = 0; l < lanes; ++l) {
+            s.Hbar[(c * D + e) * batch_points + l] = gradient_[D * p + static_cast<std::size_t>(e)][c];
+            if (tangent) s.dHbar[(c * D + e) * batch_points + l] = direction_[D * p + static_cast<std::size_t>(e)][c];
+          }
+    }
     const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &inverse_[6 * p], 0};
     kinematics_->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
@@ -266,6 +274,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
         Row stress{};
         for (int c = 0; c < D; ++c) stress[c] = share * s.P[(c * D + e) * batch_points + l];
         own_stress[e] += stress;
+        for (int c = 0; c < D && traits_.selective; ++c) own_stress[e][c] += s.bar[(c * D + e) * batch_points + l];
         if (mean) flux_[D * j + static_cast<std::size_t>(e)] += stress;
       }
     }
@@ -334,19 +343,19 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus CloudModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, blocks(), u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, traits_.selective, blocks(), u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus CloudModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const BatchWork work(laws_, Work::tangent, false);
+  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>

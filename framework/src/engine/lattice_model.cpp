@@ -32,7 +32,7 @@ const LaneFactors& lane_factors() {
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
     : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && skip_),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_),
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
@@ -218,6 +218,14 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   };
   gather(pass.u, gradient_, s.du, s.A);
   if (tangent) gather(pass.w, direction_, s.dw, s.dA);
+  if (traits_.selective) {
+    for (int k = 0; k < slots; ++k) {
+      for (int c = 0; c < D * D; ++c) {
+        std::memcpy(s.Hbar + c * batch_points + k * chunk_points, gradient_.component(c) + p, sizeof(double) * chunk_points);
+        if (tangent) std::memcpy(s.dHbar + c * batch_points + k * chunk_points, direction_.component(c) + p, sizeof(double) * chunk_points);
+      }
+    }
+  }
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
@@ -273,6 +281,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
     };
     for (int c = 0; c < D; ++c) add_own(s.t + c * batch_points, pass.out.component(c), Pack(1.0));
     for (int c = 0; c < D * D; ++c) add_own(s.P + c * batch_points, flux_.component(c), share);
+    for (int c = 0; c < D * D && traits_.selective; ++c) add_own(s.bar + c * batch_points, flux_.component(c), Pack(1.0));
   }
   return -1;
 }
@@ -367,20 +376,20 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus LatticeModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, families_.blocks.size(), u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, traits_.selective, families_.blocks.size(), u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus LatticeModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
   if (traits_.at == EvaluationPoints::bonds && direction_.size() == 0) direction_ = body_.make_field(D * D);
-  const BatchWork work(laws_, Work::tangent, false);
+  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>

@@ -61,7 +61,8 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
   const bool by_bond = traits.parts == 0;
   const FamilyView view = family.view(horizon);
   out.bonds = family.bonds;
-  out.points = by_bond ? family.bonds : traits.parts;
+  const int first = traits.selective ? 1 : 0;
+  out.points = first + (by_bond ? family.bonds : traits.parts);
   out.tiles = (out.points + 7) / 8;
   out.g.assign(static_cast<std::size_t>(D) * out.tiles * static_cast<std::size_t>(out.bonds) * 8, 0.0);
   out.share.assign(static_cast<std::size_t>(out.tiles) * 8, 0.0);
@@ -78,23 +79,24 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
       }
     }
   };
+  const auto write_whole = [&](int q) {
+    shape_tensor<D>(family, family.omega.data(), K);
+    if (invert_quickly<D>(K, inverse)) write(q, family.omega.data());
+  };
+  if (traits.selective) write_whole(0);
   int admissible = 0;
-  for (int q = 0; q < out.points; ++q) {
-    kinematics.weights(view, q, scratch.data());
+  for (int q = first; q < out.points; ++q) {
+    kinematics.weights(view, q - first, scratch.data());
     shape_tensor<D>(family, scratch.data(), K);
     const bool regular = invert_quickly<D>(K, inverse);
     if (regular) {
       write(q, scratch.data());
     } else {
       ++out.fallbacks;
-      if (by_bond) {
-        // A domain too poor for a gradient of its own uses the whole family.
-        shape_tensor<D>(family, family.omega.data(), K);
-        if (invert_quickly<D>(K, inverse)) write(q, family.omega.data());
-      }
+      if (by_bond) write_whole(q);   // a domain too poor for a gradient of its own uses the whole family
     }
     if (by_bond) {
-      out.share[static_cast<std::size_t>(q)] = bond_share[q];
+      out.share[static_cast<std::size_t>(q)] = bond_share[q - first];
     } else if (regular) {
       out.share[static_cast<std::size_t>(q)] = 1.0;
       ++admissible;
@@ -102,9 +104,8 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
   }
   if (by_bond) return;
   if (admissible == 0) {
-    shape_tensor<D>(family, family.omega.data(), K);
-    if (invert_quickly<D>(K, inverse)) write(0, family.omega.data());
-    out.share[0] = 1.0;
+    write_whole(first);
+    out.share[static_cast<std::size_t>(first)] = 1.0;
     admissible = 1;
   }
   for (double& share : out.share) share /= admissible;

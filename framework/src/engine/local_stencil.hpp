@@ -1,5 +1,5 @@
 #pragma once
-/// The gradient stencil of one family for the weighted shape: H_q = sum_k u_k (x) g_qk, g_qk = omega_q(k) V_k K_q^-1 xi_k, for all
+/// The gradient stencil of one family for the weighted shape (with the selective map, the owner's own gradient comes first, with no share): H_q = sum_k u_k (x) g_qk, g_qk = omega_q(k) V_k K_q^-1 xi_k, for all
 /// evaluation points q of one point.
 
 #include <cstdint>

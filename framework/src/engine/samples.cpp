@@ -13,9 +13,9 @@ EvaluationStatus status_at(const Body& body, std::int64_t bad) {
   return status;
 }
 
-EvaluationStatus run_forces(const Laws& laws, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
+EvaluationStatus run_forces(const Laws& laws, bool selective, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
                             const std::function<EvaluationStatus(Pass&)>& run) {
-  const BatchWork work(laws, Work::force, energy != nullptr);
+  const BatchWork work(laws, Work::force, energy != nullptr, selective);
   std::vector<double> energies(energy ? blocks : 0, 0.0);
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   const EvaluationStatus status = run(pass);
@@ -26,12 +26,12 @@ EvaluationStatus run_forces(const Laws& laws, std::size_t blocks, ConstFieldView
   return status;
 }
 
-EvaluationStatus run_samples(const Body& body, const Laws& laws, ConstFieldView u, PointSamples& s,
+EvaluationStatus run_samples(const Body& body, const Laws& laws, bool selective, ConstFieldView u, PointSamples& s,
                              const std::function<EvaluationStatus(Pass&)>& run) {
   Field weight = body.make_field(1);
   s = {body.make_field(1), body.make_field(laws.components()), body.make_field(laws.components()), body.make_field(9), body.make_field(1)};
   const SampleSums sums{weight.data(), s.strain_energy_density.data(), s.H.data(), s.P.data(), s.cauchy.data(), s.von_mises.data(), body.stride()};
-  const BatchWork work(laws, Work::sample, false);
+  const BatchWork work(laws, Work::sample, false, selective);
   Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
   const EvaluationStatus status = run(pass);
   for (const std::int32_t index : body.internal()) {

@@ -10,11 +10,11 @@ namespace perikit {
 EvaluationStatus status_at(const Body& body, std::int64_t bad);
 
 /// Forces and energy: the sum over blocks in their order.
-EvaluationStatus run_forces(const Laws& laws, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
+EvaluationStatus run_forces(const Laws& laws, bool selective, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
                             const std::function<EvaluationStatus(Pass&)>& run);
 
 /// Point averages with the evaluation weights; strain energy density is per point volume.
-EvaluationStatus run_samples(const Body& body, const Laws& laws, ConstFieldView u, PointSamples& samples,
+EvaluationStatus run_samples(const Body& body, const Laws& laws, bool selective, ConstFieldView u, PointSamples& samples,
                              const std::function<EvaluationStatus(Pass&)>& run);
 
 }  // namespace perikit

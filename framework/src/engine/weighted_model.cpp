@@ -239,6 +239,15 @@ void WeightedModel<D>::scatter(const Group& g, const LocalStencil& stencil, cons
 }
 
 template <int D>
+void WeightedModel<D>::keep_owner_gradients(int points, BatchScratch& s, bool tangent) const noexcept {
+  for (int c = 0; c < D * D; ++c)
+    for (int l = 0; l < batch_points; ++l) {
+      s.Hbar[c * batch_points + l] = s.H[c * batch_points + l % points];
+      if (tangent) s.dHbar[c * batch_points + l] = s.dH[c * batch_points + l % points];
+    }
+}
+
+template <int D>
 int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
   load_family(g, m);
   if (m.index.empty()) return -1;
@@ -247,7 +256,8 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
   gather(g, stencil, pass.u, m, m.u);
   if (tangent) gather(g, stencil, pass.w, m, m.w);
   m.t.assign(static_cast<std::size_t>(stencil.bonds) * D * 8, 0.0);
-  const int lanes_per_tile = g.whole ? 64 : 8, tiles_at_once = batch_points / lanes_per_tile;
+  const int lanes_per_tile = g.whole ? 64 : 8, tiles_at_once = batch_points / lanes_per_tile, points = g.whole ? 8 : 1;
+  double bar[D * D][8] = {};   // stress on the owners' gradients (selective map)
   for (int tile = 0; tile < stencil.tiles; tile += tiles_at_once) {
     const int tiles = std::min(tiles_at_once, stencil.tiles - tile);
     for (int i = 0; i < tiles; ++i) {
@@ -259,6 +269,7 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
         single_gradient<D>(stencil, tile + i, m.u.data(), s.H + lane);
         if (tangent) single_gradient<D>(stencil, tile + i, m.w.data(), s.dH + lane);
       }
+      if (traits_.selective && tile + i == 0) keep_owner_gradients(points, s, tangent);
       for (int l = 0; l < lanes_per_tile; ++l) {
         const int q = g.whole ? l / 8 : l, point = g.whole ? l % 8 : 0;
         s.owner[lane + l] = g.first + point;
@@ -272,12 +283,22 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
+    for (int c = 0; c < D * D && traits_.selective; ++c)
+      for (int l = 0; l < n; ++l) bar[c][l % points] += s.bar[c * batch_points + l];
     for (int i = 0; i < tiles; ++i) {
       if (g.whole) tile_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
       else single_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
     }
   }
-  if (!sample) scatter(g, stencil, m, pass.out);
+  if (sample) return -1;
+  if (traits_.selective) {
+    // The owner's gradient is evaluation point 0 of tile 0.
+    for (int c = 0; c < D * D; ++c)
+      for (int l = 0; l < lanes_per_tile; ++l) s.P[c * batch_points + l] = l < points ? bar[c][l] : 0.0;
+    if (g.whole) tile_adjoint<D>(stencil, 0, s.P, m.t.data());
+    else single_adjoint<D>(stencil, 0, s.P, m.t.data());
+  }
+  scatter(g, stencil, m, pass.out);
   return -1;
 }
 
@@ -311,19 +332,19 @@ EvaluationStatus WeightedModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus WeightedModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, block_first_.size() - 1, u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, traits_.selective, block_first_.size() - 1, u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus WeightedModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const BatchWork work(laws_, Work::tangent, false);
+  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus WeightedModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>

@@ -47,6 +47,8 @@ class WeightedModel final : public Model {
   void load_family(const Group& group, Memory& m) const;
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
+  /// Copies Hbar of the points, evaluation point 0, to every lane of the batch.
+  void keep_owner_gradients(int points, BatchScratch& s, bool tangent) const noexcept;
   int group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   void gather(const Group& g, const LocalStencil& stencil, ConstFieldView u, const Memory& m, AlignedVector<double>& out) const;
   void scatter(const Group& g, const LocalStencil& stencil, const Memory& m, FieldView out) const;

@@ -14,6 +14,11 @@ namespace perikit {
 BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static) : scene_(scene), body_(scene) {
   influence_ = factory.influence(*scene_.influence);
   kinematics_ = factory.kinematics(*scene_.kinematics);
+  const KinematicsTraits traits = kinematics_->traits();
+  const bool stress = body_.space() == Space::plane_stress || body_.space() == Space::line_stress;
+  if (traits.selective && stress) {
+    throw InputError(scene_.body.position, "body", fmt::format("{} needs the strain across the body; allowed: plane = \"strain\", line = \"strain\"", scene_.kinematics->type));
+  }
   read_materials(factory);
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());

@@ -47,6 +47,9 @@ struct KinematicsTraits {
   bool pair_symmetric = false;
   /// bond shape: g is odd in xi and independent of omega and the shape tensor
   bool g_from_xi_only = false;
+  /// The volume change of every evaluation point is that of its owner: F_q <- (Jbar_i / J_q)^(1/3) F_q. Not in plane or uniaxial
+  /// stress, and not with evaluation points at points.
+  bool selective = false;
 };
 
 class Kinematics {

@@ -1,0 +1,46 @@
+#include "perikit/sdk/plugin.hpp"
+
+namespace {
+
+using namespace perikit;
+
+/// Any bond-level or sub-horizon kinematics with the volume change of the owner.
+class Selective final : public Kinematics {
+ public:
+  explicit Selective(std::unique_ptr<Kinematics> base) : base_(std::move(base)) {}
+  KinematicsTraits traits() const noexcept override {
+    KinematicsTraits traits = base_->traits();
+    traits.selective = true;
+    return traits;
+  }
+  void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override { base_->correction(family, g, stride); }
+  void weights(const FamilyView& family, int q, double* omega) const noexcept override { base_->weights(family, q, omega); }
+
+ private:
+  std::unique_ptr<Kinematics> base_;
+};
+
+}  // namespace
+
+PERIKIT_PLUGIN(registrar) {
+  ParameterTable table;
+  table.part("base", Kind::kinematics, "The kinematics whose evaluation points keep their own shape change.").require();
+  registrar.kinematics(
+      {.name = "selective",
+       .summary = "any bond-level kinematics with the volume change of the whole family: no volumetric locking",
+       .parameters = std::move(table),
+       .examples = {"base = \"baqp\"", "base = { type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", "base = \"projection\""},
+       .equations = "Fh = (Jbar_i / Jt_q)^(1/3) Ft_q, Ft_q from the base, Jbar_i from the point gradient of the owner i\n"
+                    "forces and tangent by the exact chain rule of Fh(Ft, Fbar)",
+       .source = "Scabbia et al., eqs. 24-30, in variational form",
+       .limits = "Not in plane or uniaxial stress; not over a base with evaluation points at points."},
+      [](const ParameterValues& values, const PartFactory& factory) -> std::unique_ptr<Kinematics> {
+        std::unique_ptr<Kinematics> base = factory.kinematics(values.part("base"));
+        const KinematicsTraits traits = base->traits();
+        if (traits.at == EvaluationPoints::points) {
+          throw values.error("base", "found '" + values.part("base").type + "', whose evaluation points are points; allowed: a kinematics with bonds or sub-horizons");
+        }
+        if (traits.selective) throw values.error("base", "found 'selective' itself; allowed: a kinematics with bonds or sub-horizons");
+        return std::make_unique<Selective>(std::move(base));
+      });
+}
