@@ -55,59 +55,68 @@ void shape_tensor(const FamilyArrays& f, const double* omega, double* K) {
   for (int c = 0; c < symmetric_components(D); ++c) K[c] = sum(sums[c]);
 }
 
+/// Volume of a part: bonds that it shares count with their share.
+double part_volume(const FamilyArrays& f, const double* omega) {
+  double volume = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(f.bonds); ++k) {
+    if (f.omega[k] > 0) volume += omega[k] / f.omega[k] * f.volume[k];
+  }
+  return volume;
+}
+
 template <int D>
 void build(const Kinematics& kinematics, const KinematicsTraits& traits, const FamilyArrays& family, double horizon,
            const double* bond_share, LocalStencil& out, AlignedVector<double>& scratch) {
-  const bool by_bond = traits.parts == 0;
+  const int parts = kinematics.parts(D);
+  const bool by_bond = parts == 0;
   const FamilyView view = family.view(horizon);
   out.bonds = family.bonds;
-  out.points = by_bond ? family.bonds : traits.parts;
+  out.points = by_bond ? family.bonds : parts;
   out.tiles = (out.points + 7) / 8;
   out.g.assign(static_cast<std::size_t>(D) * out.tiles * static_cast<std::size_t>(out.bonds) * 8, 0.0);
   out.share.assign(static_cast<std::size_t>(out.tiles) * 8, 0.0);
-  out.fallbacks = 0;
+  out.fallbacks = out.dropped = 0;
   scratch.resize(family.size);
-  double K[6], inverse[6];
+  // Writes row q where these weights give a gradient.
   const auto write = [&](int q, const double* omega) {
-    for (int k = 0; k < family.bonds; ++k) {
-      const double w = omega[k] * family.volume[static_cast<std::size_t>(k)];
-      for (int e = 0; e < D; ++e) {
+    double K[6], inverse[6];
+    shape_tensor<D>(family, omega, K);
+    if (!invert_quickly<D>(K, inverse)) return false;
+    for (int e = 0; e < D; ++e) {
+      double* row = out.g.data() + (static_cast<std::size_t>(e) * out.tiles + static_cast<std::size_t>(q / 8)) * static_cast<std::size_t>(out.bonds) * 8 + q % 8;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k) {
         double g = 0;
-        for (int a = 0; a < D; ++a) g += inverse[symmetric_index(D, a, e)] * family.xi[a][static_cast<std::size_t>(k)];
-        out.g[((static_cast<std::size_t>(e) * out.tiles + static_cast<std::size_t>(q / 8)) * static_cast<std::size_t>(out.bonds) + static_cast<std::size_t>(k)) * 8 + static_cast<std::size_t>(q % 8)] = w * g;
+        for (int a = 0; a < D; ++a) g += inverse[symmetric_index(D, a, e)] * family.xi[a][k];
+        row[8 * k] = omega[k] * family.volume[k] * g;
       }
     }
+    return true;
   };
-  int admissible = 0;
+  double total = 0;
   for (int q = 0; q < out.points; ++q) {
+    double& share = out.share[static_cast<std::size_t>(q)];
     kinematics.weights(view, q, scratch.data());
-    shape_tensor<D>(family, scratch.data(), K);
-    const bool regular = invert_quickly<D>(K, inverse);
-    if (regular) {
-      write(q, scratch.data());
-    } else {
-      ++out.fallbacks;
-      if (by_bond) {
-        // A domain too poor for a gradient of its own uses the whole family.
-        shape_tensor<D>(family, family.omega.data(), K);
-        if (invert_quickly<D>(K, inverse)) write(q, family.omega.data());
-      }
-    }
+    const bool regular = write(q, scratch.data());
     if (by_bond) {
-      out.share[static_cast<std::size_t>(q)] = bond_share[q];
+      share = bond_share[q];
+      if (!regular) {
+        ++out.fallbacks;
+        write(q, family.omega.data());
+      }
     } else if (regular) {
-      out.share[static_cast<std::size_t>(q)] = 1.0;
-      ++admissible;
+      share = traits.part_weight == PartWeight::volume ? part_volume(family, scratch.data()) : 1.0;
+      total += share;
+    } else {
+      ++out.dropped;
     }
   }
   if (by_bond) return;
-  if (admissible == 0) {
-    shape_tensor<D>(family, family.omega.data(), K);
-    if (invert_quickly<D>(K, inverse)) write(0, family.omega.data());
-    out.share[0] = 1.0;
-    admissible = 1;
+  if (!(total > 0)) {
+    ++out.fallbacks;
+    write(0, family.omega.data());
+    out.share[0] = total = 1.0;
   }
-  for (double& share : out.share) share /= admissible;
+  for (double& share : out.share) share /= total;
 }
 
 }  // namespace
