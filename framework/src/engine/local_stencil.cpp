@@ -25,17 +25,22 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
 
 namespace {
 
-/// Inverse by cofactors; false where the condition |K| |K^-1| shows that K is singular. No eigenvalues: this runs per bond.
+/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane or
+/// on a line, 30 times as long as thick): their gradients magnify noise as much.
+constexpr double poor_ratio = 1e-3;
+
+/// Inverse by cofactors; false where K is ill conditioned. No eigenvalues: this runs per bond.
 template <int D>
-bool invert_quickly(const double* k, double* inverse) {
+bool invert_quickly(const double* k, double* inverse, double ratio) {
   const Square<D> m = symmetric_matrix<D>(k);
   const double size = m.norm();
   if (!(size > 0)) return false;
   const Square<D> scaled = m / size;
+  // A determinant of the size of rounding says nothing about K, nor does the inverse (of bonds on one line in 3D, say).
   const double det = scaled.determinant();
-  if (!(det > 0)) return false;
+  if (!(det > 1e-12)) return false;
   const Square<D> inv = scaled.inverse();
-  if (!(inv.norm() * singular_ratio < 1)) return false;
+  if (!(inv.norm() * ratio < 1)) return false;
   for (int a = 0; a < D; ++a)
     for (int b = a; b < D; ++b) inverse[symmetric_index(D, a, b)] = inv(a, b) / size;
   return true;
@@ -78,10 +83,10 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
   out.fallbacks = out.dropped = 0;
   scratch.resize(family.size);
   // Writes row q where these weights give a gradient.
-  const auto write = [&](int q, const double* omega) {
+  const auto write = [&](int q, const double* omega, double ratio) {
     double K[6], inverse[6];
     shape_tensor<D>(family, omega, K);
-    if (!invert_quickly<D>(K, inverse)) return false;
+    if (!invert_quickly<D>(K, inverse, ratio)) return false;
     for (int e = 0; e < D; ++e) {
       double* row = out.g.data() + (static_cast<std::size_t>(e) * out.tiles + static_cast<std::size_t>(q / 8)) * static_cast<std::size_t>(out.bonds) * 8 + q % 8;
       for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k) {
@@ -96,12 +101,12 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
   for (int q = 0; q < out.points; ++q) {
     double& share = out.share[static_cast<std::size_t>(q)];
     kinematics.weights(view, q, scratch.data());
-    const bool regular = write(q, scratch.data());
+    const bool regular = write(q, scratch.data(), poor_ratio);
     if (by_bond) {
       share = bond_share[q];
       if (!regular) {
         ++out.fallbacks;
-        write(q, family.omega.data());
+        write(q, family.omega.data(), singular_ratio);
       }
     } else if (regular) {
       share = traits.part_weight == PartWeight::volume ? part_volume(family, scratch.data()) : 1.0;
@@ -113,7 +118,7 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
   if (by_bond) return;
   if (!(total > 0)) {
     ++out.fallbacks;
-    write(0, family.omega.data());
+    write(0, family.omega.data(), singular_ratio);
     out.share[0] = total = 1.0;
   }
   for (double& share : out.share) share /= total;

@@ -59,7 +59,7 @@ class Kinematics {
   /// bond shape: g_b for each bond of the view, g[c * stride + k], c < dimension [1/m]. Fully overwritten.
   virtual void correction(const FamilyView&, double* /*g*/, std::size_t /*stride*/) const noexcept {}
   /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself): omega[k] for all bonds, at most the
-  /// view's omega for a part. Fully overwritten. A part without a gradient of its own (too few bonds) is dropped and the others share
+  /// view's omega for a part. Fully overwritten. A part without a well-conditioned gradient of its own is dropped and the others share
   /// its weight; a bond's domain without one, and a family without any part, use the whole family.
   virtual void weights(const FamilyView&, int /*q*/, double* /*omega*/) const noexcept {}
 };
