@@ -31,11 +31,7 @@ void check_same(const BodyOptions& options, const std::string& a, const std::str
   INFO(a, " against ", b, ", ", options.dimension, "D ", options.influence, options.crack ? " cracked" : "");
   const auto one = contract::build(contract::scene_text(options, a)), two = contract::build(contract::scene_text(options, b));
   for (const auto& simulation : {one.get(), two.get()}) {
-    BodyProblem& problem = simulation->problem();
-    contract::Random random(61);
-    contract::set_field(problem.body(), problem.displacement(), [&](const Point& x) {
-      return Point{0.06 * x[1] - 0.03 * x[0] + 0.02 * random(), 0.04 * x[0] + 0.05 * x[2] + 0.02 * random(), -0.05 * x[1] + 0.02 * random()};
-    });
+    contract::deform(simulation->problem().body(), simulation->problem().displacement(), 61, 0.02);
   }
   const Response r = respond(one->problem()), s = respond(two->problem());
   const Body& body = one->problem().body();

@@ -29,7 +29,8 @@ namespace {
 /// on a line, 30 times as long as thick): their gradients magnify noise as much.
 constexpr double poor_ratio = 1e-3;
 
-/// Inverse by cofactors; false where K is ill conditioned. No eigenvalues: this runs per bond.
+/// Inverse by cofactors; false where the eigenvalues of K spread by more than 1 / ratio. This runs per bond: eigenvalues are only
+/// computed where norms leave it open.
 template <int D>
 bool invert_quickly(const double* k, double* inverse, double ratio) {
   const Square<D> m = symmetric_matrix<D>(k);
@@ -40,7 +41,11 @@ bool invert_quickly(const double* k, double* inverse, double ratio) {
   const double det = scaled.determinant();
   if (!(det > 1e-12)) return false;
   const Square<D> inv = scaled.inverse();
-  if (!(inv.norm() * ratio < 1)) return false;
+  const double bound = inv.norm() * ratio;   // spread * ratio <= bound <= D spread * ratio
+  if (!(bound < 1)) {
+    double spread;
+    if (!(bound < D) || !invert_shape<D>(k, inverse, &spread) || !(spread * ratio < 1)) return false;
+  }
   for (int a = 0; a < D; ++a)
     for (int b = a; b < D; ++b) inverse[symmetric_index(D, a, b)] = inv(a, b) / size;
   return true;
