@@ -122,8 +122,8 @@ class Builder {
     for (int part = 0; part < parts; ++part) {
       double volume = 0;
       const auto in_part = [&](int k) { return share(cloud_.bond(i, k), cloud_.horizon, parts, part); };
-      for (const int k : family_) volume += in_part(k) * cloud_.volume[k];
-      Stencil g = kernel_gradient(cloud_, i, 1, description_.singular, family_,
+      for (const int k : family_) volume += in_part(k) * cloud_.intact(i, k) * cloud_.volume[k];
+      Stencil g = kernel_gradient(cloud_, i, 1, description_.poor, family_,
                                   [&](int k) { return in_part(k) * cloud_.intact(i, k) * cloud_.omega(i, k); });
       if (g.empty()) continue;
       const double weight = description_.part_volumes ? volume : 1.0;
@@ -137,7 +137,8 @@ class Builder {
   Stencil bond_stencil(int i, int j) {
     if (description_.name == "baqp") return projected(i, j, own_gradient(i), own_gradient(j));
     if (description_.name == "projection") return projected(i, j, own_gradient(i), own_gradient(i));
-    Stencil g = kernel_gradient(cloud_, i, 1, description_.singular, family_,
+    const double limit = description_.name == "bond_augmented" ? description_.singular : description_.poor;   // it holds the whole family
+    Stencil g = kernel_gradient(cloud_, i, 1, limit, family_,
                                 [&](int k) { return cloud_.intact(i, k) * bond_influence(i, j, k); });
     return g.empty() ? own_gradient(i) : g;
   }

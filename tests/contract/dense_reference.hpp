@@ -43,7 +43,7 @@ struct Description {
   std::string name = "conventional";
   int order = 1;                                      ///< conventional, baqp, projection: of the point gradient
   int parts = 0;                                      ///< sub_horizon: 0: 2^d; 1: the whole horizon; 4 in 1D: C's four-part split
-  bool part_volumes = false;                          ///< sub_horizon: weights V_i V_alpha / V_H instead of V_i / parts
+  bool part_volumes = false;                          ///< sub_horizon: weights V_i V_alpha / V_H (over intact bonds) instead of V_i / parts
   double bond_horizon_ratio = 1;                      ///< bond_associated: radius of the ball around X_j over delta
   double lambda = 10;                                 ///< bond_augmented
   double n1 = 1, n2 = 1;                              ///< non_spherical
@@ -51,6 +51,8 @@ struct Description {
   std::shared_ptr<const Description> base = nullptr;  ///< selective
   /// A moment (of xi / delta) whose smallest eigenvalue is below this fraction of its largest is singular.
   double singular = 1e-10;
+  /// The same for parts of families and domains of bonds.
+  double poor = 1e-3;
 };
 
 /// g_k of the points k that move the gradient, ascending in k: H = sum_k u_k (x) g_k. Empty: dead, H = 0.

@@ -46,7 +46,18 @@ reference::Law saint_venant_kirchhoff() {
   const auto strain = [](const Tensor& H) -> Tensor { return (H + H.transpose() + H.transpose() * H) / 2; };
   const auto stress = [=](const Tensor& E) -> Tensor { return lambda * E.trace() * Tensor::Identity() + 2 * mu * E; };
   return {[=](const Tensor& H) { return 0.5 * strain(H).cwiseProduct(stress(strain(H))).sum(); },
-          [=](const Tensor& H) -> Tensor { return (Tensor::Identity() + H) * stress(strain(H)); }, {}};
+          [=](const Tensor& H) -> Tensor { return (Tensor::Identity() + H) * stress(strain(H)); },
+          [=](const Tensor& H) {   // dP = dF S + F stress(dE), dE = sym(F^T dF); column by column
+            const Tensor F = Tensor::Identity() + H, S = stress(strain(H));
+            reference::Matrix A(9, 9);
+            for (int k = 0; k < 9; ++k) {
+              Tensor dF = Tensor::Zero();
+              dF(k / 3, k % 3) = 1;
+              const Tensor square = F.transpose() * dF, dP = dF * S + F * stress((square + square.transpose()) / 2);
+              for (int r = 0; r < 9; ++r) A(r, k) = dP(r / 3, r % 3);
+            }
+            return A;
+          }};
 }
 
 /// The body as the reference sees it, points in input order.

@@ -25,17 +25,27 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
 
 namespace {
 
-/// Inverse by cofactors; false where the condition |K| |K^-1| shows that K is singular. No eigenvalues: this runs per bond.
+/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane or
+/// on a line, 30 times as long as thick): their gradients magnify noise as much.
+constexpr double poor_ratio = 1e-3;
+
+/// Inverse by cofactors; false where the eigenvalues of K spread by more than 1 / ratio. This runs per bond: eigenvalues are only
+/// computed where norms leave it open.
 template <int D>
-bool invert_quickly(const double* k, double* inverse) {
+bool invert_quickly(const double* k, double* inverse, double ratio) {
   const Square<D> m = symmetric_matrix<D>(k);
   const double size = m.norm();
   if (!(size > 0)) return false;
   const Square<D> scaled = m / size;
+  // A determinant of the size of rounding says nothing about K, nor does the inverse (of bonds on one line in 3D, say).
   const double det = scaled.determinant();
-  if (!(det > 0)) return false;
+  if (!(det > 1e-12)) return false;
   const Square<D> inv = scaled.inverse();
-  if (!(inv.norm() * singular_ratio < 1)) return false;
+  const double bound = inv.norm() * ratio;   // spread * ratio <= bound <= D spread * ratio
+  if (!(bound < 1)) {
+    double spread;
+    if (!(bound < D) || !invert_shape<D>(k, inverse, &spread) || !(spread * ratio < 1)) return false;
+  }
   for (int a = 0; a < D; ++a)
     for (int b = a; b < D; ++b) inverse[symmetric_index(D, a, b)] = inv(a, b) / size;
   return true;
@@ -55,60 +65,70 @@ void shape_tensor(const FamilyArrays& f, const double* omega, double* K) {
   for (int c = 0; c < symmetric_components(D); ++c) K[c] = sum(sums[c]);
 }
 
+/// Volume of a part: bonds that it shares count with their share.
+double part_volume(const FamilyArrays& f, const double* omega) {
+  double volume = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(f.bonds); ++k) {
+    if (f.omega[k] > 0) volume += omega[k] / f.omega[k] * f.volume[k];
+  }
+  return volume;
+}
+
 template <int D>
 void build(const Kinematics& kinematics, const KinematicsTraits& traits, const FamilyArrays& family, double horizon,
            const double* bond_share, LocalStencil& out, AlignedVector<double>& scratch) {
-  const bool by_bond = traits.parts == 0;
+  const int parts = kinematics.parts(D);
+  const bool by_bond = parts == 0;
   const FamilyView view = family.view(horizon);
   out.bonds = family.bonds;
   const int first = traits.selective ? 1 : 0;
-  out.points = first + (by_bond ? family.bonds : traits.parts);
+  out.points = first + (by_bond ? family.bonds : parts);
   out.tiles = (out.points + 7) / 8;
   out.g.assign(static_cast<std::size_t>(D) * out.tiles * static_cast<std::size_t>(out.bonds) * 8, 0.0);
   out.share.assign(static_cast<std::size_t>(out.tiles) * 8, 0.0);
-  out.fallbacks = 0;
+  out.fallbacks = out.dropped = 0;
   scratch.resize(family.size);
-  double K[6], inverse[6];
-  const auto write = [&](int q, const double* omega) {
-    for (int k = 0; k < family.bonds; ++k) {
-      const double w = omega[k] * family.volume[static_cast<std::size_t>(k)];
-      for (int e = 0; e < D; ++e) {
+  // Writes row q where these weights give a gradient.
+  const auto write = [&](int q, const double* omega, double ratio) {
+    double K[6], inverse[6];
+    shape_tensor<D>(family, omega, K);
+    if (!invert_quickly<D>(K, inverse, ratio)) return false;
+    for (int e = 0; e < D; ++e) {
+      double* row = out.g.data() + (static_cast<std::size_t>(e) * out.tiles + static_cast<std::size_t>(q / 8)) * static_cast<std::size_t>(out.bonds) * 8 + q % 8;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k) {
         double g = 0;
-        for (int a = 0; a < D; ++a) g += inverse[symmetric_index(D, a, e)] * family.xi[a][static_cast<std::size_t>(k)];
-        out.g[((static_cast<std::size_t>(e) * out.tiles + static_cast<std::size_t>(q / 8)) * static_cast<std::size_t>(out.bonds) + static_cast<std::size_t>(k)) * 8 + static_cast<std::size_t>(q % 8)] = w * g;
+        for (int a = 0; a < D; ++a) g += inverse[symmetric_index(D, a, e)] * family.xi[a][k];
+        row[8 * k] = omega[k] * family.volume[k] * g;
       }
     }
+    return true;
   };
-  const auto write_whole = [&](int q) {
-    shape_tensor<D>(family, family.omega.data(), K);
-    if (invert_quickly<D>(K, inverse)) write(q, family.omega.data());
-  };
-  if (traits.selective) write_whole(0);
-  int admissible = 0;
+  if (traits.selective) write(0, family.omega.data(), singular_ratio);
+  double total = 0;
   for (int q = first; q < out.points; ++q) {
+    double& share = out.share[static_cast<std::size_t>(q)];
     kinematics.weights(view, q - first, scratch.data());
-    shape_tensor<D>(family, scratch.data(), K);
-    const bool regular = invert_quickly<D>(K, inverse);
-    if (regular) {
-      write(q, scratch.data());
-    } else {
-      ++out.fallbacks;
-      if (by_bond) write_whole(q);   // a domain too poor for a gradient of its own uses the whole family
-    }
+    const bool regular = write(q, scratch.data(), poor_ratio);
     if (by_bond) {
-      out.share[static_cast<std::size_t>(q)] = bond_share[q - first];
+      share = bond_share[q - first];
+      if (!regular) {
+        ++out.fallbacks;
+        write(q, family.omega.data(), singular_ratio);
+      }
     } else if (regular) {
-      out.share[static_cast<std::size_t>(q)] = 1.0;
-      ++admissible;
+      share = traits.part_weight == PartWeight::volume ? part_volume(family, scratch.data()) : 1.0;
+      total += share;
+    } else {
+      ++out.dropped;
     }
   }
   if (by_bond) return;
-  if (admissible == 0) {
-    write_whole(first);
-    out.share[static_cast<std::size_t>(first)] = 1.0;
-    admissible = 1;
+  if (!(total > 0)) {
+    ++out.fallbacks;
+    write(first, family.omega.data(), singular_ratio);
+    out.share[static_cast<std::size_t>(first)] = total = 1.0;
   }
-  for (double& share : out.share) share /= admissible;
+  for (double& share : out.share) share /= total;
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ struct LocalStencil {
   AlignedVector<double> g;
   AlignedVector<double> share;               ///< w_q, padded; their sum is 1
   int fallbacks = 0;                         ///< evaluation points that use the whole family
+  int dropped = 0;                           ///< parts without a gradient of their own
   const double* row(int e, int tile) const noexcept {
     return g.data() + (static_cast<std::size_t>(e) * tiles + tile) * static_cast<std::size_t>(bonds) * 8;
   }

@@ -15,7 +15,7 @@ namespace perikit {
 
 template <int D>
 WeightedModel<D>::WeightedModel(const ModelParts& parts)
-    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
+    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(kinematics_->parts(D)),
       condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
   normaliser_.assign(body_.stride(), 0.0);
   if (body_.lattice()) prepare_lattice(*parts.influence);
@@ -72,7 +72,7 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
     }
   }
   block_first_.push_back(groups_.size());
-  // Stencils of the classes, the most common ones first, up to the cap.
+  // Stencils of the classes, the most common ones first, kept up to the cap.
   std::vector<std::size_t> members(lattice_bonds_.size(), 0);
   std::vector<std::int32_t> example(lattice_bonds_.size(), -1);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -87,11 +87,12 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
   Memory m;
   for (const std::int32_t k : order) {
     const auto family = static_cast<std::size_t>(k);
-    if (members[family] == 0 || bytes > stencil_bytes) break;
+    if (members[family] == 0) break;
     Group group = groups_[static_cast<std::size_t>(example[family])];
     group.family = -1;
     load_family(group, m);
-    fallbacks_ += static_cast<std::size_t>(m.stencil.fallbacks) * members[family];
+    count(m.stencil, members[family]);
+    if (bytes > stencil_bytes) continue;
     bytes += m.stencil.bytes();
     stored[family] = static_cast<std::int32_t>(stencils_.size());
     stencils_.push_back(m.stencil);
@@ -145,6 +146,11 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   bonds_ = static_cast<std::size_t>(kept);
   for (std::size_t p = 0; p < body_.points(); p += cloud_block) block_first_.push_back(p);
   block_first_.push_back(body_.points());
+  Memory m;
+  for (const Group& group : groups_) {
+    load_family(group, m);
+    count(m.stencil, 1);
+  }
   const std::size_t blocks = block_first_.size() - 1;
   std::vector<std::vector<std::int32_t>> touches(blocks);
   for (std::size_t b = 0; b < blocks; ++b) {
@@ -190,9 +196,15 @@ void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
     m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? omega : 1.0) / normaliser_[p];
   }
   build_stencil(*kinematics_, traits_, m.family, body_.horizon(), m.share.data(), m.stencil, m.weights);
-  if (traits_.parts > 0) {
+  if (parts_ > 0) {
     for (double& share : m.stencil.share) share *= 1 - damage_.data()[p];
   }
+}
+
+template <int D>
+void WeightedModel<D>::count(const LocalStencil& stencil, std::size_t points) {
+  fallbacks_ += static_cast<std::size_t>(stencil.fallbacks) * points;
+  dropped_ += static_cast<std::size_t>(stencil.dropped) * points;
 }
 
 template <int D>
@@ -354,7 +366,8 @@ ModelReport WeightedModel<D>::report() const {
   report.broken_bonds = broken_;
   report.singular_families = singular_;
   report.fallbacks = fallbacks_;
-  report.evaluation_points = traits_.parts > 0 ? body_.points() * static_cast<std::size_t>(traits_.parts) : bonds_;
+  report.dropped_parts = dropped_;
+  report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
   for (const LocalStencil& s : stencils_) stencils += s.bytes();
   report.bytes = (lattice_ ? lattice_->bytes() : 0) + stencils + groups_.size() * sizeof(Group) + cloud_.neighbour.size() * 4 +

@@ -44,6 +44,7 @@ class WeightedModel final : public Model {
 
   void prepare_lattice(const InfluenceFunction& influence);
   void prepare_cloud(const InfluenceFunction& influence);
+  void count(const LocalStencil& stencil, std::size_t points);
   void load_family(const Group& group, Memory& m) const;
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
@@ -57,6 +58,7 @@ class WeightedModel final : public Model {
   const Laws& laws_;
   std::shared_ptr<const Kinematics> kinematics_;
   KinematicsTraits traits_;
+  int parts_;                                               ///< evaluation points per point; 0: one per bond
   std::optional<LatticeFamilies> lattice_;
   std::vector<std::vector<std::uint16_t>> lattice_bonds_;   ///< slots of each class of family
   std::vector<LocalStencil> stencils_;
@@ -67,7 +69,7 @@ class WeightedModel final : public Model {
   std::vector<std::size_t> block_first_;
   Colouring cloud_colouring_;
   Field condition_, damage_;
-  std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0;
+  std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;
 };

@@ -27,6 +27,7 @@ std::string Simulation::summary() {
     text += fmt::format("warning       {} points have a family too poor for a gradient; they carry no strain of their own\n", report.singular_families);
   }
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points use the gradient of the whole family\n", report.fallbacks);
+  if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
   text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.points()));

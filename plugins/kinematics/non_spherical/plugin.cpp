@@ -14,7 +14,7 @@ class NonSpherical final : public Kinematics {
   NonSpherical(double n1, double n2, BondWeight weight) : n1_(n1), n2_(n2), weight_(weight) {}
 
   KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::weighted, .weight = weight_, .parts = 0};
+    return {.at = EvaluationPoints::weighted, .weight = weight_};
   }
 
   void weights(const FamilyView& family, int q, double* omega) const noexcept override {

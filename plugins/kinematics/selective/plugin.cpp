@@ -13,6 +13,7 @@ class Selective final : public Kinematics {
     traits.selective = true;
     return traits;
   }
+  int parts(int dimension) const override { return base_->parts(dimension); }
   void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override { base_->correction(family, g, stride); }
   void weights(const FamilyView& family, int q, double* omega) const noexcept override { base_->weights(family, q, omega); }
 
@@ -29,7 +30,7 @@ PERIKIT_PLUGIN(registrar) {
       {.name = "selective",
        .summary = "any bond-level kinematics with the volume change of the whole family: no volumetric locking",
        .parameters = std::move(table),
-       .examples = {"base = \"baqp\"", "base = { type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", "base = \"projection\""},
+       .examples = {"base = \"baqp\"", "base = { type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", "base = \"projection\"", "base = \"sub_horizon\""},
        .equations = "Fh = (Jbar_i / Jt_q)^(1/3) Ft_q, Ft_q from the base, Jbar_i from the point gradient of the owner i\n"
                     "forces and tangent by the exact chain rule of Fh(Ft, Fbar)",
        .source = "Scabbia et al., eqs. 24-30, in variational form",

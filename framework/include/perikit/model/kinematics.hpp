@@ -35,14 +35,14 @@ struct FamilyView {
 enum class EvaluationPoints { points, bonds, weighted };
 enum class BondBase { own, mean };          ///< A_b of the bond shape
 enum class BondWeight { volume, kernel };   ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
+enum class PartWeight { equal, volume };    ///< W_q of the admissible parts of point i: the same share of V_i, or shares as their volumes
 
 struct KinematicsTraits {
   EvaluationPoints at = EvaluationPoints::points;
   int order = 1;                            ///< of the point gradient Hbar
   BondBase base = BondBase::own;            ///< bond shape
   BondWeight weight = BondWeight::volume;   ///< evaluation points that belong to bonds
-  /// weighted shape: evaluation points per point; 0: one per bond
-  int parts = 0;
+  PartWeight part_weight = PartWeight::equal;   ///< evaluation points that belong to parts of the family
   /// bond shape: g depends on xi alone, so that ij and ji give the same H and are evaluated once (base = mean)
   bool pair_symmetric = false;
   /// bond shape: g is odd in xi and independent of omega and the shape tensor
@@ -56,9 +56,14 @@ class Kinematics {
  public:
   virtual ~Kinematics() = default;
   virtual KinematicsTraits traits() const noexcept = 0;
+  /// weighted shape: evaluation points per point of a body of this dimension; 0: one per bond.
+  /// Throws InputError where the options do not suit the dimension; asked at set-up.
+  virtual int parts(int /*dimension*/) const { return 0; }
   /// bond shape: g_b for each bond of the view, g[c * stride + k], c < dimension [1/m]. Fully overwritten.
   virtual void correction(const FamilyView&, double* /*g*/, std::size_t /*stride*/) const noexcept {}
-  /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself): omega[k] for all bonds. Fully overwritten.
+  /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself): omega[k] for all bonds, at most the
+  /// view's omega for a part. Fully overwritten. A part without a well-conditioned gradient of its own is dropped and the others share
+  /// its weight; a bond's domain without one, and a family without any part, use the whole family.
   virtual void weights(const FamilyView&, int /*q*/, double* /*omega*/) const noexcept {}
 };
 

@@ -1,0 +1,17 @@
+#pragma once
+/// Scenes of configs/, ready to run, with overrides.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/contract/fixture.hpp"
+
+namespace perikit::validation {
+
+/// The parts of this build.
+Registry& registry();
+/// scene: relative to configs/.
+std::unique_ptr<Simulation> load(const std::string& scene, std::vector<std::string> overrides = {});
+
+}  // namespace perikit::validation

@@ -1,0 +1,113 @@
+/// Displacements that an averaged gradient does not see: the scenes of Partmann et al., section 4.4, and Roy Chowdhury et al., eq. 16,
+/// run as they stand for every kinematics.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/validation/scenes.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+
+namespace {
+
+/// Averages at the one point of a set.
+struct Sample {
+  double density, H;   ///< strain energy density, first component of F - I
+  std::size_t fallbacks, dropped_parts;
+};
+
+Sample sample(const std::string& scene, const std::string& set, std::vector<std::string> overrides) {
+  const auto simulation = load(scene, std::move(overrides));
+  BodyProblem& problem = simulation->problem();
+  PointSamples samples;
+  const EvaluationStatus status = problem.model().sample(problem.displacement(), samples);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  const std::vector<std::int32_t>& points = problem.body().set(set);
+  REQUIRE(points.size() == 1);
+  const ModelReport report = problem.model().report();
+  return {samples.strain_energy_density.data()[points[0]], samples.H.component(0)[points[0]], report.fallbacks, report.dropped_parts};
+}
+
+}  // namespace
+
+TEST_CASE("checkerboard: energy density of every kinematics and influence function") {
+  struct Row {
+    const char* kinematics;
+    double constant, cubic_spline, gaussian;
+  };
+  const Row rows[] = {{"{ type = \"conventional\" }", 0, 0, 0},
+                      {"{ type = \"baqp\" }", 1.037664e-1, 2.510877e-1, 1.247090e-1},
+                      {"{ type = \"projection\" }", 1.037664e-1, 1.037664e-1, 1.037664e-1},
+                      {"{ type = \"sub_horizon\" }", 4.268558e-2, 1.201349e-1, 4.733806e-2},
+                      {"{ type = \"bond_associated\" }", 6.280168e-2, 1.227817e-1, 6.697986e-2},
+                      {"{ type = \"bond_augmented\", lambda = 10.0 }", 2.333438e-3, 9.423944e-3, 2.572849e-3},
+                      {"{ type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", 3.635143e-2, 3.635143e-2, 3.635143e-2}};
+  for (const Row& row : rows) {
+    const std::pair<const char*, double> columns[] = {{"constant", row.constant}, {"cubic_spline", row.cubic_spline}, {"gaussian", row.gaussian}};
+    for (const auto& [influence, expected] : columns) {
+      const double density = sample("partmann/checkerboard.toml", "inside",
+                                    {fmt::format("kinematics={}", row.kinematics), fmt::format("family.influence={}", influence)}).density;
+      // F - I of the conventional model is rounding; the densities of the others are of the order of 0.1.
+      CHECK_MESSAGE(std::abs(density - expected) <= std::max(1e-6 * expected, 1e-20), row.kinematics, " ", influence, ": ", fmt::format("{:.6e}", density),
+                    " against ", expected);
+    }
+  }
+}
+
+TEST_CASE("zig-zag: F = 1 in the conventional model, energy in every other one") {
+  const Sample conventional = sample("partmann/zigzag.toml", "inside", {"kinematics={ type = \"conventional\" }"});
+  CHECK(std::abs(conventional.H) <= 1e-16);
+  CHECK(conventional.density <= 1e-28);
+  for (const std::string& kinematics : registry().names(Kind::kinematics)) {
+    if (kinematics == "conventional") continue;
+    INFO(kinematics);
+    CHECK(sample("partmann/zigzag.toml", "inside", {fmt::format("kinematics={{ type = \"{}\" }}", kinematics)}).density > 1e-3);
+  }
+  // By hand: two half-horizons of F - 1 = -+ 0.04; four parts hold one bond each, F - 1 = -+ 0.2 (inner) and 0 (outer).
+  CHECK(sample("partmann/zigzag.toml", "inside", {}).density == doctest::Approx(0.8).epsilon(1e-12));
+  CHECK(sample("partmann/zigzag.toml", "inside", {"kinematics.parts=4"}).density == doctest::Approx(0.5 * 1000 * 0.2 * 0.2 / 2).epsilon(1e-12));
+}
+
+TEST_CASE("sub_horizon: parts without a gradient are dropped, their number must suit the dimension") {
+  // The last point of either end has no outer half, and nothing else is missing.
+  const Sample bar = sample("partmann/zigzag.toml", "inside", {});
+  CHECK(bar.dropped_parts == 2);
+  CHECK(bar.fallbacks == 0);
+  // m = 1.1: the inner quarters are empty.
+  CHECK(sample("partmann/zigzag.toml", "inside", {"kinematics.parts=4", "family.horizon_ratio=1.1"}).dropped_parts == 2 * 41 + 2);
+  CHECK_THROWS_WITH_AS(sample("partmann/checkerboard.toml", "inside", {"kinematics={ type = \"sub_horizon\", parts = 4 }"}),
+                       doctest::Contains("a body of dimension 3 has 8 parts"), InputError);
+}
+
+TEST_CASE("sub_horizon: shares of the parts, equal or by volume") {
+  // The second point of the bar, by hand: F - 1 = -0.2 in the half with one bond, 0.04 in the half with two.
+  const double psi[] = {0.5 * 1000 * 0.2 * 0.2, 0.5 * 1000 * 0.04 * 0.04};
+  const auto density = [](const char* weights) {
+    return sample("partmann/zigzag.toml", "inside", {"sets.inside={ nearest = [1] }", fmt::format("kinematics.weights={}", weights)}).density;
+  };
+  CHECK(density("equal") == doctest::Approx((psi[0] + psi[1]) / 2).epsilon(1e-12));
+  CHECK(density("volume") == doctest::Approx((psi[0] + 2 * psi[1]) / 3).epsilon(1e-12));
+}
+
+TEST_CASE("bond_associated: domains that are too poor use the whole family") {
+  // Nearest neighbours only: the domain of a bond is that bond (and on a line that is enough).
+  const Sample block = sample("partmann/checkerboard.toml", "inside", {"kinematics={ type = \"bond_associated\" }", "family.horizon_ratio=1.015"});
+  CHECK(block.fallbacks == 3 * 2 * 15 * 16 * 16);
+  CHECK(block.density <= 1e-20);
+  const Sample bar = sample("partmann/zigzag.toml", "inside", {"kinematics={ type = \"bond_associated\" }", "family.horizon_ratio=1.015"});
+  CHECK(bar.fallbacks == 0);
+  CHECK(bar.density == doctest::Approx(0.5 * 1000 * 0.2 * 0.2).epsilon(1e-12));
+}
+
+TEST_CASE("sine: the conventional model keeps 3/pi^2 of the amplitude") {
+  const double limit = 3 / (std::numbers::pi * std::numbers::pi);
+  CHECK(std::abs(sample("chowdhury/sine.toml", "crest", {}).H / 0.9 - limit) <= 1e-4);
+  // Ten times finer: the error falls with the square of the spacing.
+  const double dx = 0.1 / 500.5;
+  const std::vector<std::string> finer{fmt::format("body.lattice={{ spacing = {0:.17g}, lower = [{1:.17g}], upper = [{2:.17g}] }}", dx, -1001.5 * dx, 1001.5 * dx)};
+  CHECK(std::abs(sample("chowdhury/sine.toml", "crest", finer).H / 0.9 - limit) <= 1e-6);
+}
