@@ -11,6 +11,7 @@
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/study_plot.hpp"
+#include "scene/diagnostics.hpp"
 
 namespace perikit {
 
@@ -45,6 +46,18 @@ void check_source(const StudyQuantity& quantity, const Scene& scene) {
                    fmt::format("found \"{}\"; allowed: {}{}", quantity.from, fmt::join(known, ", "), did_you_mean(quantity.from, known)));
 }
 
+/// Errors of a value come from the command line, as the scene reader sees it: they are shown where the study has its list.
+std::string placed(std::string message, const Study& study) {
+  for (const StudyKey& key : study.keys) {
+    const std::string seen = fmt::format("{}: {}:", command_line, key.key);
+    const SourcePosition& at = key.position;
+    for (std::size_t i; (i = message.find(seen)) != std::string::npos;) {
+      message.replace(i, seen.size(), fmt::format("{}:{}:{}: values.{}:", at.file, at.line, at.column, key.key));
+    }
+  }
+  return message;
+}
+
 Planned plan(const Study& study, const std::vector<std::size_t>& combination, PartCatalogue& parts, SceneOptions options) {
   Planned planned;
   for (std::size_t k = 0; k < study.keys.size(); ++k) {
@@ -57,7 +70,7 @@ Planned plan(const Study& study, const std::vector<std::size_t>& combination, Pa
     planned.scene = read_scene(study.scene, parts, options);
   } catch (const InputError& error) {
     planned.row.status = "refused";
-    planned.row.reason = error.what();
+    planned.row.reason = placed(error.what(), study);
     return planned;
   }
   for (const StudyQuantity& quantity : study.quantities) {
