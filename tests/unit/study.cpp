@@ -106,8 +106,9 @@ TEST_CASE("grid: the first key of the file is the slowest; zip: the lists side b
 
 TEST_CASE("values may be anything that a scene takes; quoted keys mean the same as dotted ones") {
   StudyFolder folder;
-  const Study study = folder.parse(replaced(study_text, "kinematics.type = [\"conventional\", \"baqp\"]",
-                                            "\"kinematics\" = [{ type = \"baqp\", order = 2 }, \"a \\\"b\\\"\", [1, 2.5], true, 1e-30]"));
+  const Study study =
+      folder.parse(replaced(study_text, "kinematics.type = [\"conventional\", \"baqp\"]",
+                            "\"kinematics\" = [{ type = \"baqp\", order = 2 }, \"a \\\"b\\\"\", [1, 2.5], true, 1e-30]"));
   const auto& values = study.keys[0].values;
   REQUIRE(values.size() == 5);
   CHECK(values[0].toml == "{ order = 2, type = \"baqp\" }");
@@ -127,23 +128,30 @@ TEST_CASE("errors of a study file name place, key, what was found and what is al
     CHECK_MESSAGE(contains(message, expected), message);
   };
   check("format = 1", "format = 2", "study.toml:1:10: format: found the integer 2; allowed: an integer >= 1 and <= 1");
-  check("title", "titel", "study.toml:2:1: titel: found an unknown key; allowed: values, quantity, plot, format, title, scene, mode; did you mean 'title'?");
-  check("scene.toml", "missing.toml", "study.toml:3:9: scene: found \"missing.toml\", but missing.toml is no file; allowed: a scene file");
-  check("[values]", "mode = \"cross\"\n[values]", "study.toml:4:8: mode: found the string \"cross\"; allowed: \"grid\" or \"zip\"");
+  check("title", "titel",
+        "study.toml:2:1: titel: found an unknown key; allowed: values, quantity, plot, format, title, scene, mode; did you mean "
+        "'title'?");
+  check("scene.toml", "missing.toml",
+        "study.toml:3:9: scene: found \"missing.toml\", but missing.toml is no file; allowed: a scene file");
+  check("[values]", "mode = \"cross\"\n[values]",
+        "study.toml:4:8: mode: found the string \"cross\"; allowed: \"grid\" or \"zip\"");
   check("[values]", "mode = \"zip\"\n[values]",
         "study.toml:7:15: values.constants.k: found a list of 3; allowed with mode = \"zip\": 2, as many as kinematics.type has");
   check("[1, 2, 4]", "3", "study.toml:6:15: values.constants.k: found the integer 3; allowed: a list of values, at least one");
   check("[1, 2, 4]", "[]", "values.constants.k: found a list of 0; allowed: a list of values, at least one");
-  check("[1, 2, 4]", "[1979-05-27]", "values.constants.k.0: found a date or time; allowed: a number, boolean, string, list or table");
+  check("[1, 2, 4]", "[1979-05-27]",
+        "values.constants.k.0: found a date or time; allowed: a number, boolean, string, list or table");
   check("constants.k = [1, 2, 4]", "\"kinematics.type\" = [\"baqp\"]", "found the key twice; allowed: once");
-  check("\"max\"", "\"sum\"", "study.toml:10:10: quantity.0.reduce: found the string \"sum\"; allowed: \"last\", \"max\", \"min\" or \"mean\"");
+  check("\"max\"", "\"sum\"",
+        "study.toml:10:10: quantity.0.reduce: found the string \"sum\"; allowed: \"last\", \"max\", \"min\" or \"mean\"");
   check("\"2 * k\"", "0.0", "study.toml:11:13: quantity.0.reference: found the number 0.0; allowed: a number other than zero");
   check("name = \"cost\"", "name = \"top\"", "study.toml:13:8: quantity.1.name: found \"top\"; allowed: a name of its own");
   check("name = \"cost\"", "name = \"constants.k\"", "quantity.1.name: found \"constants.k\"; allowed: a name of its own");
   const std::string plot = "\n[plot]\nx = \"cots\"\ny = \"top_error\"\nseries = \"k\"\nlog = \"z\"\n";
   check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot,
         "plot.x: found \"cots\"; allowed: kinematics.type, constants.k, top, top_error, cost; did you mean 'cost'?");
-  check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot, "plot.series: found \"k\"; allowed: kinematics.type, constants.k");
+  check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot,
+        "plot.series: found \"k\"; allowed: kinematics.type, constants.k");
   check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot, "plot.log: found the string \"z\"");
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "values: found nothing; allowed: a table of scene keys"));
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "quantity: found nothing; allowed: [[quantity]]"));
@@ -166,14 +174,16 @@ TEST_CASE("a quantity or reference that does not fit the scene is refused before
   check("2 * k", "2 * kk", "study.toml:11:13: quantity.0.reference: found the expression \"2 * kk\": unknown name 'kk'");
   check("2 * k", "2 * x", "quantity.0.reference: found an expression in x, y or z; allowed: one in the constants of the scene");
   check("2 * k", "k - 2", "quantity.0.reference: found the value 0; allowed: any other");
-  check("kinematics.type = [\"conventional\", \"baqp\"]", "kinematics.typ = [1, 2]", "values: none of the 6 combinations makes a scene; the first: ");
+  check("kinematics.type = [\"conventional\", \"baqp\"]", "kinematics.typ = [1, 2]",
+        "values: none of the 6 combinations makes a scene; the first: ");
 }
 
 TEST_CASE("the table holds values, quantities, errors and what went wrong; a failed run does not stop the study") {
   StudyFolder folder;
   const Study study = folder.parse(replaced(study_text, "\"baqp\"]", "\"baqp\", \"bapq\"]"));
   std::vector<std::string> lines;
-  const StudyTable table = run_study(study, folder.parts, {}, folder.path / "out", pretend, [&](const std::string& line) { lines.push_back(line); });
+  const StudyTable table =
+      run_study(study, folder.parts, {}, folder.path / "out", pretend, [&](const std::string& line) { lines.push_back(line); });
   REQUIRE(table.rows.size() == 9);
   CHECK(lines.size() == 18);
   CHECK(lines[0] == "run 1 of 9: kinematics.type = \"conventional\", constants.k = 1");
@@ -185,9 +195,11 @@ TEST_CASE("the table holds values, quantities, errors and what went wrong; a fai
   CHECK(table.rows[5].status == "failed");
   CHECK_FALSE(table.number(table.rows[5], "top").has_value());
   CHECK(table.rows[6].status == "refused");
-  CHECK(contains(table.rows[6].reason, "study.toml:5:19: values.kinematics.type: unknown kinematics 'bapq'; did you mean 'baqp'?"));
+  CHECK(
+      contains(table.rows[6].reason, "study.toml:5:19: values.kinematics.type: unknown kinematics 'bapq'; did you mean 'baqp'?"));
   const std::string csv = content(folder.path / "out" / "table.csv");
-  CHECK(csv.starts_with("run,kinematics.type,constants.k,top,top_error,cost,status,reason\n0,conventional,1,1.5,0.25,0.25,done,\n"));
+  CHECK(csv.starts_with(
+      "run,kinematics.type,constants.k,top,top_error,cost,status,reason\n0,conventional,1,1.5,0.25,0.25,done,\n"));
   CHECK(contains(csv, "5,baqp,4,,,,failed,\"det F < 0 at point 3, \"\"x\"\" = 1\"\n"));
   CHECK(contains(content(folder.path / "out" / "table.md"), "| 2 | conventional | 4 | 6 | 0.25 | 0.25 | done |  |\n"));
   CHECK(fs::exists(folder.path / "out" / "runs" / "4" / "history.csv"));
@@ -205,13 +217,16 @@ TEST_CASE("reductions over the history") {
   CHECK(top("mean") == doctest::Approx(5.0 / 3.0).epsilon(1e-15));
 }
 
-TEST_CASE("the picture has a line for each value of the series" * doctest::skip(std::system("gnuplot --version > /dev/null 2>&1") != 0)) {
+TEST_CASE("the picture has a line for each value of the series" *
+          doctest::skip(std::system("gnuplot --version > /dev/null 2>&1") != 0)) {
   StudyFolder folder;
-  const Study study = folder.parse(study_text + "[plot]\nx = \"cost\"\ny = \"top_error\"\nseries = \"kinematics.type\"\nlog = \"xy\"\n");
+  const Study study =
+      folder.parse(study_text + "[plot]\nx = \"cost\"\ny = \"top_error\"\nseries = \"kinematics.type\"\nlog = \"xy\"\n");
   run_study(study, folder.parts, {}, folder.path / "out", pretend, silent);
   CHECK(content(folder.path / "out" / "plot.png").starts_with("\x89PNG"));
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
-  CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }), "no run gives numbers for cost and top_error"));
+  CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
+                 "no run gives numbers for cost and top_error"));
 }
 
 TEST_CASE("a run in a process of its own: its measures come back, its end is told") {

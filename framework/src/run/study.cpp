@@ -31,10 +31,12 @@ double reference_of(const StudyQuantity& quantity, const Scene& scene) {
   const std::string key = quantity.path + ".reference";
   const Expression expression(*quantity.reference, scene.constants, false, quantity.reference_position, key);
   if (expression.depends_on_position()) {
-    throw InputError(quantity.reference_position, key, "found an expression in x, y or z; allowed: one in the constants of the scene");
+    throw InputError(quantity.reference_position, key,
+                     "found an expression in x, y or z; allowed: one in the constants of the scene");
   }
   const double value = expression({});
-  if (value == 0) throw InputError(quantity.reference_position, key, "found the value 0; allowed: any other, since errors are relative to it");
+  if (value == 0)
+    throw InputError(quantity.reference_position, key, "found the value 0; allowed: any other, since errors are relative to it");
   return value;
 }
 
@@ -42,8 +44,9 @@ void check_source(const StudyQuantity& quantity, const Scene& scene) {
   std::vector<std::string> known = history_columns(scene);
   known.insert(known.end(), run_measures().begin(), run_measures().end());
   if (std::ranges::find(known, quantity.from) != known.end()) return;
-  throw InputError(quantity.from_position, quantity.path + ".from",
-                   fmt::format("found \"{}\"; allowed: {}{}", quantity.from, fmt::join(known, ", "), did_you_mean(quantity.from, known)));
+  throw InputError(
+      quantity.from_position, quantity.path + ".from",
+      fmt::format("found \"{}\"; allowed: {}{}", quantity.from, fmt::join(known, ", "), did_you_mean(quantity.from, known)));
 }
 
 /// Errors of a value come from the command line, as the scene reader sees it: they are shown where the study has its list.
@@ -84,8 +87,9 @@ std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const Sc
   std::vector<Planned> runs;
   for (const auto& combination : combinations(study)) runs.push_back(plan(study, combination, parts, options));
   if (std::ranges::none_of(runs, [](const Planned& run) { return run.scene.has_value(); })) {
-    throw InputError({study.file.string()}, "values",
-                     fmt::format("none of the {} combinations makes a scene; the first: {}", runs.size(), runs.front().row.reason));
+    throw InputError(
+        {study.file.string()}, "values",
+        fmt::format("none of the {} combinations makes a scene; the first: {}", runs.size(), runs.front().row.reason));
   }
   return runs;
 }
@@ -107,20 +111,23 @@ std::optional<double> measured(const StudyQuantity& quantity, const RunOutcome& 
   return measure == outcome.measures.end() ? std::nullopt : std::optional(measure->second);
 }
 
-void fill(StudyRow& row, const Study& study, const RunOutcome& outcome, const std::vector<double>& references, const fs::path& folder) {
+void fill(StudyRow& row, const Study& study, const RunOutcome& outcome, const std::vector<double>& references,
+          const fs::path& folder) {
   row.status = outcome.status;
   row.reason = outcome.reason;
   if (outcome.status != "done") return;
   const History history = read_history(folder / "history.csv");
   for (std::size_t q = 0; q < study.quantities.size(); ++q) {
     row.quantities[q] = measured(study.quantities[q], outcome, history);
-    if (references[q] != 0 && row.quantities[q]) row.errors[q] = std::abs(*row.quantities[q] - references[q]) / std::abs(references[q]);
+    if (references[q] != 0 && row.quantities[q])
+      row.errors[q] = std::abs(*row.quantities[q] - references[q]) / std::abs(references[q]);
   }
 }
 
 std::string described(const Study& study, const StudyRow& row) {
   std::vector<std::string> texts;
-  for (std::size_t k = 0; k < study.keys.size(); ++k) texts.push_back(fmt::format("{} = {}", study.keys[k].key, row.values[k].toml));
+  for (std::size_t k = 0; k < study.keys.size(); ++k)
+    texts.push_back(fmt::format("{} = {}", study.keys[k].key, row.values[k].toml));
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
@@ -146,8 +153,8 @@ std::vector<std::vector<std::size_t>> combinations(const Study& study) {
   return all;
 }
 
-StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder, const StudyRunner& run,
-                     const std::function<void(const std::string&)>& progress) {
+StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress) {
   std::vector<Planned> runs = plan_all(study, parts, options);
   fs::create_directories(folder);
   StudyTable table{study, {}};
@@ -162,7 +169,9 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
     table.rows.push_back(row);
     write_file_atomically(folder / "table.csv", table.csv());
     write_file_atomically(folder / "table.md", table.markdown());
-    if (stop_requested()) throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", i + 1, runs.size(), (folder / "table.csv").string()));
+    if (stop_requested())
+      throw RunError(
+          fmt::format("stopped by a signal; {} of {} runs are in {}", i + 1, runs.size(), (folder / "table.csv").string()));
   }
   if (study.plot) draw(table, folder / "plot.png");
   return table;

@@ -47,14 +47,17 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
   if (lines.empty()) throw RunError(fmt::format("{}: no run gives numbers for {} and {}", picture.string(), plot.x, plot.y));
 
   std::string script = gnuplot_terminal(picture, 1150, 750);
-  script += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\n", gnuplot_quoted(table.study.title), gnuplot_quoted(plot.x), gnuplot_quoted(plot.y));
+  script += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\n", gnuplot_quoted(table.study.title), gnuplot_quoted(plot.x),
+                        gnuplot_quoted(plot.y));
   if (!plot.log.empty()) script += fmt::format("set logscale {}\n", plot.log);
-  script += "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
-  script += plot.series.empty() ? "unset key\n" : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
+  script +=
+      "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
+  script +=
+      plot.series.empty() ? "unset key\n" : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
   for (std::size_t i = 0; i < lines.size(); ++i) script += fmt::format("$line{} << end\n{}end\n", i, lines[i].points);
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    script += fmt::format("{} $line{} using 1:2 with linespoints lw 2 ps 1.4 pt {} lc rgb '{}' title {}", i == 0 ? "plot" : ",", i,
-                          marks[i % marks.size()], colours[i % colours.size()], gnuplot_quoted(lines[i].name));
+    script += fmt::format("{} $line{} using 1:2 with linespoints lw 2 ps 1.4 pt {} lc rgb '{}' title {}", i == 0 ? "plot" : ",",
+                          i, marks[i % marks.size()], colours[i % colours.size()], gnuplot_quoted(lines[i].name));
   }
   run_gnuplot(script + "\n", picture);
 }

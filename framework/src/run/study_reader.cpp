@@ -102,9 +102,11 @@ class StudyReader {
   void read_values(const toml::table& root) {
     const toml::node* node = root.get("values");
     if (!node || !node->is_table() || node->as_table()->empty()) {
-      reader_.errors.add(reader_.position(node ? *node : root), "values",
-                         fmt::format("found {}; allowed: a table of scene keys with lists of values",
-                                     !node ? "nothing" : node->is_table() ? "an empty table" : found(*node)));
+      reader_.errors.add(
+          reader_.position(node ? *node : root), "values",
+          fmt::format("found {}; allowed: a table of scene keys with lists of values", !node              ? "nothing"
+                                                                                       : node->is_table() ? "an empty table"
+                                                                                                          : found(*node)));
       return;
     }
     read_keys(*node->as_table(), "");
@@ -144,7 +146,8 @@ class StudyReader {
 
   void read_value(StudyKey& key, const toml::node& node, const std::string& path) {
     const auto text = one_line(node);
-    if (!text) reader_.refuse(node, path, fmt::format("found {}; allowed: a number, boolean, string, list or table", found(node)));
+    if (!text)
+      reader_.refuse(node, path, fmt::format("found {}; allowed: a number, boolean, string, list or table", found(node)));
     StudyValue value{text.value_or(""), text.value_or(""), std::nullopt};
     if (const auto* v = node.as_string()) value.shown = v->get();
     if (node.is_number()) value.number = node.value<double>();
@@ -155,8 +158,9 @@ class StudyReader {
     const toml::node* node = root.get("quantity");
     const toml::array* list = node ? node->as_array() : nullptr;
     if (!list || list->empty() || !list->is_homogeneous<toml::table>()) {
-      reader_.errors.add(reader_.position(node ? *node : root), "quantity",
-                         fmt::format("found {}; allowed: [[quantity]], a list of tables, at least one", node ? found(*node) : "nothing"));
+      reader_.errors.add(
+          reader_.position(node ? *node : root), "quantity",
+          fmt::format("found {}; allowed: [[quantity]], a list of tables, at least one", node ? found(*node) : "nothing"));
       return;
     }
     std::set<std::string> taken{"run", "status", "reason"};
@@ -172,7 +176,8 @@ class StudyReader {
       quantity.name = values.text("name");
       if (quantity.name.empty() || !taken.insert(quantity.name).second || !taken.insert(quantity.error_column()).second) {
         reader_.errors.add(values.position("name"), quantity.path + ".name",
-                           fmt::format("found {}; allowed: a name of its own, other than {}", toml_string(quantity.name), fmt::join(taken, ", ")));
+                           fmt::format("found {}; allowed: a name of its own, other than {}", toml_string(quantity.name),
+                                       fmt::join(taken, ", ")));
       }
     }
     if (values.has("from")) quantity.from = values.text("from");
@@ -187,7 +192,8 @@ class StudyReader {
         quantity.reference = *number;
       } else {
         reader_.refuse(*reference, quantity.path + ".reference",
-                       fmt::format("found {}; allowed: a number other than zero, or an expression in the constants of the scene", found(*reference)));
+                       fmt::format("found {}; allowed: a number other than zero, or an expression in the constants of the scene",
+                                   found(*reference)));
       }
     }
     study_.quantities.push_back(std::move(quantity));
@@ -212,12 +218,14 @@ class StudyReader {
       if (!values.has(key)) return "";
       const std::string& text = values.text(key);
       if (std::ranges::find(known, text) == known.end()) {
-        reader_.errors.add(values.position(key), join_path("plot", key),
-                           fmt::format("found {}; allowed: {}{}", toml_string(text), fmt::join(known, ", "), did_you_mean(text, known)));
+        reader_.errors.add(
+            values.position(key), join_path("plot", key),
+            fmt::format("found {}; allowed: {}{}", toml_string(text), fmt::join(known, ", "), did_you_mean(text, known)));
       }
       return text;
     };
-    study_.plot = StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : ""};
+    study_.plot =
+        StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : ""};
   }
 
   TomlReader reader_;
@@ -233,7 +241,8 @@ Study parse_study(const std::string& text, const fs::path& file, PartCatalogue& 
 Study read_study(const fs::path& file, PartCatalogue& parts) {
   std::error_code failed;
   std::ifstream stream(file, std::ios::binary);
-  if (!fs::is_regular_file(file, failed) || !stream) throw InputError({file.string()}, "", "cannot be read; allowed: a readable study file");
+  if (!fs::is_regular_file(file, failed) || !stream)
+    throw InputError({file.string()}, "", "cannot be read; allowed: a readable study file");
   return parse_study({std::istreambuf_iterator<char>(stream), {}}, file, parts);
 }
 

@@ -23,7 +23,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-RunOutcome failed(const std::string& reason) { return {"failed", reason, {}}; }
+RunOutcome failed(const std::string& reason) {
+  return {"failed", reason, {}};
+}
 
 /// "status\nmeasure value\n...\n\nreason" and a null byte, which says that nothing is missing.
 std::string packed(const RunOutcome& outcome) {

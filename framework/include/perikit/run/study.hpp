@@ -75,7 +75,8 @@ Study parse_study(const std::string& text, const std::filesystem::path& file, Pa
 /// For each run the index of the value of each key.
 std::vector<std::vector<std::size_t>> combinations(const Study& study);
 
-/// What a run itself knows besides its history: run_time [s] (with its output), set_up_time [s], steps, points, bonds, memory [bytes].
+/// What a run itself knows besides its history: run_time [s] (with its output), set_up_time [s], steps, points, bonds, memory
+/// [bytes].
 const std::vector<std::string>& run_measures();
 
 struct RunOutcome {
@@ -92,7 +93,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::fil
 RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
 
 struct StudyRow {
-  std::vector<StudyValue> values;                       ///< one for each key
+  std::vector<StudyValue> values;                         ///< one for each key
   std::vector<std::optional<double>> quantities, errors;  ///< one for each quantity; errors: |quantity - reference| / |reference|
   std::string status, reason;
 };
