@@ -27,7 +27,9 @@ namespace dll = boost::dll;
 namespace {
 
 /// Whether [offset, offset + length) lies inside a file of `size` bytes; no sum that could overflow.
-bool inside(std::uint64_t offset, std::uint64_t length, std::uint64_t size) { return offset <= size && length <= size - offset; }
+bool inside(std::uint64_t offset, std::uint64_t length, std::uint64_t size) {
+  return offset <= size && length <= size - offset;
+}
 
 /// Whether header, program headers, segments and section table of a 64-bit ELF file lie inside the file.
 bool complete(std::ifstream& in, std::uint64_t size) {

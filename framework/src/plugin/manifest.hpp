@@ -1,5 +1,5 @@
 #pragma once
-/// Manifests: beside X.so lies X.parts, TOML text that names the parts of the library, so that names are known without opening it.
+/// Manifests: beside X.so lies X.parts, TOML text that names its parts, so that names are known without opening the library.
 ///
 ///   format = 1
 ///   abi = 1

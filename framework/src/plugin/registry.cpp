@@ -116,7 +116,8 @@ struct Registry::Implementation {
     for (const auto& part : collector.parts) of(part->kind())[part->description.name] = {library, part};
     for (const Entries& kind : entries) {
       for (const auto& [name, entry] : kind) {
-        if (entry.library == library && !entry.part) throw Refusal(fmt::format("its manifest names '{}', which it does not register", name));
+        if (entry.library == library && !entry.part)
+          throw Refusal(fmt::format("its manifest names '{}', which it does not register", name));
       }
     }
   }
@@ -150,8 +151,9 @@ struct Registry::Implementation {
 
   [[noreturn]] void unknown(Kind kind, std::string_view part) const {
     const auto known = names(kind);
-    std::string message = fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
-                                      nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
+    std::string message =
+        fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
+                    nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
     const char* separator = "; refused libraries, one of which may hold it: ";
     for (const RefusedLibrary& r : refused) {
       message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);
@@ -171,8 +173,9 @@ struct Registry::Implementation {
   }
 
   InputError not_made(Kind kind, const PartValues& values, std::string_view reason) const {
-    return InputError(values.values.position("type"), values.values.path(),
-                      fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
+    return InputError(
+        values.values.position("type"), values.values.path(),
+        fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
   }
 
   template <class Interface>
@@ -226,11 +229,21 @@ void Registry::open(const fs::path& library) {
   implementation_->open(file);
 }
 
-std::vector<std::string> Registry::names(Kind kind) const { return implementation_->names(kind); }
-const PartDescription& Registry::describe(Kind kind, std::string_view name) { return implementation_->part(kind, name).description; }
-bool Registry::known(Kind kind, std::string_view name) const { return !implementation_->owner(kind, name).empty(); }
-const std::vector<RefusedLibrary>& Registry::refused() const noexcept { return implementation_->refused; }
-std::vector<fs::path> Registry::opened() const { return implementation_->opened; }
+std::vector<std::string> Registry::names(Kind kind) const {
+  return implementation_->names(kind);
+}
+const PartDescription& Registry::describe(Kind kind, std::string_view name) {
+  return implementation_->part(kind, name).description;
+}
+bool Registry::known(Kind kind, std::string_view name) const {
+  return !implementation_->owner(kind, name).empty();
+}
+const std::vector<RefusedLibrary>& Registry::refused() const noexcept {
+  return implementation_->refused;
+}
+std::vector<fs::path> Registry::opened() const {
+  return implementation_->opened;
+}
 
 fs::path Registry::library_of(Kind kind, std::string_view name) const {
   fs::path library = implementation_->owner(kind, name);

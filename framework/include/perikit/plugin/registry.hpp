@@ -33,7 +33,8 @@ class Registry final : public PartFactory, public PartCatalogue {
   /// that has changed is tried in a child process first. What is refused is kept in `refused`; a folder
   /// that cannot be read throws InputError. Of two libraries that bring the same part, the second is refused.
   void add_folder(const std::filesystem::path& folder);
-  /// Opens and registers one library now. Throws InputError with file and reason when it is refused; nothing of it is then known.
+  /// Opens and registers one library now; without a manifest of exactly this file, in a child process first, so that a library
+  /// that crashes is refused too. Throws InputError with file and reason when it is refused; nothing of it is then known.
   void open(const std::filesystem::path& library) override;
 
   /// Parts in hand: registered, or named by a manifest. Sorted.
