@@ -178,8 +178,8 @@ TEST_CASE("cli: exit status 0 for what is done, 2 for what is refused") {
   for (const std::string refused : {"", "walk scene.toml", "run", "run nowhere.toml", "run scene.toml --threads 0", "run scene.toml --unknown", "check scene.toml --set",
                               "describe material", "describe material/rubber", "describe matter/rubber", "list matter"}) {
     const Result result = desk.perikit(refused);
-    CHECK_MESSAGE(result.status == 2, "perikit " + refused, ": status ", result.status);
-    CHECK_MESSAGE(!result.err.empty(), "perikit " + refused, ": no message");
+    CHECK_MESSAGE(result.status == 2, "perikit ", refused, ": status ", result.status);
+    CHECK_MESSAGE(!result.err.empty(), "perikit ", refused, ": no message");
   }
   CHECK(contains(desk.perikit("run nowhere.toml").err, "nowhere.toml"));
 }
@@ -219,7 +219,7 @@ TEST_CASE("cli: list and describe show every part") {
   const std::string all = desk.perikit("list").out;
   std::size_t parts = 0;
   for (const std::string kind : {"kinematics", "material", "influence", "integrator"}) {
-    CHECK(contains(all, std::string(kind) + "\n"));
+    CHECK(contains(all, kind + "\n"));
     const Result list = desk.perikit(fmt::format("list {}", kind));
     CHECK(list.status == 0);
     for (const std::string& line : lines(list.out)) {
