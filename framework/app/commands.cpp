@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "bench.hpp"
 #include "describe.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
+#include "perikit/run/study.hpp"
 
 namespace perikit::app {
 
@@ -74,6 +76,22 @@ void check(const Options& options) {
   }
 }
 
+void study(const Options& options) {
+  const auto registry = open_registry(options);
+  if (options.threads > 0) set_thread_count(options.threads);
+  const Study study = read_study(options.scene, *registry);
+  const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / study.file.stem() : options.output;
+  const auto runner = [&](const Scene& scene, const std::filesystem::path& own) { return run_in_child(scene, *registry, own); };
+  const auto progress = [&](const std::string& line) {
+    if (!options.quiet) fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress);
+  const auto done = std::ranges::count(table.rows, "done", &StudyRow::status);
+  if (!options.quiet) fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(), study.plot ? " and plot" : "", folder.string());
+  if (done == 0) throw RunError(fmt::format("no run of the study came to its end; the first: {}", table.rows.front().reason));
+}
+
 void list(const Options& options) {
   const auto registry = open_registry(options);
   fmt::print("{}", list_parts(*registry, options.kind));
@@ -123,6 +141,13 @@ void add_commands(CLI::App& app, Options& options) {
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
+  CLI::App* study_command = add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
+  study_command->add_option("study", options.scene, "Study file (TOML)")->required();
+  study_command->add_option("-o,--output", options.output, "Folder for table, plot and runs; default: out/<study>");
+  study_command->add_option("--set", options.overrides, "key=value: overrides a value of the scene in every run");
+  study_command->add_option("--threads", options.threads, "Threads of each run; default: all cores")->check(CLI::Range(1, 1024));
+  study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");
+  study_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", draw);
   plot_command->add_option("results", options.plot.results, "Folder of a run, or its results.h5")->required();
   plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")->capture_default_str();

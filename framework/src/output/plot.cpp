@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numeric>
-#include <sstream>
 #include <vector>
 
+#include "output/history_file.hpp"
 #include "output/picture/body_picture.hpp"
 #include "output/picture/field_values.hpp"
 #include "output/picture/gnuplot.hpp"
@@ -68,29 +67,6 @@ hdf5::Source::Array read_field(const ResultFile& results, const std::string& gro
                      fmt::format("found {} points; the body has {}", array.rows(), points));
   }
   return array;
-}
-
-struct History {
-  std::vector<std::string> columns;
-  std::vector<std::vector<double>> values;  ///< [column][row]
-};
-
-History read_history(const fs::path& file) {
-  std::ifstream stream(file);
-  std::string line, cell;
-  if (!std::getline(stream, line)) throw InputError({file.string(), 0, 0}, "", "cannot be read, or is empty");
-  History history;
-  for (std::istringstream cells(line); std::getline(cells, cell, ',');) history.columns.push_back(cell);
-  history.values.resize(history.columns.size());
-  while (std::getline(stream, line)) {
-    if (stream.eof()) break;  // a line without its end is still being written
-    std::istringstream cells(line);
-    for (std::vector<double>& column : history.values) {
-      std::getline(cells, cell, ',');
-      column.push_back(std::strtod(cell.c_str(), nullptr));
-    }
-  }
-  return history;
 }
 
 void plot_history(const PlotOptions& options, const std::string& name, const fs::path& picture) {

@@ -13,7 +13,7 @@ namespace perikit {
 
 namespace {
 
-std::atomic<bool> stop_requested{false};
+std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
@@ -39,7 +39,14 @@ ReferenceData reference_of(const BodyProblem& problem) {
 
 }  // namespace
 
-void request_stop() noexcept { stop_requested = true; }
+void request_stop() noexcept { stop = true; }
+bool stop_requested() noexcept { return stop; }
+
+std::vector<std::string> history_columns(const Scene& scene) {
+  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
+  for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
+  return columns;
+}
 
 RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress)
     : simulation_(simulation), folder_(std::move(folder)), show_progress_(show_progress),
@@ -56,8 +63,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   std::sort(frame_times_.begin(), frame_times_.end());
   writer_ = std::make_unique<FrameWriter>(folder_, reference_of(simulation.problem()), RunAttributes{PERIKIT_VERSION, scene.title, scene.text});
   write_file_atomically(folder_ / "scene.toml", scene.resolved);
-  columns_ = {"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
-  for (const HistoryDescription& record : scene.output.history) columns_.push_back(record.name);
+  columns_ = perikit::history_columns(scene);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_);
 }
 
@@ -102,7 +108,7 @@ void RunRecorder::step_done(const StepReport& report) {
   }
   fields_.renew();
   // Read once a step: a signal that comes while this step is written ends the run after the next one, whose state is then kept.
-  stopping_ = stop_requested;
+  stopping_ = stop_requested();
   if (history_due(report.step) || stopping_) write_history(report);
   if (frame_due(report.step, report.time) || stopping_) write_frame(report);
   progress(report);

@@ -38,6 +38,9 @@ class Simulation {
   std::unique_ptr<BodyProblem> problem_;
 };
 
+/// The columns of history.csv: the standard ones, then those that the scene asks for.
+std::vector<std::string> history_columns(const Scene& scene);
+
 /// Writes frames, history and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
@@ -84,5 +87,6 @@ class RunRecorder final : public Observer {
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.
 void request_stop() noexcept;
+bool stop_requested() noexcept;
 
 }  // namespace perikit

@@ -1,0 +1,180 @@
+#include "perikit/run/study.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "output/history_file.hpp"
+#include "perikit/output/recorder.hpp"
+#include "perikit/run/simulation.hpp"
+#include "run/study_plot.hpp"
+#include "scene/diagnostics.hpp"
+
+namespace perikit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A combination, read but not run. Without a scene the row already says why.
+struct Planned {
+  std::optional<Scene> scene;
+  std::vector<double> references;  ///< one for each quantity; 0: none
+  StudyRow row;
+};
+
+double reference_of(const StudyQuantity& quantity, const Scene& scene) {
+  if (!quantity.reference) return 0;
+  const std::string key = quantity.path + ".reference";
+  const Expression expression(*quantity.reference, scene.constants, false, quantity.reference_position, key);
+  if (expression.depends_on_position()) {
+    throw InputError(quantity.reference_position, key,
+                     "found an expression in x, y or z; allowed: one in the constants of the scene");
+  }
+  const double value = expression({});
+  if (value == 0)
+    throw InputError(quantity.reference_position, key, "found the value 0; allowed: any other, since errors are relative to it");
+  return value;
+}
+
+void check_source(const StudyQuantity& quantity, const Scene& scene) {
+  std::vector<std::string> known = history_columns(scene);
+  known.insert(known.end(), run_measures().begin(), run_measures().end());
+  if (std::ranges::find(known, quantity.from) != known.end()) return;
+  throw InputError(
+      quantity.from_position, quantity.path + ".from",
+      fmt::format("found \"{}\"; allowed: {}{}", quantity.from, fmt::join(known, ", "), did_you_mean(quantity.from, known)));
+}
+
+/// Errors of a value come from the command line, as the scene reader sees it: they are shown where the study has its list.
+std::string placed(std::string message, const Study& study) {
+  for (const StudyKey& key : study.keys) {
+    const std::string seen = fmt::format("{}: {}:", command_line, key.key);
+    const SourcePosition& at = key.position;
+    for (std::size_t i; (i = message.find(seen)) != std::string::npos;) {
+      message.replace(i, seen.size(), fmt::format("{}:{}:{}: values.{}:", at.file, at.line, at.column, key.key));
+    }
+  }
+  return message;
+}
+
+Planned plan(const Study& study, const std::vector<std::size_t>& combination, PartCatalogue& parts, SceneOptions options) {
+  Planned planned;
+  for (std::size_t k = 0; k < study.keys.size(); ++k) {
+    planned.row.values.push_back(study.keys[k].values[combination[k]]);
+    options.overrides.push_back(fmt::format("{}={}", study.keys[k].key, planned.row.values.back().toml));
+  }
+  planned.row.quantities.resize(study.quantities.size());
+  planned.row.errors.resize(study.quantities.size());
+  try {
+    planned.scene = read_scene(study.scene, parts, options);
+  } catch (const InputError& error) {
+    planned.row.status = "refused";
+    planned.row.reason = placed(error.what(), study);
+    return planned;
+  }
+  for (const StudyQuantity& quantity : study.quantities) {
+    check_source(quantity, *planned.scene);
+    planned.references.push_back(reference_of(quantity, *planned.scene));
+  }
+  return planned;
+}
+
+std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const SceneOptions& options) {
+  std::vector<Planned> runs;
+  for (const auto& combination : combinations(study)) runs.push_back(plan(study, combination, parts, options));
+  if (std::ranges::none_of(runs, [](const Planned& run) { return run.scene.has_value(); })) {
+    throw InputError(
+        {study.file.string()}, "values",
+        fmt::format("none of the {} combinations makes a scene; the first: {}", runs.size(), runs.front().row.reason));
+  }
+  return runs;
+}
+
+double reduced(const std::vector<double>& values, const std::string& reduce) {
+  if (reduce == "max") return *std::ranges::max_element(values);
+  if (reduce == "min") return *std::ranges::min_element(values);
+  if (reduce == "mean") return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return values.back();
+}
+
+std::optional<double> measured(const StudyQuantity& quantity, const RunOutcome& outcome, const History& history) {
+  const auto column = std::ranges::find(history.columns, quantity.from);
+  if (column != history.columns.end()) {
+    const auto& values = history.values[static_cast<std::size_t>(column - history.columns.begin())];
+    return values.empty() ? std::nullopt : std::optional(reduced(values, quantity.reduce));
+  }
+  const auto measure = outcome.measures.find(quantity.from);
+  return measure == outcome.measures.end() ? std::nullopt : std::optional(measure->second);
+}
+
+void fill(StudyRow& row, const Study& study, const RunOutcome& outcome, const std::vector<double>& references,
+          const fs::path& folder) {
+  row.status = outcome.status;
+  row.reason = outcome.reason;
+  if (outcome.status != "done") return;
+  const History history = read_history(folder / "history.csv");
+  for (std::size_t q = 0; q < study.quantities.size(); ++q) {
+    row.quantities[q] = measured(study.quantities[q], outcome, history);
+    if (references[q] != 0 && row.quantities[q])
+      row.errors[q] = std::abs(*row.quantities[q] - references[q]) / std::abs(references[q]);
+  }
+}
+
+std::string described(const Study& study, const StudyRow& row) {
+  std::vector<std::string> texts;
+  for (std::size_t k = 0; k < study.keys.size(); ++k)
+    texts.push_back(fmt::format("{} = {}", study.keys[k].key, row.values[k].toml));
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
+}  // namespace
+
+std::vector<std::vector<std::size_t>> combinations(const Study& study) {
+  std::vector<std::vector<std::size_t>> all;
+  if (study.zip) {
+    for (std::size_t i = 0; i < study.keys.front().values.size(); ++i) all.emplace_back(study.keys.size(), i);
+    return all;
+  }
+  all.emplace_back();
+  for (const StudyKey& key : study.keys) {
+    std::vector<std::vector<std::size_t>> longer;
+    for (const auto& combination : all) {
+      for (std::size_t i = 0; i < key.values.size(); ++i) {
+        longer.push_back(combination);
+        longer.back().push_back(i);
+      }
+    }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress) {
+  std::vector<Planned> runs = plan_all(study, parts, options);
+  fs::create_directories(folder);
+  StudyTable table{study, {}};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    StudyRow& row = runs[i].row;
+    progress(fmt::format("run {} of {}: {}", i + 1, runs.size(), described(study, row)));
+    if (runs[i].scene) {
+      const fs::path own = folder / "runs" / fmt::format("{}", i);
+      fill(row, study, run(*runs[i].scene, own), runs[i].references, own);
+    }
+    progress(row.reason.empty() ? row.status : fmt::format("{}: {}", row.status, row.reason));
+    table.rows.push_back(row);
+    write_file_atomically(folder / "table.csv", table.csv());
+    write_file_atomically(folder / "table.md", table.markdown());
+    if (stop_requested())
+      throw RunError(
+          fmt::format("stopped by a signal; {} of {} runs are in {}", i + 1, runs.size(), (folder / "table.csv").string()));
+  }
+  if (study.plot) draw(table, folder / "plot.png");
+  return table;
+}
+
+}  // namespace perikit

@@ -1,0 +1,267 @@
+#include "perikit/run/study.hpp"
+
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+#include "perikit/plugin/registry.hpp"
+#include "unit/fake_catalogue.hpp"
+#include "unit/temporary_folder.hpp"
+
+using namespace perikit;
+using namespace perikit::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::string scene_text = R"(format = 1
+[constants]
+k = 2.0
+[body]
+dimension = 1
+[body.lattice]
+spacing = 1.0
+lower = [0]
+upper = [4]
+[family]
+horizon_ratio = 2
+[kinematics]
+type = "conventional"
+[material]
+type = "saint_venant_kirchhoff"
+density = 1.0
+youngs_modulus = 1.0
+poisson_ratio = 0.25
+[integrator]
+type = "verlet"
+end_time = 1.0
+)";
+
+const std::string study_text = R"(format = 1
+title = "A study"
+scene = "scene.toml"
+[values]
+kinematics.type = ["conventional", "baqp"]
+constants.k = [1, 2, 4]
+[[quantity]]
+name = "top"
+from = "time"
+reduce = "max"
+reference = "2 * k"
+[[quantity]]
+name = "cost"
+from = "run_time"
+)";
+
+struct StudyFolder : TemporaryFolder {
+  FakeCatalogue parts;
+  StudyFolder() { std::ofstream(path / "scene.toml") << scene_text; }
+  Study parse(const std::string& text) { return parse_study(text, path / "study.toml", parts); }
+  std::string error(const std::string& text) {
+    std::string message = message_of([&] { parse(text); });
+    const std::string prefix = (path / "").string();
+    for (std::size_t at; (at = message.find(prefix)) != std::string::npos;) message.erase(at, prefix.size());
+    return message;
+  }
+};
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A run without physics: its history holds k in the middle.
+RunOutcome pretend(const Scene& scene, const fs::path& folder) {
+  const double k = scene.constants.at("k");
+  if (k == 4 && scene.kinematics->type == "baqp") return {"failed", "det F < 0 at point 3, \"x\" = 1", {}};
+  fs::create_directories(folder);
+  std::ofstream(folder / "history.csv") << "step,time\n0,0\n1," << 1.5 * k << "\n2," << k << '\n';
+  return {"done", "", {{"run_time", 0.25}}};
+}
+
+void silent(const std::string&) {}
+
+}  // namespace
+
+TEST_CASE("grid: the first key of the file is the slowest; zip: the lists side by side") {
+  StudyFolder folder;
+  const Study grid = folder.parse(study_text);
+  REQUIRE(grid.keys.size() == 2);
+  CHECK(grid.keys[0].key == "kinematics.type");
+  CHECK(grid.keys[1].key == "constants.k");
+  using Lists = std::vector<std::vector<std::size_t>>;
+  CHECK(combinations(grid) == Lists{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}});
+  const std::string pairs = replaced(replaced(study_text, "[1, 2, 4]", "[1, 2]"), "[values]", "mode = \"zip\"\n[values]");
+  CHECK(combinations(folder.parse(pairs)) == Lists{{0, 0}, {1, 1}});
+}
+
+TEST_CASE("values may be anything that a scene takes; quoted keys mean the same as dotted ones") {
+  StudyFolder folder;
+  const Study study =
+      folder.parse(replaced(study_text, "kinematics.type = [\"conventional\", \"baqp\"]",
+                            "\"kinematics\" = [{ type = \"baqp\", order = 2 }, \"a \\\"b\\\"\", [1, 2.5], true, 1e-30]"));
+  const auto& values = study.keys[0].values;
+  REQUIRE(values.size() == 5);
+  CHECK(values[0].toml == "{ order = 2, type = \"baqp\" }");
+  CHECK(values[1].toml == "\"a \\\"b\\\"\"");
+  CHECK(values[1].shown == "a \"b\"");
+  CHECK(values[2].toml == "[1, 2.5]");
+  CHECK(values[3].toml == "true");
+  CHECK(values[4].number == 1e-30);
+  CHECK_FALSE(values[2].number.has_value());
+  CHECK(folder.parse(replaced(study_text, "kinematics.type", "\"kinematics.type\"")).keys[0].key == "kinematics.type");
+}
+
+TEST_CASE("errors of a study file name place, key, what was found and what is allowed") {
+  StudyFolder folder;
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& expected) {
+    const std::string message = folder.error(replaced(study_text, from, to));
+    CHECK_MESSAGE(contains(message, expected), message);
+  };
+  check("format = 1", "format = 2", "study.toml:1:10: format: found the integer 2; allowed: an integer >= 1 and <= 1");
+  check("title", "titel",
+        "study.toml:2:1: titel: found an unknown key; allowed: values, quantity, plot, format, title, scene, mode; did you mean "
+        "'title'?");
+  check("scene.toml", "missing.toml",
+        "study.toml:3:9: scene: found \"missing.toml\", but missing.toml is no file; allowed: a scene file");
+  check("[values]", "mode = \"cross\"\n[values]",
+        "study.toml:4:8: mode: found the string \"cross\"; allowed: \"grid\" or \"zip\"");
+  check("[values]", "mode = \"zip\"\n[values]",
+        "study.toml:7:15: values.constants.k: found a list of 3; allowed with mode = \"zip\": 2, as many as kinematics.type has");
+  check("[1, 2, 4]", "3", "study.toml:6:15: values.constants.k: found the integer 3; allowed: a list of values, at least one");
+  check("[1, 2, 4]", "[]", "values.constants.k: found a list of 0; allowed: a list of values, at least one");
+  check("[1, 2, 4]", "[1979-05-27]",
+        "values.constants.k.0: found a date or time; allowed: a number, boolean, string, list or table");
+  check("constants.k = [1, 2, 4]", "\"kinematics.type\" = [\"baqp\"]", "found the key twice; allowed: once");
+  check("\"max\"", "\"sum\"",
+        "study.toml:10:10: quantity.0.reduce: found the string \"sum\"; allowed: \"last\", \"max\", \"min\" or \"mean\"");
+  check("\"2 * k\"", "0.0", "study.toml:11:13: quantity.0.reference: found the number 0.0; allowed: a number other than zero");
+  check("name = \"cost\"", "name = \"top\"", "study.toml:13:8: quantity.1.name: found \"top\"; allowed: a name of its own");
+  check("name = \"cost\"", "name = \"constants.k\"", "quantity.1.name: found \"constants.k\"; allowed: a name of its own");
+  const std::string plot = "\n[plot]\nx = \"cots\"\ny = \"top_error\"\nseries = \"k\"\nlog = \"z\"\n";
+  check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot,
+        "plot.x: found \"cots\"; allowed: kinematics.type, constants.k, top, top_error, cost; did you mean 'cost'?");
+  check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot,
+        "plot.series: found \"k\"; allowed: kinematics.type, constants.k");
+  check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot, "plot.log: found the string \"z\"");
+  CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "values: found nothing; allowed: a table of scene keys"));
+  CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "quantity: found nothing; allowed: [[quantity]]"));
+  CHECK(contains(folder.error("format = "), "study.toml:1:10: not valid TOML"));
+  CHECK(contains(message_of([&] { read_study(folder.path / "absent.toml", folder.parts); }), "absent.toml: cannot be read"));
+}
+
+TEST_CASE("a quantity or reference that does not fit the scene is refused before the first run") {
+  StudyFolder folder;
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& expected) {
+    const Study study = folder.parse(replaced(study_text, from, to));
+    bool ran = false;
+    const auto run = [&](const Scene&, const fs::path&) { return ran = true, RunOutcome{}; };
+    const std::string message = message_of([&] { run_study(study, folder.parts, {}, folder.path / "out", run, silent); });
+    CHECK_MESSAGE(contains(message, expected), message);
+    CHECK_FALSE(ran);
+  };
+  check("\"time\"", "\"tiem\"", "study.toml:9:8: quantity.0.from: found \"tiem\"; allowed: step, time, time_step,");
+  check("\"time\"", "\"tiem\"", "run_time, set_up_time, steps, points, bonds, memory; did you mean 'time'?");
+  check("2 * k", "2 * kk", "study.toml:11:13: quantity.0.reference: found the expression \"2 * kk\": unknown name 'kk'");
+  check("2 * k", "2 * x", "quantity.0.reference: found an expression in x, y or z; allowed: one in the constants of the scene");
+  check("2 * k", "k - 2", "quantity.0.reference: found the value 0; allowed: any other");
+  check("kinematics.type = [\"conventional\", \"baqp\"]", "kinematics.typ = [1, 2]",
+        "values: none of the 6 combinations makes a scene; the first: ");
+}
+
+TEST_CASE("the table holds values, quantities, errors and what went wrong; a failed run does not stop the study") {
+  StudyFolder folder;
+  const Study study = folder.parse(replaced(study_text, "\"baqp\"]", "\"baqp\", \"bapq\"]"));
+  std::vector<std::string> lines;
+  const StudyTable table =
+      run_study(study, folder.parts, {}, folder.path / "out", pretend, [&](const std::string& line) { lines.push_back(line); });
+  REQUIRE(table.rows.size() == 9);
+  CHECK(lines.size() == 18);
+  CHECK(lines[0] == "run 1 of 9: kinematics.type = \"conventional\", constants.k = 1");
+  CHECK(table.number(table.rows[2], "constants.k") == 4);
+  CHECK(table.number(table.rows[2], "top") == 6);           // max: 1.5 k
+  CHECK(table.number(table.rows[2], "top_error") == 0.25);  // against 2 k
+  CHECK(table.number(table.rows[2], "cost") == 0.25);
+  CHECK_FALSE(table.number(table.rows[2], "kinematics.type").has_value());
+  CHECK(table.rows[5].status == "failed");
+  CHECK_FALSE(table.number(table.rows[5], "top").has_value());
+  CHECK(table.rows[6].status == "refused");
+  CHECK(
+      contains(table.rows[6].reason, "study.toml:5:19: values.kinematics.type: unknown kinematics 'bapq'; did you mean 'baqp'?"));
+  const std::string csv = content(folder.path / "out" / "table.csv");
+  CHECK(csv.starts_with(
+      "run,kinematics.type,constants.k,top,top_error,cost,status,reason\n0,conventional,1,1.5,0.25,0.25,done,\n"));
+  CHECK(contains(csv, "5,baqp,4,,,,failed,\"det F < 0 at point 3, \"\"x\"\" = 1\"\n"));
+  CHECK(contains(content(folder.path / "out" / "table.md"), "| 2 | conventional | 4 | 6 | 0.25 | 0.25 | done |  |\n"));
+  CHECK(fs::exists(folder.path / "out" / "runs" / "4" / "history.csv"));
+}
+
+TEST_CASE("reductions over the history") {
+  StudyFolder folder;
+  const auto top = [&](const std::string& reduce) {
+    const Study study = folder.parse(replaced(study_text, "\"max\"", '"' + reduce + '"'));
+    return *run_study(study, folder.parts, {}, folder.path / "out", pretend, silent).rows[1].quantities[0];
+  };
+  CHECK(top("last") == 2.0);
+  CHECK(top("max") == 3.0);
+  CHECK(top("min") == 0.0);
+  CHECK(top("mean") == doctest::Approx(5.0 / 3.0).epsilon(1e-15));
+}
+
+TEST_CASE("the picture has a line for each value of the series" *
+          doctest::skip(std::system("gnuplot --version > /dev/null 2>&1") != 0)) {
+  StudyFolder folder;
+  const Study study =
+      folder.parse(study_text + "[plot]\nx = \"cost\"\ny = \"top_error\"\nseries = \"kinematics.type\"\nlog = \"xy\"\n");
+  run_study(study, folder.parts, {}, folder.path / "out", pretend, silent);
+  CHECK(content(folder.path / "out" / "plot.png").starts_with("\x89PNG"));
+  const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
+  CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
+                 "no run gives numbers for cost and top_error"));
+}
+
+TEST_CASE("a run in a process of its own: its measures come back, its end is told") {
+  StudyFolder folder;
+  Registry registry;
+  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  const Scene scene = read_scene(folder.path / "scene.toml", registry, {{"integrator.time_step=0.1", "run.threads=1"}, false});
+  const RunOutcome outcome = run_in_child(scene, registry, folder.path / "run");
+  CHECK_MESSAGE(outcome.status == "done", outcome.reason);
+  CHECK(outcome.measures.at("points") == 4);
+  CHECK(outcome.measures.at("steps") == 10);
+  CHECK(outcome.measures.at("run_time") > 0);
+  CHECK(outcome.measures.size() == run_measures().size());
+  CHECK(fs::exists(folder.path / "run" / "results.h5"));
+  std::ofstream(folder.path / "file") << "no folder";
+  const RunOutcome failed = run_in_child(scene, registry, folder.path / "file" / "run");
+  CHECK(failed.status == "failed");
+  CHECK(contains(failed.reason, "file"));
+}
+
+TEST_CASE("zero_energy.toml: the conventional gradient does not see the shortest wave, bond-level ones do") {
+  const TemporaryFolder folder;
+  Registry registry;
+  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  const Study study = read_study(fs::path(PERIKIT_SOURCE_FOLDER) / "configs/studies/zero_energy.toml", registry);
+  const auto run = [&](const Scene& scene, const fs::path& own) { return run_here(scene, registry, own); };
+  const StudyTable table = run_study(study, registry, {}, folder.path, run, silent);
+  const double exact = 2.0e11 * 1.0e-12 * 9.869604401089358 / 4;
+  for (const StudyRow& row : table.rows) {
+    CAPTURE(row.values[0].shown);
+    CAPTURE(row.values[1].shown);
+    REQUIRE_MESSAGE(row.status == "done", row.reason);
+    if (row.values[1].number == 1) CHECK(*row.errors[0] < 2e-3);  // one half wave over 33 horizons
+    if (row.values[1].number != 99) continue;
+    if (row.values[0].shown == "conventional") CHECK(*row.quantities[0] < 1e-4 * exact);
+    if (row.values[0].shown == "baqp" || row.values[0].shown == "projection") CHECK(*row.quantities[0] > 0.1 * exact);
+  }
+}
