@@ -57,7 +57,7 @@ PartDescription description() {
                                     "t = omega [3 K theta |xi| + 15 mu (e - theta |xi|/3)]/m  (3D)\n"
                                     "t = omega [2 k' theta |xi| + 8 mu (e - theta |xi|/2)]/m  (2D),  t = E omega e/m  (1D)",
                        .source = "Silling et al., J. Elasticity 88 (2007) 151; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.14-3.20",
-                       .limits = "of the material only its small strain counts; softer near surfaces unless surface_correction is set"};
+                       .limits = "of the material only its small strain counts; near surfaces a stretch along one axis is stored with errors of some per cent"};
   part.parameters.choice("surface_correction", {"none", "energy"}, "\"energy\": bonds of cut families are scaled, so that a homogeneous stretch along an axis stores as much in them as inside")
       .by_default("\"none\"");
   return part;
