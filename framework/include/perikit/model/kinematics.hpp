@@ -59,8 +59,8 @@ struct PairModuli {
   double dilatation = 0;              ///< k_i
 };
 
-/// Arrays over n bonds, padded with bonds at rest (extension 0), 64-byte aligned. A null output is not wanted; the others are
-/// fully overwritten up to padded(n).
+/// Arrays over n bonds that can be read (bonds at rest) and written up to padded(n). A null output is not wanted; the others are
+/// overwritten for all n bonds.
 struct BondBatch {
   int n = 0;
   const double* length = nullptr;     ///< |xi| [m]
