@@ -44,8 +44,9 @@ void run(const Options& options) {
   try {
     simulation.run(recorder);
   } catch (const RunError& error) {
-    recorder.log(fmt::format("failed: {}\nlast good frame: {}", error.what(), recorder.frames() - 1));
-    throw;
+    const std::string reason = fmt::format("{}; last good frame: {}", error.what(), recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");
+    recorder.log(fmt::format("failed: {}", reason));
+    throw RunError(reason);
   }
   const double spent = seconds_since(running);
   const BodyProblem& problem = simulation.problem();

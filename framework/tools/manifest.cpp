@@ -1,12 +1,13 @@
 /// perikit-manifest FILE.so: opens a library as the program would, and writes the manifest beside it.
 
+#include "plugin/manifest.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <exception>
 
 #include "perikit/plugin/registry.hpp"
-#include "plugin/manifest.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 2) {
@@ -16,7 +17,8 @@ int main(int argc, char** argv) try {
   perikit::Registry registry;
   registry.open(argv[1]);
   std::vector<perikit::NamedPart> parts;
-  for (const auto& [kind, name] : registry.parts_of(argv[1])) parts.push_back({kind, name, registry.describe(kind, name).summary});
+  for (const auto& [kind, name] : registry.parts_of(argv[1]))
+    parts.push_back({kind, name, registry.describe(kind, name).summary});
   perikit::write_manifest(argv[1], parts);
 } catch (const std::exception& error) {
   fmt::print(stderr, "{}\n", error.what());

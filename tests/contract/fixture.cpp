@@ -40,7 +40,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   text += fmt::format("[body.lattice]\nspacing = {:.17g}\nlower = {}\nupper = {}\n", o.scale, vector([](int) { return 0.0; }),
                       vector([&](int a) { return o.scale * cells[static_cast<std::size_t>(a)]; }));
   if (o.cloud) text += "jitter = 0.25\nseed = 7\n";
-  text += fmt::format("[sets]\npart = \"x < {:.17g}\"\n", 0.4 * o.scale * cells[0]);
+  text += fmt::format("[sets]\npart = \"x < {:.17g}\"\n", 0.4 * o.scale * cells[0]) + o.sets;
   text += fmt::format("[family]\nhorizon_ratio = {}\ninfluence = {}\n", o.horizon_ratio,
                       o.influence.find('=') == std::string::npos ? "\"" + o.influence + "\"" : "{ " + o.influence + " }");
   text += "[kinematics]\n" + kinematics + "\n[material]\n" + o.material + "\n";
@@ -55,7 +55,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
     const double z = 0.5013 * o.scale * cells[2], x = 0.45 * o.scale * cells[0], y = o.scale * (cells[1] + 1);
     text += fmt::format("[[crack]]\npolygon = [[-1.0, -1.0, {0:.17g}], [{1:.17g}, -1.0, {0:.17g}], [{1:.17g}, {2:.17g}, {0:.17g}], [-1.0, {2:.17g}, {0:.17g}]]\n", z, x, y);
   }
-  text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\n", o.skip);
+  text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\n", o.skip) + o.conditions;
   return text;
 }
 
@@ -68,6 +68,22 @@ void set_field(const Body& body, FieldView field, const std::function<Point(cons
     const Point v = value(body.position(static_cast<std::size_t>(p)));
     for (int c = 0; c < field.components; ++c) field.component(c)[p] = v[static_cast<std::size_t>(c)];
   }
+}
+
+void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
+  Noise random(seed);
+  std::array<std::array<double, 3>, 3> G{};
+  for (auto& row : G)
+    for (double& g : row) g = 0.08 * random();
+  const double s = body.spacing();
+  set_field(body, u, [&](const Point& x) {
+    Point v{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < static_cast<std::size_t>(body.dimension()); ++b) v[a] += G[a][b] * x[b];
+      v[a] += noise * s * random();
+    }
+    return v;
+  });
 }
 
 double dot(const Body& body, ConstFieldView a, ConstFieldView b) {

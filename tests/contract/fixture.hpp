@@ -43,6 +43,8 @@ struct BodyOptions {
   double horizon_ratio = 2.515;
   std::string plane = "strain";
   std::string integrator = "type = \"evaluate\"";
+  std::string sets;           ///< further lines of [sets]
+  std::string conditions;     ///< further sections: initial, boundaries, loads
 };
 
 /// Scene text for a kinematics (its table, `type` included).
@@ -51,9 +53,9 @@ std::unique_ptr<Simulation> build(const std::string& text);
 std::string kinematics_table(const Example& example);
 
 /// Uniform in [-1, 1).
-class Random {
+class Noise {
  public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  explicit Noise(std::uint64_t seed) : engine_(seed) {}
   double operator()() { return static_cast<double>(engine_() >> 11) * 0x1.0p-52 - 1.0; }
 
  private:
@@ -62,6 +64,8 @@ class Random {
 
 /// field(x) at every live point; other entries untouched.
 void set_field(const Body& body, FieldView field, const std::function<Point(const Point&)>& value);
+/// A smooth, finite deformation with noise on top, admissible everywhere: noise times the spacing.
+void deform(const Body& body, FieldView u, std::uint64_t seed, double noise);
 /// Sum over live points and components of a b.
 double dot(const Body& body, ConstFieldView a, ConstFieldView b);
 /// Largest |component| over live points.

@@ -49,23 +49,6 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// A smooth, finite deformation with noise on top, admissible everywhere.
-void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
-  Random random(seed);
-  std::array<std::array<double, 3>, 3> G{};
-  for (auto& row : G)
-    for (double& g : row) g = 0.08 * random();
-  const double s = body.spacing();
-  set_field(body, u, [&](const Point& x) {
-    Point v{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = 0; b < static_cast<std::size_t>(body.dimension()); ++b) v[a] += G[a][b] * x[b];
-      v[a] += noise * s * random();
-    }
-    return v;
-  });
-}
-
 /// Poisoned output: whatever a kernel forgets to write shows.
 Field poisoned(const BodyProblem& problem) {
   Field f = problem.make_field(problem.dimension());
@@ -95,7 +78,7 @@ Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, do
 
 Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
   Field w = problem.make_field(problem.dimension());
-  Random random(seed);
+  Noise random(seed);
   set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
   return w;
 }

@@ -83,7 +83,7 @@ TEST_CASE("kinematics: pair laws agree with the dense reference") {
               const auto at = [&](int p) { return body.position(static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(p)])); };
               return body.cut(at(i), at(j)) ? 0.0 : 1.0;
             };
-            Random random(61);
+            Noise random(61);
             reference::Vector u(d * static_cast<int>(body.points()));
             for (int i = 0; i < static_cast<int>(body.points()); ++i) {
               const auto p = static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(i)]);

@@ -8,7 +8,8 @@ endfunction()
 
 run(${CMAKE_COMMAND} --install ${build} --prefix ${prefix})
 # A plugin that installation changed would not fit its manifest any more, and be opened without need.
-run(${CMAKE_COMMAND} -E compare_files ${build}/${libdir}/perikit/influence_cone.so ${prefix}/${libdir}/perikit/influence_cone.so)
+set(cone ${libdir}/perikit/influence_cone.so)
+run(${CMAKE_COMMAND} -E compare_files ${build}/${cone} ${prefix}/${cone})
 
 run(${CMAKE_COMMAND} -S ${source}/plugin -B ${work}/plugin -G Ninja -D CMAKE_PREFIX_PATH=${prefix} -D CMAKE_CXX_COMPILER=${compiler}
     -D CMAKE_BUILD_TYPE=Release)
@@ -17,7 +18,8 @@ if(NOT EXISTS ${work}/plugin/parabola.parts)
   message(FATAL_ERROR "no manifest beside ${work}/plugin/parabola.so")
 endif()
 
-execute_process(COMMAND ${prefix}/bin/perikit list influence --plugin-path ${work}/plugin OUTPUT_VARIABLE parts COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${prefix}/bin/perikit list influence --plugin-path ${work}/plugin
+                OUTPUT_VARIABLE parts COMMAND_ERROR_IS_FATAL ANY)
 foreach(part parabola cone)
   if(NOT parts MATCHES ${part})
     message(FATAL_ERROR "the installed program does not list ${part}:\n${parts}")

@@ -1,10 +1,14 @@
 #include "perikit/plugin/registry.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "perikit/core/errors.hpp"
 #include "perikit/sdk/plugin.hpp"
@@ -124,10 +128,29 @@ TEST_CASE("a failed registration leaves nothing behind") {
   check_refused(built("throwing_number"), "no std::exception");
   check_refused(built("registers_nothing"), "registers no part");
   check_refused(built("crashing_constructor"), "kills the process");
+  check_refused(built("exiting_constructor"), "ends the process that loads it (exit status 0)");
+}
+
+TEST_CASE("without a process to try it in, a library is refused") {
+  const Folder folder;
+  const fs::path library = folder.copy("good", "good.so");
+  const pid_t child = fork();
+  if (child == 0) {  // the limit cannot be undone, and does not bind root
+    const rlimit none{0, 0};
+    if (setrlimit(RLIMIT_NPROC, &none) != 0 || (getuid() == 0 && setuid(65534) != 0)) _exit(2);
+    _exit(error_of([&] { Registry().open(library); }).find("no process to try it in") != std::string::npos ? 0 : 1);
+  }
+  int status = -1;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(status == 0);
 }
 
 TEST_CASE("bad descriptions are refused with part and reason") {
   check_refused(built("bad_names"), "influence 'CamelCase': the name must be snake_case");
+  check_refused(built("bad_underscores"), "influence 'two__lines': the name must be snake_case");
+  check_refused(built("trailing_underscore"), "influence 'private_': the name must be snake_case");
+  check_refused(built("broken_example"), "influence 'unreadable': example \"order = = 1\" is not valid TOML");
+  check_refused(built("typed_example"), "influence 'typed': an example must leave out 'type'");
   check_refused(built("bad_parameters"), "influence 'twice': parameter 'order' is declared twice");
   check_refused(built("bad_examples"), "influence 'unexampled': at least one example");
   check_refused(built("bad_summary"), "influence 'silent': the summary must be one line");
@@ -194,9 +217,24 @@ TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and t
     CHECK(registry.opened().size() == 1);
     CHECK(registry.refused().empty());
   }
+  SUBCASE("manifest links to itself, or to nowhere") {
+    for (const char* target : {"good.parts", "nowhere"}) {
+      fs::remove(manifest);
+      fs::create_symlink(target, manifest);
+      Registry registry;
+      registry.add_folder(folder.path);
+      CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
+      REQUIRE(registry.refused().size() == 1);
+      CHECK(registry.refused()[0].file.filename() == "good.parts");
+      CHECK(registry.refused()[0].reason.find("not a regular file") != std::string::npos);
+    }
+  }
   SUBCASE("manifest unreadable") {
     const std::string wrong_kind = std::string(good).replace(good.find("'influence'"), 11, "'elephants'");
-    for (const std::string& content : {std::string("format = "), std::string("\0\xff\xfe", 3), std::string(), std::string("format = 1"),
+    const std::string wrong_name = std::string(good).replace(good.find("of_an_older_build"), 17, "of__older_build__");
+    write_manifest(library, {{Kind::influence, "sound", ""}, {Kind::influence, "sound", "again"}});
+    const std::string twice = bytes(manifest);
+    for (const std::string& content : {wrong_name, twice, std::string("format = "), std::string("\0\xff\xfe", 3), std::string(), std::string("format = 1"),
                                        std::string("format = 7"), good.substr(0, good.size() / 2), wrong_kind, std::string(2 << 20, '#')}) {
       folder.write("good.parts", content);
       Registry registry;
@@ -207,6 +245,52 @@ TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and t
       CHECK(registry.refused()[0].reason.find("bad manifest") != std::string::npos);
     }
   }
+}
+
+TEST_CASE("a scan reads manifests alone; a library that changed since then is tried in a child process before it is opened") {
+  const Folder folder;
+  const fs::path library = folder.copy("good", "good.so");
+  write_manifest(library, {{Kind::influence, "sound", ""}, {Kind::influence, "promised", ""}});
+  std::string other = bytes(built("good"));
+  SUBCASE("into one that kills its process") {
+    Registry registry;
+    registry.add_folder(folder.path);
+    folder.copy("crashing_constructor", "good.so");
+    CHECK(error_of([&] { registry.describe(Kind::influence, "sound"); }).find("kills the process") != std::string::npos);
+    CHECK(registry.names(Kind::influence).empty());
+  }
+  SUBCASE("into one of the same size: what the manifest named is forgotten") {
+    other.back() = static_cast<char>(other.back() + 1);  // the end of the section table, which the loader does not read
+    Registry registry;
+    folder.write("good.so", other);
+    registry.add_folder(folder.path);
+    CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
+    CHECK(error_of([&] { registry.describe(Kind::influence, "promised"); }).find("unknown influence 'promised'") == 0);
+    CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
+    CHECK(registry.refused().empty());
+  }
+}
+
+TEST_CASE("manifests of one library written at once do not meet") {
+  const Folder folder;
+  const fs::path library = folder.copy("good", "good.so");
+  fs::create_directory(folder.path / "good.parts.new");
+  std::atomic<int> failures{0};
+  const auto write = [&] {
+    for (int i = 0; i < 25; ++i) {
+      try {
+        write_manifest(library, {{Kind::influence, "sound", ""}});
+        read_manifest(manifest_path(library));
+      } catch (const std::exception&) {
+        ++failures;
+      }
+    }
+  };
+  std::thread first(write), second(write);
+  first.join();
+  second.join();
+  CHECK(failures == 0);
+  CHECK(std::distance(fs::directory_iterator(folder.path), {}) == 3);  // library, manifest, the folder above
 }
 
 TEST_CASE("a manifest that names what the library does not register: refused when it is asked for") {

@@ -59,7 +59,7 @@ void LatticeFamilies::make_blocks() {
   const auto& n = lattice.extent;
   const std::int64_t row_chunks = (n[0] + chunk_points - 1) / chunk_points, segments = (row_chunks + segment - 1) / segment;
   const std::int64_t points = n[0] * n[1] * n[2];
-  std::int64_t tile1 = 8, tile2 = 4;
+  std::int64_t tile1 = 16, tile2 = 8;
   while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * chunk_points)) < 16 && tile1 * tile2 > 1) {
     (tile1 > tile2 ? tile1 : tile2) /= 2;
   }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <boost/dll/shared_library.hpp>
 #include <csignal>
 #include <cstring>
@@ -26,7 +27,9 @@ namespace dll = boost::dll;
 namespace {
 
 /// Whether [offset, offset + length) lies inside a file of `size` bytes; no sum that could overflow.
-bool inside(std::uint64_t offset, std::uint64_t length, std::uint64_t size) { return offset <= size && length <= size - offset; }
+bool inside(std::uint64_t offset, std::uint64_t length, std::uint64_t size) {
+  return offset <= size && length <= size - offset;
+}
 
 /// Whether header, program headers, segments and section table of a 64-bit ELF file lie inside the file.
 bool complete(std::ifstream& in, std::uint64_t size) {
@@ -50,7 +53,11 @@ dll::shared_library load(const fs::path& file) try {
   throw Refusal(fmt::format("the loader refuses it: {}", error.what()));  // its text is dlerror's; its code means nothing
 }
 
-[[noreturn]] void probe_in_child(const fs::path& file) {
+/// Exit status of a child that came to its own end; a library that calls exit() leaves another one.
+constexpr int probe_ended = 90;
+
+/// noexcept: nothing may unwind into the parent's stack frames.
+[[noreturn]] void probe_in_child(const fs::path& file) noexcept {
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) std::signal(signal, SIG_DFL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
@@ -63,7 +70,7 @@ dll::shared_library load(const fs::path& file) try {
     load_library(file, collector);
   } catch (const Refusal&) {  // the caller meets it again, and reports it
   }
-  _exit(0);
+  _exit(probe_ended);
 }
 
 }  // namespace
@@ -114,12 +121,16 @@ void probe_library(const fs::path& file) {
   check_file(file);
   const pid_t child = fork();
   if (child == 0) probe_in_child(file);
+  if (child < 0) throw Refusal(fmt::format("no process to try it in: {}", std::strerror(errno)));
   int status = 0;
   pid_t ended = -1;
-  while (child > 0 && (ended = waitpid(child, &status, 0)) < 0 && errno == EINTR) {
+  while ((ended = waitpid(child, &status, 0)) < 0 && errno == EINTR) {
   }
-  if (ended != child || !WIFSIGNALED(status)) return;
-  throw Refusal(fmt::format("it kills the process that loads it ({})", strsignal(WTERMSIG(status))));
+  if (ended != child) throw Refusal(fmt::format("the process that tries it cannot be watched: {}", std::strerror(errno)));
+  if (WIFSIGNALED(status)) throw Refusal(fmt::format("it kills the process that loads it ({})", strsignal(WTERMSIG(status))));
+  if (WEXITSTATUS(status) != probe_ended) {
+    throw Refusal(fmt::format("it ends the process that loads it (exit status {})", WEXITSTATUS(status)));
+  }
 }
 
 }  // namespace perikit

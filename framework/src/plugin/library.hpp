@@ -25,8 +25,8 @@ void check_abi(int version, const std::string& build_id);
 /// Loads `file` for good, compares its C symbols and calls its registration function. Throws Refusal.
 void load_library(const std::filesystem::path& file, Registrar& registrar);
 
-/// Loads and registers `file` in a child process first. Throws Refusal when that kills the child: a file damaged inside, or a
-/// library that crashes in its static constructors or its registration.
+/// Loads and registers `file` in a child process first. Throws Refusal unless the child comes to its own end: a file damaged
+/// inside, a library that crashes or exits in its static constructors or its registration, no process to be had.
 void probe_library(const std::filesystem::path& file);
 
 }  // namespace perikit

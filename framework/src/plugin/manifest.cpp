@@ -1,12 +1,17 @@
 #include "plugin/manifest.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <fstream>
+#include <random>
 #include <toml++/toml.h>
 
 #include "perikit/plugin/abi.hpp"
+#include "plugin/registrar.hpp"
 
 namespace perikit {
 
@@ -30,12 +35,17 @@ std::string checksum(const fs::path& file) {
   return fmt::format("{:016x}", hash);
 }
 
+SourcePosition place(const toml::node& node, const fs::path& file) {
+  const toml::source_position at = node.source().begin;
+  return {file.string(), static_cast<int>(at.line), static_cast<int>(at.column)};
+}
+
 /// The value of a key that every manifest has.
 template <class T>
 T required(const toml::table& table, std::string_view key, const fs::path& file) {
   if (const auto* value = table[key].template as<T>()) return value->get();
-  const toml::source_position at = table[key] ? table[key].node()->source().begin : table.source().begin;
-  throw InputError({file.string(), static_cast<int>(at.line), static_cast<int>(at.column)}, key,
+  const toml::node& at = table[key] ? *table[key].node() : table;
+  throw InputError(place(at, file), key,
                    fmt::format("{}; must be {}", table[key] ? "another type" : "missing",
                                std::is_same_v<T, std::string> ? "a string" : "an integer"));
 }
@@ -43,16 +53,28 @@ T required(const toml::table& table, std::string_view key, const fs::path& file)
 NamedPart read_part(const toml::table& table, const fs::path& file) {
   const auto kind_name = required<std::string>(table, "kind", file);
   const auto kind = kind_from_name(kind_name);
-  if (!kind) throw InputError({file.string()}, "kind", fmt::format("'{}' is no kind of part", kind_name));
-  return {*kind, required<std::string>(table, "name", file), required<std::string>(table, "summary", file)};
+  if (!kind) throw InputError(place(*table.get("kind"), file), "kind", fmt::format("'{}' is no kind of part", kind_name));
+  const auto part_name = required<std::string>(table, "name", file);
+  if (!is_snake_case(part_name)) {
+    throw InputError(place(*table.get("name"), file), "name", fmt::format("'{}'; must be {}", part_name, snake_case_rule));
+  }
+  return {*kind, part_name, required<std::string>(table, "summary", file)};
+}
+
+/// A name beside a file that no other process or thread uses.
+fs::path temporary_name(const fs::path& file) {
+  static std::atomic<unsigned> count{0};
+  return fmt::format("{}.{}.{}.{:08x}.new", file.string(), getpid(), count++, std::random_device{}());
 }
 
 }  // namespace
 
-bool Manifest::matches(const fs::path& library) const {
+bool Manifest::matches_size(const fs::path& library) const {
   std::error_code unreadable;
-  return fs::file_size(library, unreadable) == size && !unreadable && checksum == perikit::checksum(library);
+  return fs::file_size(library, unreadable) == size && !unreadable;
 }
+
+bool Manifest::matches(const fs::path& library) const { return matches_size(library) && checksum == perikit::checksum(library); }
 
 fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
 
@@ -73,7 +95,14 @@ Manifest read_manifest(const fs::path& file) try {
   if (!parts || parts->empty() || !parts->is_homogeneous<toml::table>()) {
     throw InputError({file.string()}, "part", "must be a list of tables, at least one");
   }
-  for (const toml::node& part : *parts) manifest.parts.push_back(read_part(*part.as_table(), file));
+  for (const toml::node& node : *parts) {
+    NamedPart part = read_part(*node.as_table(), file);
+    const auto same = [&](const NamedPart& other) { return other.kind == part.kind && other.name == part.name; };
+    if (std::ranges::any_of(manifest.parts, same)) {
+      throw InputError(place(node, file), "part", fmt::format("{} '{}' is named twice", name(part.kind), part.name));
+    }
+    manifest.parts.push_back(std::move(part));
+  }
   return manifest;
 } catch (const toml::parse_error& error) {
   const auto& at = error.source().begin;
@@ -92,12 +121,17 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
                           {"checksum", checksum(library)},
                           {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
-  const fs::path temporary = file.string() + ".new";
+  const fs::path temporary = temporary_name(file);
   std::ofstream out(temporary);
   out << table << '\n';
   out.close();
-  if (!out) throw RunError(fmt::format("{}: cannot be written", temporary.string()));
-  fs::rename(temporary, file);
+  std::error_code failed;
+  if (out) fs::rename(temporary, file, failed);
+  if (!out || failed) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw RunError(fmt::format("{}: cannot be written{}", file.string(), failed ? ": " + failed.message() : ""));
+  }
 }
 
 }  // namespace perikit

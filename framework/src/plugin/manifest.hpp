@@ -1,5 +1,5 @@
 #pragma once
-/// Manifests: beside X.so lies X.parts, TOML text that names the parts of the library, so that names are known without opening it.
+/// Manifests: beside X.so lies X.parts, TOML text that names its parts, so that names are known without opening the library.
 ///
 ///   format = 1
 ///   abi = 1
@@ -29,7 +29,9 @@ struct Manifest {
   std::string checksum;
   std::vector<NamedPart> parts;
 
-  /// Whether `library` is, byte for byte, the file that this manifest was written for.
+  /// Whether `library` has the size of the file that this manifest was written for: all that is looked at before it is opened.
+  bool matches_size(const std::filesystem::path& library) const;
+  /// Whether `library` is, byte for byte, that file. Reads all of it.
   bool matches(const std::filesystem::path& library) const;
 };
 
@@ -39,7 +41,7 @@ std::filesystem::path manifest_path(const std::filesystem::path& library);
 /// Throws InputError naming file and place for anything that is not a complete manifest.
 Manifest read_manifest(const std::filesystem::path& file);
 
-/// Writes the manifest of a library of this program's ABI, by a temporary name and a rename. Throws RunError.
+/// Writes the manifest of a library of this program's ABI, by a temporary name of its own and a rename. Throws RunError.
 void write_manifest(const std::filesystem::path& library, const std::vector<NamedPart>& parts);
 
 }  // namespace perikit

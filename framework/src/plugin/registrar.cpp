@@ -4,15 +4,17 @@
 
 #include <algorithm>
 #include <set>
+#include <toml++/toml.h>
 
 namespace perikit {
 
-namespace {
-
 bool is_snake_case(std::string_view text) {
   const auto allowed = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
-  return !text.empty() && text.front() >= 'a' && text.front() <= 'z' && std::ranges::all_of(text, allowed);
+  return !text.empty() && text.front() >= 'a' && text.front() <= 'z' && std::ranges::all_of(text, allowed) && text.back() != '_' &&
+         text.find("__") == std::string_view::npos;
 }
+
+namespace {
 
 /// What is wrong with a parameter table; empty when nothing is.
 std::string fault(const ParameterTable& table) {
@@ -30,10 +32,20 @@ std::string fault(const ParameterTable& table) {
   return {};
 }
 
+/// What is wrong with an example, a TOML table without `type`; empty when nothing is.
+std::string fault(const std::string& example) try {
+  return toml::parse(example).contains("type") ? "an example must leave out 'type', which the part's name stands for" : "";
+} catch (const toml::parse_error& error) {
+  return fmt::format("example \"{}\" is not valid TOML: {}", example, error.description());
+}
+
 std::string fault(const PartDescription& description) {
-  if (!is_snake_case(description.name)) return "the name must be snake_case (a-z, 0-9, _)";
+  if (!is_snake_case(description.name)) return fmt::format("the name must be {}", snake_case_rule);
   if (description.summary.empty() || description.summary.find('\n') != std::string::npos) return "the summary must be one line of text";
   if (description.examples.empty()) return "at least one example is needed (\"\" where nothing is required)";
+  for (const std::string& example : description.examples) {
+    if (std::string reason = fault(example); !reason.empty()) return reason;
+  }
   return fault(description.parameters);
 }
 

@@ -4,12 +4,17 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "perikit/plugin/part.hpp"
 
 namespace perikit {
+
+/// Names of parts: registered ones and those in manifests.
+bool is_snake_case(std::string_view text);
+inline constexpr std::string_view snake_case_rule = "snake_case (a-z, 0-9, single _ between them)";
 
 /// In the order of Kind.
 using AnyFactory = std::variant<Factory<Kinematics>, Factory<Stabilization>, Factory<Material>, Factory<Damage>,

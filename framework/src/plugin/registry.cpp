@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 
+#include "perikit/plugin/abi.hpp"
 #include "perikit/sdk/plugin.hpp"
 #include "plugin/library.hpp"
 #include "plugin/manifest.hpp"
@@ -40,6 +41,7 @@ struct Registry::Implementation {
 
   std::array<Entries, all_kinds.size()> entries;
   std::set<fs::path> candidates;
+  std::map<fs::path, Manifest> manifests;  ///< of libraries that are not open yet
   std::vector<fs::path> opened;
   std::vector<RefusedLibrary> refused;
 
@@ -57,24 +59,33 @@ struct Registry::Implementation {
     return names;
   }
 
+  void forget(const fs::path& library) {
+    for (Entries& kind : entries) std::erase_if(kind, [&](const auto& e) { return e.second.library == library; });
+  }
+
   /// Forgets what a manifest named, and keeps the reason.
   void refuse(const fs::path& file, const std::string& reason) {
-    for (Entries& kind : entries) std::erase_if(kind, [&](const auto& e) { return e.second.library == file; });
+    forget(file);
     std::erase_if(refused, [&](const RefusedLibrary& r) { return r.file == file; });
     refused.push_back({file, reason});
   }
 
-  /// The manifest of exactly this file, if there is one. A stale one says nothing; an unreadable one is refused by name.
-  std::optional<Manifest> manifest_of(const fs::path& library) {
+  /// Reads the manifest of a library, if there is one. A stale one says nothing; an unreadable one is refused by name.
+  /// The library itself is not read: its size must do until it is opened, or a scan would read every plugin there is. Only to be
+  /// refused for its ABI it must be the very file.
+  const Manifest* manifest_of(const fs::path& library) {
     const fs::path file = manifest_path(library);
-    if (std::error_code failed; !fs::exists(file, failed)) return std::nullopt;
+    // Not exists(): a link to nowhere or to itself is a bad manifest, not a missing one.
+    std::error_code failed;
+    if (fs::symlink_status(file, failed).type() == fs::file_type::not_found) return nullptr;
     try {
       Manifest manifest = read_manifest(file);
-      if (manifest.matches(library)) return manifest;
+      const bool fits = manifest.abi == PERIKIT_ABI_VERSION && manifest.build_id == PERIKIT_BUILD_ID;
+      if (fits ? manifest.matches_size(library) : manifest.matches(library)) return &manifests.insert_or_assign(library, std::move(manifest)).first->second;
     } catch (const InputError& error) {
       refuse(file, fmt::format("bad manifest: {}", error.what()));
     }
-    return std::nullopt;
+    return nullptr;
   }
 
   void name_parts(const fs::path& library, const Manifest& manifest) {
@@ -88,8 +99,14 @@ struct Registry::Implementation {
     for (const NamedPart& part : manifest.parts) of(part.kind)[part.name] = {library, nullptr};
   }
 
-  void load(const fs::path& library, bool trusted) {
-    if (!trusted) probe_library(library);
+  void load(const fs::path& library) {
+    // A file that its manifest describes byte for byte was opened before, when the manifest was written. Any other is tried in a
+    // child process first, and what an old manifest named is forgotten.
+    const auto manifest = manifests.find(library);
+    if (manifest == manifests.end() || !manifest->second.matches(library)) {
+      forget(library);
+      probe_library(library);
+    }
     PartCollector collector([&](Kind kind, std::string_view name) {
       const fs::path first = owner(kind, name);
       return first == library ? fs::path() : first;
@@ -99,15 +116,16 @@ struct Registry::Implementation {
     for (const auto& part : collector.parts) of(part->kind())[part->description.name] = {library, part};
     for (const Entries& kind : entries) {
       for (const auto& [name, entry] : kind) {
-        if (entry.library == library && !entry.part) throw Refusal(fmt::format("its manifest names '{}', which it does not register", name));
+        if (entry.library == library && !entry.part)
+          throw Refusal(fmt::format("its manifest names '{}', which it does not register", name));
       }
     }
   }
 
-  void open(const fs::path& library, bool trusted) {
+  void open(const fs::path& library) {
     if (std::ranges::find(opened, library) != opened.end()) return;
     try {
-      load(library, trusted);
+      load(library);
     } catch (const Refusal& reason) {
       refuse(library, reason.what());
       throw InputError({library.string()}, "", fmt::format("this library is refused: {}", reason.what()));
@@ -120,10 +138,10 @@ struct Registry::Implementation {
   void add_candidate(const fs::path& library) {
     if (!candidates.insert(library).second) return;
     try {
-      if (const auto manifest = manifest_of(library)) {
+      if (const Manifest* manifest = manifest_of(library)) {
         name_parts(library, *manifest);
       } else {
-        open(library, false);
+        open(library);
       }
     } catch (const Refusal& reason) {
       refuse(library, reason.what());
@@ -133,8 +151,9 @@ struct Registry::Implementation {
 
   [[noreturn]] void unknown(Kind kind, std::string_view part) const {
     const auto known = names(kind);
-    std::string message = fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
-                                      nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
+    std::string message =
+        fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
+                    nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
     const char* separator = "; refused libraries, one of which may hold it: ";
     for (const RefusedLibrary& r : refused) {
       message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);
@@ -144,15 +163,19 @@ struct Registry::Implementation {
   }
 
   const RegisteredPart& part(Kind kind, std::string_view part) {
-    const auto entry = of(kind).find(part);
+    auto entry = of(kind).find(part);
+    if (entry != of(kind).end() && !entry->second.part) {
+      open(fs::path(entry->second.library));
+      entry = of(kind).find(part);  // gone where the file has changed and no longer brings it
+    }
     if (entry == of(kind).end()) unknown(kind, part);
-    if (!entry->second.part) open(fs::path(entry->second.library), true);
-    return *of(kind).find(part)->second.part;
+    return *entry->second.part;
   }
 
   InputError not_made(Kind kind, const PartValues& values, std::string_view reason) const {
-    return InputError(values.values.position("type"), values.values.path(),
-                      fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
+    return InputError(
+        values.values.position("type"), values.values.path(),
+        fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
   }
 
   template <class Interface>
@@ -184,7 +207,7 @@ std::vector<fs::path> Registry::standard_search_path(const std::vector<fs::path>
   }
   static const char here = 0;
   const fs::path own = canonical_path(boost::dll::symbol_location_ptr(&here)).parent_path() / "perikit";
-  if (fs::is_directory(own)) folders.push_back(own);
+  if (std::error_code failed; fs::is_directory(own, failed)) folders.push_back(own);
   return folders;
 }
 
@@ -202,14 +225,25 @@ void Registry::add_folder(const fs::path& folder) {
 void Registry::open(const fs::path& library) {
   const fs::path file = canonical_path(library);
   implementation_->candidates.insert(file);
-  implementation_->open(file, implementation_->manifest_of(file).has_value());
+  implementation_->manifest_of(file);
+  implementation_->open(file);
 }
 
-std::vector<std::string> Registry::names(Kind kind) const { return implementation_->names(kind); }
-const PartDescription& Registry::describe(Kind kind, std::string_view name) { return implementation_->part(kind, name).description; }
-bool Registry::known(Kind kind, std::string_view name) const { return !implementation_->owner(kind, name).empty(); }
-const std::vector<RefusedLibrary>& Registry::refused() const noexcept { return implementation_->refused; }
-std::vector<fs::path> Registry::opened() const { return implementation_->opened; }
+std::vector<std::string> Registry::names(Kind kind) const {
+  return implementation_->names(kind);
+}
+const PartDescription& Registry::describe(Kind kind, std::string_view name) {
+  return implementation_->part(kind, name).description;
+}
+bool Registry::known(Kind kind, std::string_view name) const {
+  return !implementation_->owner(kind, name).empty();
+}
+const std::vector<RefusedLibrary>& Registry::refused() const noexcept {
+  return implementation_->refused;
+}
+std::vector<fs::path> Registry::opened() const {
+  return implementation_->opened;
+}
 
 fs::path Registry::library_of(Kind kind, std::string_view name) const {
   fs::path library = implementation_->owner(kind, name);

@@ -96,13 +96,7 @@ Field BodyProblem::acceleration(double t) {
       const auto p = static_cast<std::size_t>(index);
       a.component(c)[p] = (internal_force_.component(c)[p] + (external.data ? external.component(c)[p] : 0.0)) / masses[p];
     }
-  if (!any_constraint()) return a;
-  // Prescribed components: central difference of the prescribed velocity.
-  const double h = 1e-4 * std::max(last_step_, 1e-9 * std::abs(t));
-  Field before = body_.make_field(dimension()), after = body_.make_field(dimension());
-  prescribe_velocity(t - h, before);
-  prescribe_velocity(t + h, after);
-  for (const std::int64_t dof : constrained_) a.data()[dof] = h > 0 ? (after.data()[dof] - before.data()[dof]) / (2 * h) : 0.0;
+  prescribe_acceleration(t, a);
   return a;
 }
 

@@ -82,6 +82,21 @@ void BodyProblem::prescribe_velocity(double t, FieldView v) {
   }
 }
 
+void BodyProblem::prescribe_acceleration(double t, FieldView a) const {
+  // Differences over whole steps: over a small part of one, rounding would grow with the square of the number of steps.
+  const double h = last_step_;
+  for (const Constraint& constraint : constraints_) {
+    double* values = a.component(constraint.component);
+    for (std::size_t k = 0; k < constraint.points.size(); ++k) {
+      const auto at = [&](double time) { return constraint.at(body_, k, time); };
+      double& value = values[constraint.points[k]];
+      if (!constraint.fixed.empty() || h <= 0) value = 0.0;
+      else if (constraint.velocity) value = (at(t + h / 2) - at(t - h / 2)) / h;
+      else value = (at(t + h) - 2 * at(t) + at(t - h)) / (h * h);
+    }
+  }
+}
+
 void BodyProblem::prescribe_displacement(double t, FieldView u) {
   for (const Constraint& constraint : constraints_) {
     double* values = u.component(constraint.component);

@@ -71,7 +71,7 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept { return stop_requested; }
+bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return (steps_expected_ > 0 && step >= steps_expected_) || (end_time_ > 0 && time >= end_time_ * (1 - 1e-12));
@@ -101,9 +101,10 @@ void RunRecorder::step_done(const StepReport& report) {
     history_every_ = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
-  const bool stopping = cancelled();
-  if (history_due(report.step) || stopping) write_history(report);
-  if (frame_due(report.step, report.time) || stopping) write_frame(report);
+  // Read once a step: a signal that comes while this step is written ends the run after the next one, whose state is then kept.
+  stopping_ = stop_requested;
+  if (history_due(report.step) || stopping_) write_history(report);
+  if (frame_due(report.step, report.time) || stopping_) write_frame(report);
   progress(report);
 }
 

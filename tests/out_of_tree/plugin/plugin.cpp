@@ -1,7 +1,7 @@
+#include "perikit/sdk/plugin.hpp"
+
 #include <algorithm>
 #include <memory>
-
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 

@@ -11,6 +11,7 @@ PERIKIT_PLUGIN(registrar) {
                       [](const ParameterValues&, const PartFactory&) -> Result { throw std::runtime_error("table not found"); });
   registrar.influence({.name = "null", .summary = "returns null", .examples = {""}},
                       [](const ParameterValues&, const PartFactory&) -> Result { return nullptr; });
-  registrar.influence({.name = "explains", .summary = "names the place itself", .examples = {""}},
-                      [](const ParameterValues&, const PartFactory&) -> Result { throw InputError("scene.toml:3:1: its own text"); });
+  registrar.influence(
+      {.name = "explains", .summary = "names the place itself", .examples = {""}},
+      [](const ParameterValues&, const PartFactory&) -> Result { throw InputError("scene.toml:3:1: its own text"); });
 }

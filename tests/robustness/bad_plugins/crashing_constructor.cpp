@@ -5,4 +5,6 @@
 /// Runs inside dlopen, before any symbol can be compared.
 static const int crash = std::raise(SIGSEGV);
 
-PERIKIT_PLUGIN(registrar) { (void)registrar; }
+PERIKIT_PLUGIN(registrar) {
+  (void)registrar;
+}

@@ -1,4 +1,8 @@
 #include "perikit/plugin/abi.hpp"
 
-PERIKIT_EXPORT int perikit_abi_version() { return PERIKIT_ABI_VERSION; }
-PERIKIT_EXPORT const char* perikit_build_id() { return PERIKIT_BUILD_ID; }
+PERIKIT_EXPORT int perikit_abi_version() {
+  return PERIKIT_ABI_VERSION;
+}
+PERIKIT_EXPORT const char* perikit_build_id() {
+  return PERIKIT_BUILD_ID;
+}

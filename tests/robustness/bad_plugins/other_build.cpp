@@ -1,5 +1,11 @@
 #include "perikit/plugin/abi.hpp"
 
-PERIKIT_EXPORT int perikit_abi_version() { return PERIKIT_ABI_VERSION; }
-PERIKIT_EXPORT const char* perikit_build_id() { return "msvc19 abacus"; }
-PERIKIT_EXPORT void perikit_register(void*) { __builtin_trap(); }  // must not be reached
+PERIKIT_EXPORT int perikit_abi_version() {
+  return PERIKIT_ABI_VERSION;
+}
+PERIKIT_EXPORT const char* perikit_build_id() {
+  return "msvc19 abacus";
+}
+PERIKIT_EXPORT void perikit_register(void*) {
+  __builtin_trap();
+}  // must not be reached

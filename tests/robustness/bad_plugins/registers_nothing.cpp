@@ -1,3 +1,5 @@
 #include "perikit/plugin/abi.hpp"
 
-PERIKIT_PLUGIN(registrar) { (void)registrar; }
+PERIKIT_PLUGIN(registrar) {
+  (void)registrar;
+}

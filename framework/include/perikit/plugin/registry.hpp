@@ -29,10 +29,12 @@ class Registry final : public PartFactory, public PartCatalogue {
 
   /// Adds every *.so below `folder` (not recursive) as a candidate: reads the manifest beside it (X.so -> X.parts) where there is
   /// one, so that names are known without opening; opens the library at once where there is none.
-  /// A manifest that was not written for exactly this file is stale and ignored. What is refused is kept in `refused`; a folder
+  /// A manifest of a file of another size is stale and ignored; the bytes are compared when the library is opened, and a file
+  /// that has changed is tried in a child process first. What is refused is kept in `refused`; a folder
   /// that cannot be read throws InputError. Of two libraries that bring the same part, the second is refused.
   void add_folder(const std::filesystem::path& folder);
-  /// Opens and registers one library now. Throws InputError with file and reason when it is refused; nothing of it is then known.
+  /// Opens and registers one library now; without a manifest of exactly this file, in a child process first, so that a library
+  /// that crashes is refused too. Throws InputError with file and reason when it is refused; nothing of it is then known.
   void open(const std::filesystem::path& library) override;
 
   /// Parts in hand: registered, or named by a manifest. Sorted.

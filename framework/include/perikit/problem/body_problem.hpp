@@ -92,6 +92,8 @@ class BodyProblem final : public Problem {
   void read_initial();
   void read_constraints(bool quasi_static);
   void read_loads(bool quasi_static);
+  /// Overwrites prescribed components with their acceleration at t: differences of what is prescribed.
+  void prescribe_acceleration(double t, FieldView a) const;
   std::vector<double> face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const;
 
   Scene scene_;

@@ -82,6 +82,7 @@ class RunRecorder final : public Observer {
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
+  bool stopping_ = false;
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.

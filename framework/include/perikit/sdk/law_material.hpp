@@ -109,6 +109,7 @@ class LawMaterial final : public Material {
       PackMask good = Pack(0.0) == Pack(0.0);
       if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law_, H, k, ratio, good);
       good &= admissible(H);
+      if (b.lateral) H[S::components - 1].store(b.lateral + p);
 
       Pack probe = 0.0;  // turns to NaN where an output is not finite
       if (b.psi) {
@@ -162,6 +163,7 @@ class LawMaterial final : public Material {
         for (int c = 0; c < count; ++c) x[static_cast<std::size_t>(c) * b.stride + p + lane] = 0.0;
       };
       zero(b.psi, 1);
+      zero(b.lateral, 1);
       zero(b.P, components);
       zero(b.dP, components);
       zero(b.A, components * components);

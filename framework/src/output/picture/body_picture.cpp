@@ -155,7 +155,8 @@ std::string body_script(const BodyPicture& picture) {
                   screen_x(left), screen_x(left + columns), screen_y(bottom), screen_y(bottom + rows));
   script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\nset cbrange [{}:{}]\n", frame.lower.x(), frame.upper.x(),
                         frame.lower.y(), frame.upper.y(), picture.range[0], picture.range[1]);
-  script += fmt::format("set title {}\nset cbtics out\nunset key\n", gnuplot_quoted(picture.title));
+  // Centred over the whole picture: the plot itself may be much narrower than its title.
+  script += fmt::format("set label 1 {} at screen 0.5, screen 0.98 center\nset cbtics out\nunset key\n", gnuplot_quoted(picture.title));
   // The label of the bar has a place of its own, because gnuplot's own one runs into long numbers.
   const std::string value_label = gnuplot_quoted(picture.value_label);
   if (wide) {

@@ -1,0 +1,99 @@
+/// The material contract (material_contract.hpp) for every registered material, with the constants of each of its example tables.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tests/contract/fixture.hpp"
+#include "tests/contract/material_contract.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+std::shared_ptr<const PartValues> values_of(const Example& example) {
+  return parse_part(Kind::material, example.part, example.table, subject().registry);
+}
+
+const Parameter& declared(const Example& example, const std::string& key) {
+  return *subject().registry.describe(Kind::material, example.part).parameters.find(key);
+}
+
+/// Constants from the example's values at the origin, with every parameter in Pa multiplied.
+std::vector<double> constants_of(const Material& material, const Example& example, double factor_of_moduli = 1.0) {
+  const auto part = values_of(example);
+  std::map<std::string, double, std::less<>> numbers;
+  for (const std::string& key : part->values.keys()) {
+    const ParameterValue* value = part->values.find(key);
+    if (const auto* number = std::get_if<double>(value)) numbers[key] = *number;
+    else if (part->values.is_expression(key)) numbers[key] = Expression(part->values.text(key), {}, false, {}, key)({});
+    else continue;
+    if (declared(example, key).unit == "Pa") numbers[key] *= factor_of_moduli;
+  }
+  std::vector<double> constants(static_cast<std::size_t>(material.traits().constants), std::numeric_limits<double>::quiet_NaN());
+  material.constants({[&](std::string_view key) { return numbers.contains(key); }, [&](std::string_view key) { return numbers.find(key)->second; }},
+                     constants.data());
+  return constants;
+}
+
+std::string label(const Example& example) { return fmt::format("{} ({})", example.part, example.table); }
+
+}  // namespace
+
+TEST_CASE("material: the law keeps its contract in every space") {
+  for (const Example& example : examples(Kind::material)) {
+    INFO(label(example));
+    const auto material = subject().registry.material(*values_of(example));
+    const std::vector<double> constants = constants_of(*material, example);
+    MaterialOptions options{.law = label(example)};
+    // A constant that grows with the parameters in Pa is a modulus; the others must not notice the unit of stress.
+    constexpr double factor = 1024.0;
+    const std::vector<double> scaled = constants_of(*material, example, factor);
+    for (std::size_t k = 0; k < constants.size(); ++k) {
+      const double size = std::abs(constants[k]);
+      const bool modulus = std::abs(scaled[k] - factor * constants[k]) <= 1e-12 * factor * size;
+      CHECK_MESSAGE((modulus || std::abs(scaled[k] - constants[k]) <= 1e-12 * size), "constant ", k, " depends on the unit of stress: ", constants[k],
+                    " becomes ", scaled[k], " where all moduli are multiplied by ", factor);
+      options.moduli.push_back(modulus);
+    }
+    check_material(*material, constants, options);
+  }
+}
+
+TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {
+  for (const Example& example : examples(Kind::material)) {
+    INFO(label(example));
+    const auto material = subject().registry.material(*values_of(example));
+    const std::vector<double> constants = constants_of(*material, example);
+    for (const double constant : constants) CHECK_MESSAGE(std::isfinite(constant), "a constant is not written or not finite");
+    CHECK(constants == constants_of(*subject().registry.material(*values_of(example)), example));
+    const Moduli moduli = material->small_strain(constants.data());
+    CHECK_MESSAGE(moduli.mu > 0, "shear modulus at F = I: ", moduli.mu);
+    CHECK_MESSAGE(moduli.bulk() > 0, "bulk modulus at F = I: ", moduli.bulk());
+  }
+}
+
+TEST_CASE("material: the table declares a density, and what must be positive is refused when it is not") {
+  for (const Example& example : examples(Kind::material)) {
+    INFO(label(example));
+    const ParameterTable& table = subject().registry.describe(Kind::material, example.part).parameters;
+    const Parameter* density = table.find("density");
+    REQUIRE_MESSAGE(density != nullptr, "no parameter 'density': the material cannot run in time");
+    CHECK(density->unit == "kg/m^3");
+    CHECK_THROWS_AS(parse_part(Kind::material, example.part, example.table + "\nno_such_parameter = 1.0", subject().registry), InputError);
+    for (const std::string& key : values_of(example)->values.keys()) {
+      const Parameter* parameter = table.find(key);
+      if (!parameter->per_point || !(parameter->lower >= 0)) continue;
+      std::string bad;
+      for (std::size_t begin = 0; begin < example.table.size();) {
+        const std::size_t end = std::min(example.table.find('\n', begin), example.table.size());
+        const std::string line = example.table.substr(begin, end - begin);
+        bad += (line.starts_with(key + " ") || line.starts_with(key + "=") ? key + " = -1.0" : line) + "\n";
+        begin = end + 1;
+      }
+      CHECK_THROWS_AS_MESSAGE(parse_part(Kind::material, example.part, bad, subject().registry), InputError, key, " = -1 is accepted");
+    }
+  }
+}

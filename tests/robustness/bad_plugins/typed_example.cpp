@@ -1,0 +1,6 @@
+#include "perikit/sdk/plugin.hpp"
+
+PERIKIT_PLUGIN(registrar) {
+  registrar.influence({.name = "typed", .summary = "an example that holds the type", .examples = {"type = \"typed\""}},
+                      [](const perikit::ParameterValues&, const perikit::PartFactory&) { return nullptr; });
+}

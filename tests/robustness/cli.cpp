@@ -1,0 +1,386 @@
+/// The program as a user meets it: exit statuses, messages, the files of a run, and what is left when a run is killed or fails.
+
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <hdf5.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "perikit/output/recorder.hpp"
+#include "unit/temporary_folder.hpp"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t points = 8 * 5;
+
+/// A plate that is pulled for 1 s in steps of 0.02 s.
+const std::string plate = R"(format = 1
+title = "Pulled plate"
+
+[body]
+dimension = 2
+plane = "strain"
+[body.lattice]
+spacing = 1.0
+lower = [0, 0]
+upper = [8, 5]
+
+[sets]
+left = "x < 2"
+right = "x > 6"
+
+[family]
+horizon_ratio = 2.015
+
+[kinematics]
+type = "baqp"
+
+[material]
+type = "neo_hookean"
+density = 1.0
+shear_modulus = 0.8
+bulk_modulus = 2.0
+
+[[boundary]]
+set = "left"
+displacement = [0, 0]
+[[boundary]]
+set = "right"
+velocity = [0.1, "free"]
+
+[integrator]
+type = "verlet"
+time_step = 0.02
+end_time = 1.0
+
+[output]
+frames = 5
+history_every = 1
+history = [ { name = "pull", set = "right", quantity = "reaction", component = "x", reduce = "sum" } ]
+)";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+std::string read(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+struct Result {
+  int status;
+  std::string out, err;
+};
+
+/// A folder with a scene, and the program run in it.
+class Desk {
+ public:
+  explicit Desk(const std::string& scene = plate) { write("scene.toml", scene); }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
+  fs::path path(const std::string& name) const { return folder_.path / name; }
+  std::string text(const std::string& name) const { return read(path(name)); }
+
+  Result perikit(const std::string& arguments) const {
+    const std::string command = fmt::format("cd '{}' && '{}' {} > stdout.txt 2> stderr.txt", folder_.path.string(), PERIKIT_PROGRAM, arguments);
+    const int status = std::system(command.c_str());
+    REQUIRE(WIFEXITED(status));
+    return {WEXITSTATUS(status), text("stdout.txt"), text("stderr.txt")};
+  }
+
+  /// Starts the program and returns its process.
+  pid_t start(const std::vector<std::string>& arguments) const {
+    const pid_t child = fork();
+    if (child != 0) return child;
+    std::vector<char*> words{const_cast<char*>(PERIKIT_PROGRAM)};
+    for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+    words.push_back(nullptr);
+    const int null = open("/dev/null", O_WRONLY);
+    dup2(null, STDOUT_FILENO);
+    dup2(null, STDERR_FILENO);
+    if (chdir(folder_.path.c_str()) == 0) execv(PERIKIT_PROGRAM, words.data());
+    _exit(127);
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+/// Time, step and the number of values of `displacement` of one frame file; -1 values where it cannot be read.
+struct Frame {
+  double time = NAN;
+  std::int64_t step = -1;
+  hssize_t values = -1;
+};
+
+Frame read_frame(const fs::path& file, const std::string& group = "/") {
+  Frame frame;
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  const hid_t handle = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (handle < 0) return frame;
+  const auto attribute = [&](const char* name, hid_t type, void* to) {
+    const hid_t a = H5Aopen_by_name(handle, group.c_str(), name, H5P_DEFAULT, H5P_DEFAULT);
+    if (a < 0) return;
+    H5Aread(a, type, to);
+    H5Aclose(a);
+  };
+  attribute("time", H5T_NATIVE_DOUBLE, &frame.time);
+  attribute("step", H5T_NATIVE_INT64, &frame.step);
+  if (const hid_t set = H5Dopen2(handle, (group + "/displacement").c_str(), H5P_DEFAULT); set >= 0) {
+    const hid_t space = H5Dget_space(set);
+    const hssize_t values = H5Sget_simple_extent_npoints(space);
+    std::vector<double> data(static_cast<std::size_t>(values));
+    if (H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()) >= 0) frame.values = values;
+    H5Sclose(space);
+    H5Dclose(set);
+  }
+  H5Fclose(handle);
+  return frame;
+}
+
+std::vector<Frame> read_frames(const fs::path& folder) {
+  std::vector<Frame> frames;
+  for (std::size_t k = 0; fs::exists(folder / fmt::format("frames/{:08}.h5", k)); ++k) frames.push_back(read_frame(folder / fmt::format("frames/{:08}.h5", k)));
+  return frames;
+}
+
+std::vector<std::string> lines(const std::string& text) {
+  std::vector<std::string> all;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) all.push_back(line);
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("cli: exit status 0 for what is done, 2 for what is refused") {
+  const Desk desk;
+  CHECK(desk.perikit("--help").status == 0);
+  CHECK(desk.perikit("--version").status == 0);
+  CHECK(desk.perikit("check scene.toml").status == 0);
+  for (const std::string refused : {"", "walk scene.toml", "run", "run nowhere.toml", "run scene.toml --threads 0", "run scene.toml --unknown", "check scene.toml --set",
+                              "describe material", "describe material/rubber", "describe matter/rubber", "list matter"}) {
+    const Result result = desk.perikit(refused);
+    CHECK_MESSAGE(result.status == 2, "perikit ", refused, ": status ", result.status);
+    CHECK_MESSAGE(!result.err.empty(), "perikit ", refused, ": no message");
+  }
+  CHECK(contains(desk.perikit("run nowhere.toml").err, "nowhere.toml"));
+}
+
+TEST_CASE("cli: errors name file, line, column, key and what was meant") {
+  struct Fault {
+    std::string from, to;
+    std::vector<std::string> words;
+  };
+  const std::vector<Fault> faults{
+      {"spacing = 1.0", "spacing = -1.0", {"scene.toml:8:", "body.lattice.spacing", "-1", "> 0"}},
+      {"horizon_ratio = 2.015", "horizon_ratoi = 2.015", {"scene.toml:17:1", "horizon_ratoi", "did you mean 'horizon_ratio'"}},
+      {"\"neo_hookean\"", "\"neo_hokean\"", {"scene.toml:23:", "neo_hokean", "did you mean 'neo_hookean'"}},
+      {"bulk_modulus = 2.0", "bulk_modulus = \"2.0 + q\"", {"scene.toml:26:", "material.bulk_modulus"}},
+      {"set = \"right\"\nvelocity", "set = \"rihgt\"\nvelocity", {"scene.toml:32:", "rihgt", "did you mean 'right'"}},
+      {"density = 1.0\n", "", {"scene.toml:", "density"}},
+      {"frames = 5", "frames = five", {"scene.toml:41:"}},
+  };
+  for (const Fault& fault : faults) {
+    const Desk desk(replaced(plate, fault.from, fault.to));
+    for (const std::string command : {"check scene.toml", "run scene.toml -o out"}) {
+      const Result result = desk.perikit(command);
+      INFO(fault.to, "\n", result.err);
+      CHECK(result.status == 2);
+      for (const std::string& word : fault.words) CHECK_MESSAGE(contains(result.err, word), "no '", word, "'");
+      CHECK_MESSAGE(!fs::exists(desk.path("out")), "a refused scene leaves a folder");
+    }
+  }
+  // All of them at once.
+  const Result both = Desk(replaced(replaced(plate, "spacing = 1.0", "spacing = -1.0"), "horizon_ratio", "horizon_ratoi")).perikit("check scene.toml");
+  CHECK(contains(both.err, "scene.toml:8:"));
+  CHECK(contains(both.err, "scene.toml:17:"));
+}
+
+TEST_CASE("cli: list and describe show every part") {
+  const Desk desk;
+  const std::string all = desk.perikit("list").out;
+  std::size_t parts = 0;
+  for (const std::string kind : {"kinematics", "material", "influence", "integrator"}) {
+    CHECK(contains(all, kind + "\n"));
+    const Result list = desk.perikit(fmt::format("list {}", kind));
+    CHECK(list.status == 0);
+    for (const std::string& line : lines(list.out)) {
+      const std::string part = line.substr(0, line.find(' '));
+      CHECK(contains(all, part));
+      const Result described = desk.perikit(fmt::format("describe {}/{}", kind, part));
+      CHECK(described.status == 0);
+      for (const std::string section : {"Equations", "Source", "Limits", "Example"}) CHECK_MESSAGE(contains(described.out, section), kind, "/", part, ": no ", section);
+      ++parts;
+    }
+  }
+  CHECK(parts >= 10);
+  const std::string rubber = desk.perikit("describe material/neo_hookean").out;
+  for (const std::string word : {"shear_modulus", "[Pa]", "density", "kg/m^3", "volumetric", "Default"}) CHECK_MESSAGE(contains(rubber, word), "no ", word);
+}
+
+TEST_CASE("cli: check prints a scene that is the same when read again") {
+  const Desk desk;
+  const Result first = desk.perikit("check scene.toml --set integrator.end_time=0.5");
+  REQUIRE(first.status == 0);
+  for (const std::string word : {"# points        40", "# bonds", "# memory", "# integration   verlet: 25 steps of 0.02 s"}) CHECK_MESSAGE(contains(first.out, word), "no '", word, "' in\n", first.out);
+  desk.write("resolved.toml", first.out);
+  const Result again = desk.perikit("check resolved.toml");
+  CHECK(again.status == 0);
+  CHECK(again.out == first.out);
+  CHECK(desk.perikit("run scene.toml --quiet -o a --set integrator.end_time=0.5").status == 0);
+  CHECK(desk.perikit("run resolved.toml --quiet -o b").status == 0);
+  CHECK_MESSAGE(desk.text("a/history.csv") == desk.text("b/history.csv"), "the resolved scene runs differently");
+}
+
+TEST_CASE("cli: --set, --explain, --quiet and --threads") {
+  const Desk desk;
+  const Result quiet = desk.perikit("run scene.toml --quiet -o quiet");
+  CHECK(quiet.status == 0);
+  CHECK(quiet.out.empty());
+  CHECK(quiet.err.empty());
+  CHECK(contains(desk.perikit("run scene.toml -o loud").out, "frames in loud"));
+  CHECK(contains(desk.perikit("run scene.toml --explain -o explained").out, "skipped:"));
+  CHECK(desk.perikit("run scene.toml --quiet -o set --set 'title=\"other\"' --set integrator.end_time=0.1 --set kinematics.type=conventional").status == 0);
+  CHECK(contains(desk.text("set/scene.toml"), "title = \"other\""));
+  CHECK(contains(desk.text("set/scene.toml"), "conventional"));
+  CHECK(read_frames(desk.path("set")).back().time == 0.1);
+  const Result wrong = desk.perikit("run scene.toml --set integrator.end_tiem=0.1");
+  CHECK(wrong.status == 2);
+  CHECK(contains(wrong.err, "did you mean 'end_time'"));
+  CHECK(desk.perikit("run scene.toml --quiet --threads 1 -o one").status == 0);
+  CHECK(desk.perikit("run scene.toml --quiet --threads 2 -o two").status == 0);
+  CHECK(desk.text("one/history.csv") == desk.text("two/history.csv"));
+}
+
+TEST_CASE("cli: the folder of a run") {
+  const Desk desk;
+  REQUIRE(desk.perikit("run scene.toml -o out").status == 0);
+  std::set<std::string> found, expected{"results.h5", "reference.h5", "results.xdmf", "history.csv", "scene.toml", "run.log", "frames"};
+  for (const auto& entry : fs::directory_iterator(desk.path("out"))) found.insert(entry.path().filename());
+  CHECK(found == expected);
+  const std::vector<std::string> history = lines(desk.text("out/history.csv"));
+  REQUIRE(history.size() == 1 + 51);
+  CHECK(history[0] == "step,time,time_step,strain_energy,kinetic_energy,external_work,dissipated_energy,iterations,residual,pull");
+  for (const std::string& row : history) CHECK(std::count(row.begin(), row.end(), ',') == 9);
+  CHECK(contains(desk.text("out/run.log"), "50 steps of 0.02 s"));
+  for (int k = 0; k < 6; ++k) {
+    const Frame frame = read_frame(desk.path("out/results.h5"), fmt::format("/frames/{:08}", k));
+    CHECK_MESSAGE(frame.values == 3 * points, "results.h5 does not show frame ", k);
+    CHECK(frame.step == 10 * k);
+  }
+  CHECK(contains(desk.text("out/results.xdmf"), "00000005"));
+  const perikit::LoadedFrame last = perikit::read_last_frame(desk.path("out/results.h5"), points);
+  CHECK(last.time == 1.0);
+  CHECK(last.step == 50);
+  for (const std::string field : {"displacement", "velocity", "strain_energy_density"}) CHECK_MESSAGE(last.fields.contains(field), "no field ", field);
+  CHECK(desk.perikit("check out/scene.toml").status == 0);
+  // A run starts from the last frame of an earlier one.
+  desk.write("next.toml", plate + "\n[initial]\nfrom = \"out/results.h5\"\n");
+  const Result next = desk.perikit("run next.toml --quiet -o next");
+  CHECK_MESSAGE(next.status == 0, next.err);
+}
+
+TEST_CASE("cli: frames, every and times give the frames that they promise") {
+  const auto frames_of = [](const std::string& output) {
+    const Desk desk(replaced(plate, "frames = 5", output));
+    const Result result = desk.perikit("run scene.toml --quiet -o out");
+    REQUIRE_MESSAGE(result.status == 0, result.err);
+    return read_frames(desk.path("out"));
+  };
+  const auto steps_of = [&](const std::string& output) {
+    std::vector<std::int64_t> steps;
+    for (const Frame& frame : frames_of(output)) {
+      steps.push_back(frame.step);
+      CHECK(std::abs(frame.time - 0.02 * static_cast<double>(frame.step)) <= 1e-14);
+      CHECK(frame.values == 3 * points);
+    }
+    return steps;
+  };
+  using Steps = std::vector<std::int64_t>;
+  CHECK(steps_of("frames = 5") == Steps{0, 10, 20, 30, 40, 50});
+  CHECK(steps_of("frames = 3") == Steps{0, 17, 34, 50});      // the first step at or after k/3
+  CHECK(steps_of("frames = 1") == Steps{0, 50});
+  CHECK(steps_of("frames = 500").size() == 51);               // every step once
+  CHECK(steps_of("every = 20") == Steps{0, 20, 40, 50});      // and the end
+  CHECK(steps_of("every = 25") == Steps{0, 25, 50});
+  CHECK(steps_of("times = [0.0, 0.31, 0.4, 1.0]") == Steps{0, 16, 20, 50});
+}
+
+TEST_CASE("cli: kill -9 leaves every finished frame readable") {
+  const Desk desk(replaced(replaced(plate, "frames = 5", "every = 1"), "end_time = 1.0", "end_time = 4000.0"));
+  const pid_t child = desk.start({"run", "scene.toml", "-o", "out"});
+  REQUIRE(child > 0);
+  const auto start = std::chrono::steady_clock::now();
+  while (!fs::exists(desk.path("out/frames/00000011.h5")) && std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  REQUIRE_MESSAGE(WIFSIGNALED(status), "the run had ended before it was killed");
+  const std::vector<Frame> frames = read_frames(desk.path("out"));
+  REQUIRE(frames.size() > 11);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    CHECK_MESSAGE(frames[k].values == 3 * points, "frame ", k, " cannot be read");
+    CHECK(frames[k].step == static_cast<std::int64_t>(k));
+  }
+  // The list may lack the frame that was just finished, no other.
+  const std::int64_t listed = perikit::read_last_frame(desk.path("out/results.h5"), points).step;
+  CHECK(listed >= frames.back().step - 1);
+  const std::string history = desk.text("out/history.csv");
+  CHECK(lines(history).size() > 11);
+  CHECK_MESSAGE(history.back() == '\n', "history.csv ends within a row");
+}
+
+TEST_CASE("cli: a signal ends a run in order") {
+  const Desk desk(replaced(plate, "end_time = 1.0", "end_time = 1.0e6"));
+  const pid_t child = desk.start({"run", "scene.toml", "-o", "out"});
+  REQUIRE(child > 0);
+  const auto start = std::chrono::steady_clock::now();
+  while (lines(desk.text("out/history.csv")).size() < 10 && std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  kill(child, SIGTERM);
+  int status = 0;
+  waitpid(child, &status, 0);
+  REQUIRE(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 1);
+  const std::vector<Frame> frames = read_frames(desk.path("out"));
+  REQUIRE(frames.size() >= 2);
+  CHECK(frames.back().values == 3 * points);
+  CHECK_MESSAGE(frames.back().step >= 8, "the state at the end is not kept");
+}
+
+TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and what is left") {
+  const Desk every(replaced(plate, "frames = 5", "every = 1") + "\n[initial]\nvelocity = [\"-60*(x > 4)\", 0]\n");
+  const Result failed = every.perikit("run scene.toml -o out");
+  INFO(failed.err);
+  CHECK(failed.status == 1);
+  for (const std::string word : {"the run failed", "inadmissible", "point ", "(", "step ", "time ", "kinematics baqp", "material neo_hookean", "last good frame: "}) {
+    CHECK_MESSAGE(contains(failed.err, word), "no '", word, "'");
+  }
+  const std::vector<Frame> frames = read_frames(every.path("out"));
+  REQUIRE(!frames.empty());
+  for (const Frame& frame : frames) CHECK(frame.values == 3 * points);
+  CHECK_MESSAGE(contains(failed.err, fmt::format("last good frame: {}", frames.size() - 1)), frames.size(), " frames");
+  CHECK(contains(every.text("out/run.log"), fmt::format("last good frame: {}", frames.size() - 1)));
+  CHECK(perikit::read_last_frame(every.path("out/results.h5"), points).step == frames.back().step);
+}
