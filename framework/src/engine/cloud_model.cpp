@@ -24,7 +24,7 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
   if (traits_.at == EvaluationPoints::bonds) {
     gradient_.resize(D * n);
     force_.resize(n);
-    build_colouring();
+    colouring_ = colour_cloud(families_, n);
   }
 }
 
@@ -83,36 +83,6 @@ void CloudModel<D>::build_families(const InfluenceFunction& influence) {
   families_.first = std::move(first);
   families_.neighbour.resize(static_cast<std::size_t>(kept));
   omega_.resize(static_cast<std::size_t>(kept));
-}
-
-template <int D>
-void CloudModel<D>::build_colouring() {
-  std::vector<std::vector<std::int32_t>> touches(blocks());
-  for (std::size_t b = 0; b < blocks(); ++b) {
-    std::vector<std::int32_t>& units = touches[b];
-    units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
-      for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]) / block_points);
-        if (unit != units.back()) units.push_back(unit);
-      }
-    }
-    std::sort(units.begin(), units.end());
-    units.erase(std::unique(units.begin(), units.end()), units.end());
-  }
-  colouring_ = Colouring(touches, blocks());
-}
-
-template <int D>
-void CloudModel<D>::mirror(ConstFieldView u, AlignedVector<Row>& rows) const {
-  rows.resize(body_.points());
-  parallel_for(blocks(), [&](std::size_t b) {
-    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
-      Row row{};
-      for (int c = 0; c < D; ++c) row[c] = u.component(c)[p];
-      rows[p] = row;
-    }
-  });
 }
 
 template <int D>
@@ -314,8 +284,8 @@ void CloudModel<D>::divergence(std::size_t p, FieldView out) const noexcept {
 template <int D>
 EvaluationStatus CloudModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
-  mirror(pass.u, u_);
-  if (pass.work.tangent()) mirror(pass.w, w_);
+  mirror_rows(pass.u, body_.points(), u_);
+  if (pass.work.tangent()) mirror_rows(pass.w, body_.points(), w_);
   const bool sample = pass.work.work() == Work::sample;
   const auto over_points = [&](auto&& body) {
     parallel_for(blocks(), [&](std::size_t b) {

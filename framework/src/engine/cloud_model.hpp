@@ -4,12 +4,10 @@
 #include "batch.hpp"
 #include "blocks.hpp"
 #include "bond_kernel.hpp"
+#include "cloud_rows.hpp"
 #include "perikit/engine/model.hpp"
 
 namespace perikit {
-
-/// Four doubles: a point-major row, so that one neighbour costs one cache line.
-typedef double Row __attribute__((vector_size(32)));
 
 /// Any point or bond kinematics on an irregular cloud: one point at a time over sorted neighbour lists; gathered quantities are
 /// mirrored point-major.
@@ -26,12 +24,10 @@ class CloudModel final : public Model {
   ModelReport report() const override;
 
  private:
-  static constexpr std::size_t block_points = 256;
+  static constexpr std::size_t block_points = cloud_block_points;
 
   void build_families(const InfluenceFunction& influence);
-  void build_colouring();
   EvaluationStatus run(Pass& pass);
-  void mirror(ConstFieldView u, AlignedVector<Row>& rows) const;
   /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
   void gradient_lane(std::size_t p, const AlignedVector<Row>& u, double* H, int lane) const noexcept;

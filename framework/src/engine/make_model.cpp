@@ -1,5 +1,6 @@
 #include "cloud_model.hpp"
 #include "lattice_model.hpp"
+#include "pair_model.hpp"
 #include "weighted_model.hpp"
 
 namespace perikit {
@@ -8,6 +9,7 @@ namespace {
 
 template <int D>
 std::unique_ptr<Model> make(const ModelParts& parts) {
+  if (parts.kinematics->traits().at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
   if (parts.kinematics->traits().at == EvaluationPoints::weighted) return std::make_unique<WeightedModel<D>>(parts);
   if (parts.body->lattice()) return std::make_unique<LatticeModel<D>>(parts);
   return std::make_unique<CloudModel<D>>(parts);

@@ -70,8 +70,8 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
     const auto p = static_cast<std::size_t>(body_.internal()[static_cast<std::size_t>(status.point)]);
     const std::uint16_t id = body_.material_ids().empty() ? std::uint16_t{0} : body_.material_ids()[p];
     const std::string& material = id == 0 ? scene_.material->type : scene_.regions[id - 1u].material->type;
-    status.description = fmt::format("inadmissible deformation (det F <= 0 or not finite) at {}, kinematics {}, material {}",
-                                     status.description, scene_.kinematics->type, material);
+    status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
+                                     model_->has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length", status.description, scene_.kinematics->type, material);
   }
   return status;
 }

@@ -13,6 +13,11 @@ const std::vector<std::string>& PointFields::names() {
   return all;
 }
 
+bool PointFields::needs_gradients(const std::string& name) {
+  static const std::array fields{"deformation_gradient", "first_piola", "cauchy", "von_mises", "jacobian", "shape_tensor_condition"};
+  return std::find(fields.begin(), fields.end(), name) != fields.end();
+}
+
 int PointFields::width(const std::string& name) {
   static const std::array vectors{"displacement", "velocity", "acceleration", "internal_force", "external_force", "reaction"};
   static const std::array tensors{"deformation_gradient", "first_piola", "cauchy"};

@@ -12,6 +12,22 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   traits_ = integrator_->traits();
   problem_ = std::make_unique<BodyProblem>(scene_, factory, traits_.quasi_static);
   if (traits_.dynamic) problem_->mass();
+  if (!problem_->model().has_gradients()) refuse_gradients();
+}
+
+void Simulation::refuse_gradients() const {
+  const auto check = [&](const std::string& field, const SourcePosition& position, const std::string& key) {
+    if (!PointFields::needs_gradients(field)) return;
+    std::vector<std::string> others;
+    for (const std::string& name : PointFields::names())
+      if (!PointFields::needs_gradients(name)) others.push_back(name);
+    throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
+                                                field, scene_.kinematics->type, fmt::join(others, ", ")));
+  };
+  for (const std::string& field : scene_.output.fields) check(field, scene_.output.fields_position, "output.fields");
+  for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
+    check(scene_.output.history[k].quantity, scene_.output.history[k].position, fmt::format("output.history.{}.quantity", k));
+  }
 }
 
 void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer); }
@@ -24,8 +40,10 @@ std::string Simulation::summary() {
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
-    text += fmt::format("warning       {} points have a family too poor for a gradient; they carry no strain of their own\n", report.singular_families);
+    text += fmt::format("warning       {} points have {}\n", report.singular_families,
+                        problem_->model().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
+  for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points use the gradient of the whole family\n", report.fallbacks);
   if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);

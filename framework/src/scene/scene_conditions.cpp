@@ -99,6 +99,7 @@ void SceneReader::read_output(const toml::table& root) {
   if (values.has("history_every")) description.history_every = values.integer("history_every");
   if (values.has("checkpoint_every")) description.checkpoint_every = values.integer("checkpoint_every");
   if (values.has("fields")) description.fields = values.texts("fields");
+  description.fields_position = values.position("fields");
   for (std::size_t i = 0; i < description.fields.size(); ++i) {
     if (std::count(description.fields.begin(), description.fields.begin() + static_cast<std::ptrdiff_t>(i),
                    description.fields[i]) == 0)

@@ -38,8 +38,8 @@ PERIKIT_PLUGIN(registrar) {
       [](const ParameterValues& values, const PartFactory& factory) -> std::unique_ptr<Kinematics> {
         std::unique_ptr<Kinematics> base = factory.kinematics(values.part("base"));
         const KinematicsTraits traits = base->traits();
-        if (traits.at == EvaluationPoints::points) {
-          throw values.error("base", "found '" + values.part("base").type + "', whose evaluation points are points; allowed: a kinematics with bonds or sub-horizons");
+        if (traits.at == EvaluationPoints::points || traits.at == EvaluationPoints::pairs) {
+          throw values.error("base", "found '" + values.part("base").type + "', which has no evaluation points at bonds or sub-horizons; allowed: a kinematics with bonds or sub-horizons");
         }
         if (traits.selective) throw values.error("base", "found 'selective' itself; allowed: a kinematics with bonds or sub-horizons");
         return std::make_unique<Selective>(std::move(base));

@@ -102,6 +102,46 @@ inline Pack sqrt(Pack a) noexcept {
   return r;
 #endif
 }
+/// 1/sqrt(a) and 1/a for normal a > 0 to about one unit in the last place; not a number for 0 and infinity.
+inline Pack reciprocal_sqrt(Pack a) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_rsqrt14_pd(reinterpret_cast<__m512d>(a.v)))};
+  const Pack half = Pack(0.5) * a;
+  r = r * (Pack(1.5) - half * r * r);
+  return r + r * (Pack(0.5) - half * r * r);
+#else
+  return Pack(1.0) / sqrt(a);
+#endif
+}
+inline Pack reciprocal(Pack a) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_rcp14_pd(reinterpret_cast<__m512d>(a.v)))};
+  r = r + r * (Pack(1.0) - a * r);
+  return r + r * (Pack(1.0) - a * r);
+#else
+  return Pack(1.0) / a;
+#endif
+}
+/// a in the lanes whose bit is set, zero elsewhere (bits: of a group of eight, shifted so that lane 0 is bit 0).
+inline Pack keep(std::uint8_t bits, Pack a) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return {reinterpret_cast<detail::Lanes>(_mm512_maskz_mov_pd(bits, reinterpret_cast<__m512d>(a.v)))};
+#else
+  for (int i = 0; i < pack_width; ++i)
+    if (!(bits >> i & 1)) a.v[i] = 0;
+  return a;
+#endif
+}
+/// p[lane] -= a[lane] where the bit of the lane is set; nothing else is written.
+inline void subtract_at(double* p, std::uint8_t bits, Pack a) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  const __m512d old = _mm512_maskz_loadu_pd(bits, p);
+  _mm512_mask_storeu_pd(p, bits, _mm512_sub_pd(old, reinterpret_cast<__m512d>(a.v)));
+#else
+  for (int i = 0; i < pack_width; ++i)
+    if (bits >> i & 1) p[i] -= a.v[i];
+#endif
+}
 inline Pack abs(Pack a) noexcept {
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & std::int64_t{0x7fffffffffffffff})};
 }

@@ -38,6 +38,7 @@ struct ModelReport {
   std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family
   std::size_t dropped_parts = 0;              ///< parts of families without a gradient of their own
   std::vector<SkipNote> skips;
+  std::vector<std::string> warnings;          ///< one line each
 };
 
 class Model {
@@ -48,7 +49,9 @@ class Model {
   /// Kw <- d2Pi/du2 w [N], fully overwritten.
   virtual EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   virtual EvaluationStatus sample(ConstFieldView u, PointSamples& samples) = 0;
-  /// Condition number of each point's shape tensor (one component; infinite where singular).
+  /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
+  virtual bool has_gradients() const noexcept { return true; }
+  /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).
   virtual Field shape_tensor_condition() = 0;
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
   virtual Field damage() = 0;

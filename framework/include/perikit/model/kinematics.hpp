@@ -1,5 +1,5 @@
 #pragma once
-/// Kinematics: linear operators from displacements to displacement gradients H = F - I at evaluation points. A kinematics states
+/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at evaluation points. A kinematics states
 /// its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the momentum balances hold
 /// for every formulation without further code.
 ///
@@ -8,12 +8,22 @@
 ///   point     one evaluation point per point:   H_i = Hbar_i, the point gradient of order n          (conventional)
 ///   bond      one per bond, H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = Hbar_i or (Hbar_i + Hbar_j)/2  (baqp, projection, ...)
 ///   weighted  one or more per point, H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1               (non_spherical, sub_horizon, ...)
+///   pairs     no gradients and no material evaluations: central forces along the bonds                 (bond_based, ordinary)
 ///
 /// Hbar is the point gradient, a service of the engine: (sum_j omega V_j u_ij (x) xi_ij) K_i^-1 for order 1.
-/// Every shape is exact for affine motion whatever the plugin returns.
+/// Every shape with gradients is exact for affine motion whatever the plugin returns.
+///
+/// A pair law is stated by its energy, with e = |xi + u_j - u_i| - |xi| the extension of a bond:
+///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e V_j,
+///   m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
+/// The engine makes extensions, dilatations, forces and tangents of it; both moduli come from the small strain of the material.
 
 #include <cstddef>
+#include <string>
 #include <vector>
+
+#include "perikit/core/space.hpp"
+#include "perikit/model/material.hpp"
 
 namespace perikit {
 
@@ -32,7 +42,47 @@ struct FamilyView {
   std::size_t inverse_shape_stride = 0;
 };
 
-enum class EvaluationPoints { points, bonds, weighted };
+/// What the moduli of a pair law at one point may depend on.
+struct PairPoint {
+  Space space = Space::solid;
+  double section = 1;                 ///< thickness (2D) [m] or area (1D) [m^2], contained in the volumes
+  double horizon = 0;                 ///< delta [m]
+  Moduli moduli;                      ///< small strain of the point's material [Pa]
+  double weighted_volume = 0;         ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
+  double intact = 1;                  ///< share of the family's influence that is not broken
+  /// Bulk modulus as the space sees it: K; plane strain K + mu/3, plane stress E/(2(1 - nu)); uniaxial strain lambda + 2 mu, stress E.
+  double bulk() const noexcept;
+};
+
+struct PairModuli {
+  double bond = 0;                    ///< c_i
+  double dilatation = 0;              ///< k_i
+};
+
+/// Arrays over n bonds that can be read (bonds at rest) and written up to padded(n). A null output is not wanted; the others are
+/// overwritten for all n bonds.
+struct BondBatch {
+  int n = 0;
+  const double* length = nullptr;     ///< |xi| [m]
+  const double* omega = nullptr;      ///< influence
+  const double* extension = nullptr;  ///< e [m]
+  const double* modulus = nullptr;    ///< c_ij
+  double* energy = nullptr;           ///< w [J/m^6]
+  double* force = nullptr;            ///< dw/de [N/m^6]; exactly 0 at e = 0
+  double* stiffness = nullptr;        ///< d2w/de2 [N/m^7]
+};
+
+/// Arrays over n points, as above.
+struct DilatationBatch {
+  int n = 0;
+  const double* theta = nullptr;      ///< [-]
+  const double* modulus = nullptr;    ///< k_i
+  double* energy = nullptr;           ///< phi [J/m^3]
+  double* pressure = nullptr;         ///< dphi/dtheta [Pa]; exactly 0 at theta = 0
+  double* stiffness = nullptr;        ///< d2phi/dtheta2 [Pa]
+};
+
+enum class EvaluationPoints { points, bonds, weighted, pairs };
 enum class BondBase { own, mean };          ///< A_b of the bond shape
 enum class BondWeight { volume, kernel };   ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
 enum class PartWeight { equal, volume };    ///< W_q of the admissible parts of point i: the same share of V_i, or shares as their volumes
@@ -50,6 +100,12 @@ struct KinematicsTraits {
   /// The volume change of every evaluation point is that of its owner: F_q <- (Jbar_i / J_q)^(1/3) F_q. Not in plane or uniaxial
   /// stress, and not with evaluation points at points.
   bool selective = false;
+  bool dilatation = false;                  ///< pairs: phi is not zero
+  bool influence = true;                    ///< pairs: w or theta depends on omega
+  bool constant_moduli = false;             ///< pairs: c_i depends on the material alone, not on the family
+  /// pairs: moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as
+  /// in a whole family (w must be proportional to c_ij)
+  bool surface_correction = false;
 };
 
 class Kinematics {
@@ -65,6 +121,25 @@ class Kinematics {
   /// view's omega for a part. Fully overwritten. A part without a well-conditioned gradient of its own is dropped and the others share
   /// its weight; a bond's domain without one, and a family without any part, use the whole family.
   virtual void weights(const FamilyView&, int /*q*/, double* /*omega*/) const noexcept {}
+  /// pairs: moduli of one point, asked for at set-up.
+  virtual PairModuli pair_moduli(const PairPoint&) const noexcept { return {}; }
+  /// pairs: what is wrong with the law for such a point, as one line for the log; empty: nothing.
+  virtual std::string pair_warning(const PairPoint&) const { return {}; }
+  /// pairs: w and its derivatives.
+  virtual void bond_law(const BondBatch&) const noexcept {}
+  /// pairs: phi and its derivatives.
+  virtual void dilatation_law(const DilatationBatch&) const noexcept {}
 };
+
+inline double PairPoint::bulk() const noexcept {
+  switch (space) {
+    case Space::solid: return moduli.bulk();
+    case Space::plane_strain: return moduli.lambda + moduli.mu;
+    case Space::plane_stress: return moduli.youngs() / (2 * (1 - moduli.poisson()));
+    case Space::line_strain: return moduli.lambda + 2 * moduli.mu;
+    case Space::line_stress: return moduli.youngs();
+  }
+  return 0;
+}
 
 }  // namespace perikit

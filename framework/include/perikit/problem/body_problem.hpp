@@ -53,7 +53,7 @@ class BodyProblem final : public Problem {
 
   double largest_eigenvalue(ConstFieldView u) override;
   double bond_based_time_step() const override;
-  bool constant_stiffness() const noexcept override { return laws_->constant_tangent(); }
+  bool constant_stiffness() const noexcept override { return model_->has_gradients() && laws_->constant_tangent(); }
 
   const Body& body() const noexcept { return body_; }
   Model& model() noexcept { return *model_; }

@@ -17,6 +17,8 @@ class PointFields {
 
   /// Names in the order of the documentation.
   static const std::vector<std::string>& names();
+  /// Made of deformation gradients or stresses, which pair laws do not have.
+  static bool needs_gradients(const std::string& name);
   /// Numbers per point: 1, 3 or 9.
   static int width(const std::string& name);
   /// Column of a row by component name ("x", "xy"); -1 for "magnitude". Throws std::out_of_range for an unknown one.

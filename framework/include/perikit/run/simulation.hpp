@@ -32,6 +32,9 @@ class Simulation {
   std::string explanation(const Registry& registry) const;
 
  private:
+  /// InputError where output asks a pair law for fields that it does not have.
+  void refuse_gradients() const;
+
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;

@@ -81,6 +81,7 @@ struct OutputDescription {
   std::int64_t history_every = 0;            ///< 0: default (every step for statics, about 1000 samples for explicit runs)
   std::int64_t checkpoint_every = 0;         ///< 0: none
   std::vector<std::string> fields;           ///< empty: default
+  SourcePosition fields_position;
   std::vector<HistoryDescription> history;
 };
 

@@ -1,0 +1,35 @@
+#include "cloud_rows.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows) {
+  rows.resize(points);
+  parallel_for(cloud_blocks(points), [&](std::size_t b) {
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+      Row row{};
+      for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
+      rows[p] = row;
+    }
+  });
+}
+
+Colouring colour_cloud(const FamilyLists& families, std::size_t points) {
+  std::vector<std::vector<std::int32_t>> touches(cloud_blocks(points));
+  for (std::size_t b = 0; b < touches.size(); ++b) {
+    std::vector<std::int32_t>& units = touches[b];
+    units.push_back(static_cast<std::int32_t>(b));
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+      for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / cloud_block_points);
+        if (unit != units.back()) units.push_back(unit);
+      }
+    }
+    std::sort(units.begin(), units.end());
+    units.erase(std::unique(units.begin(), units.end()), units.end());
+  }
+  return Colouring(touches, touches.size());
+}
+
+}  // namespace perikit

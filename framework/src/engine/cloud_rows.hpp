@@ -1,0 +1,23 @@
+#pragma once
+/// What the loops over clouds share: point-major mirrors of fields, and blocks of points.
+
+#include "blocks.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+/// Four doubles: a point-major row, so that one neighbour costs one cache line.
+typedef double Row __attribute__((vector_size(32)));
+
+inline constexpr std::size_t cloud_block_points = 256;
+
+constexpr std::size_t cloud_blocks(std::size_t points) noexcept { return (points + cloud_block_points - 1) / cloud_block_points; }
+
+/// rows[p] <- components of u at p, zero in the rest.
+void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows);
+
+/// Blocks that scatter to all neighbours of their points.
+Colouring colour_cloud(const FamilyLists& families, std::size_t points);
+
+}  // namespace perikit

@@ -1,0 +1,43 @@
+#pragma once
+#include "pair_loop.hpp"
+#include "perikit/engine/model.hpp"
+
+namespace perikit {
+
+/// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
+template <int D>
+class PairModel final : public Model {
+ public:
+  explicit PairModel(const ModelParts& parts);
+
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) override;
+  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  /// strain_energy_density only.
+  EvaluationStatus sample(ConstFieldView u, PointSamples& samples) override;
+  bool has_gradients() const noexcept override { return false; }
+  Field shape_tensor_condition() override { return body_.make_field(1); }
+  Field damage() override { return damage_; }
+  ModelReport report() const override;
+
+ private:
+  void set_moduli(const Laws& laws);
+  void set_correction(const Laws& laws, const InfluenceFunction& influence);
+  PairPoint point(const Laws& laws, std::size_t p) const;
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
+  EvaluationStatus dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density);
+
+  const Body& body_;
+  std::shared_ptr<const Kinematics> law_;
+  KinematicsTraits traits_;
+  bool skip_;
+  PairFields fields_;
+  std::unique_ptr<PairLoop> loop_;
+  Field damage_;
+  Field scale_;                  ///< d/m_i; 0 without bonds
+  Field dilatation_modulus_;     ///< k_i
+  Field theta_, q_, rate_;
+  std::size_t lone_ = 0;         ///< points without bonds
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,234 @@
+/// What pair laws must fulfil beyond the suite of every kinematics. Comparisons with formulas are for the laws that have one.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tests/contract/dense_reference.hpp"
+#include "tests/contract/fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+constexpr double youngs = 2.0, poisson = 0.3;   // the fixture's material
+constexpr double lambda = youngs * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu = youngs / (2 * (1 + poisson));
+
+std::vector<Example> pair_laws() {
+  std::vector<Example> laws;
+  for (const Example& example : examples(Kind::kinematics)) {
+    BodyOptions body;
+    body.dimension = 1;
+    if (!build(scene_text(body, kinematics_table(example)))->problem().model().has_gradients()) laws.push_back(example);
+  }
+  return laws;
+}
+
+bool has_reference(const Example& law) { return (law.part == "bond_based" || law.part == "ordinary") && law.table.empty(); }
+
+reference::Elasticity elasticity(const Body& body) {
+  switch (body.space()) {
+    case Space::plane_stress: return {2 * lambda * mu / (lambda + 2 * mu), mu, body.section()};
+    case Space::line_stress: return {youngs - 2 * mu, mu, body.section()};
+    default: return {lambda, mu, body.section()};
+  }
+}
+
+double distance_to_surface(const Body& body, const Point& x) {
+  double least = INFINITY;
+  const Lattice& lattice = *body.lattice();
+  for (int a = 0; a < body.dimension(); ++a) {
+    const auto axis = static_cast<std::size_t>(lattice.axis[a]);
+    const double low = lattice.lower[axis], high = low + static_cast<double>(lattice.extent[a]) * lattice.spacing;
+    least = std::min({least, x[axis] - low, high - x[axis]});
+  }
+  return least;
+}
+
+/// Energy densities under u = H x, H diagonal.
+Field densities(Simulation& simulation, const Point& H) {
+  BodyProblem& problem = simulation.problem();
+  set_field(problem.body(), problem.displacement(), [&](const Point& x) { return Point{H[0] * x[0], H[1] * x[1], H[2] * x[2]}; });
+  PointSamples samples;
+  REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+  return samples.strain_energy_density;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: pair laws agree with the dense reference") {
+  for (const Example& law : pair_laws()) {
+    if (!has_reference(law)) continue;
+    for (int d = 1; d <= 3; ++d)
+      for (const bool cloud : {false, true})
+        for (const bool crack : {false, true})
+          for (const std::string plane : {"strain", "stress"}) {
+            if ((crack && d == 1) || (plane == "stress" && (d == 3 || crack))) continue;
+            INFO(law.part, " ", d, "D ", cloud ? "cloud" : "lattice", crack ? " cracked " : " ", plane);
+            BodyOptions options;
+            options.dimension = d;
+            options.cloud = cloud;
+            options.crack = crack;
+            options.plane = plane;
+            const auto simulation = build(scene_text(options, kinematics_table(law)));
+            BodyProblem& problem = simulation->problem();
+            const Body& body = problem.body();
+            reference::Cloud dense;
+            dense.dimension = d;
+            dense.horizon = body.horizon();
+            dense.influence = [](double r) { return std::exp(-r * r); };
+            dense.integrity = [&](int i, int j) {
+              const auto at = [&](int p) { return body.position(static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(p)])); };
+              return body.cut(at(i), at(j)) ? 0.0 : 1.0;
+            };
+            Noise random(61);
+            reference::Vector u(d * static_cast<int>(body.points()));
+            for (int i = 0; i < static_cast<int>(body.points()); ++i) {
+              const auto p = static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(i)]);
+              const Point x = body.position(p);
+              reference::Vector position(d);
+              for (int c = 0; c < d; ++c) position[c] = x[static_cast<std::size_t>(c)];
+              dense.position.push_back(position);
+              dense.volume.push_back(body.volume(p));
+              for (int c = 0; c < d; ++c) problem.displacement().component(c)[p] = u[d * i + c] = 0.05 * x[static_cast<std::size_t>(c)] + 0.03 * random();
+            }
+            Field f = problem.make_field(d);
+            double energy = 0;
+            REQUIRE(problem.evaluate_forces(problem.displacement(), f, &energy).ok());
+            const reference::Vector expected = reference::pair_force(dense, law.part, elasticity(body), u);
+            const double expected_energy = reference::pair_energy(dense, law.part, elasticity(body), u);
+            double worst = 0;
+            for (int i = 0; i < static_cast<int>(body.points()); ++i)
+              for (int c = 0; c < d; ++c)
+                worst = std::max(worst, std::abs(f.component(c)[body.internal()[static_cast<std::size_t>(i)]] - expected[d * i + c]));
+            CHECK_MESSAGE(worst <= 1e-11 * expected.cwiseAbs().maxCoeff(), "forces are off by ", worst / expected.cwiseAbs().maxCoeff());
+            CHECK_MESSAGE(std::abs(energy - expected_energy) <= 1e-11 * expected_energy, "energy ", energy, " against ", expected_energy);
+          }
+  }
+}
+
+TEST_CASE("kinematics: pair laws store the classical energy density of a homogeneous expansion inside") {
+  for (const Example& law : pair_laws()) {
+    if (!has_reference(law)) continue;
+    for (int d = 1; d <= 3; ++d) {
+      INFO(law.part, " ", d, "D");
+      const bool springs = law.part == "bond_based";
+      BodyOptions options;
+      options.dimension = d;
+      options.horizon_ratio = springs ? 5.015 : 2.515;
+      options.cells = d == 3 ? 16 : 24;
+      const auto simulation = build(scene_text(options, kinematics_table(law)));
+      const Body& body = simulation->problem().body();
+      const double strain = 1e-3, classical = elasticity(body).bulk(d) * d * d * strain * strain / 2;
+      const Field density = densities(*simulation, {strain, strain, strain});
+      double total = 0, error = 0;
+      int points = 0;
+      for (const std::int32_t p : body.internal()) {
+        total += density.data()[p];
+        // Neighbours of an inside point of `ordinary` have whole families, too.
+        if (distance_to_surface(body, body.position(static_cast<std::size_t>(p))) < (springs ? 1 : 2) * body.horizon()) continue;
+        error = std::max(error, std::abs(density.data()[p] / classical - 1));
+        ++points;
+      }
+      REQUIRE(points > 0);
+      // Springs: up to the error of a sum over bonds for an integral. The linear solid is exact, as a whole with its surfaces.
+      CHECK_MESSAGE(error <= (!springs ? 1e-11 : d == 1 ? 0.21 : 0.1), "the inside is off by ", error);
+      if (!springs) CHECK(std::abs(total / (classical * static_cast<double>(body.points())) - 1) <= 1e-11);
+    }
+  }
+}
+
+TEST_CASE("kinematics: the surface correction of pair laws changes surfaces and not the inside") {
+  for (const Example& law : pair_laws()) {
+    if (law.table.find("surface_correction") == std::string::npos) continue;
+    for (int d = 1; d <= 3; ++d) {
+      INFO(law.part, " ", d, "D");
+      BodyOptions options;
+      options.dimension = d;
+      options.cells = d == 3 ? 16 : 0;
+      const auto corrected = build(scene_text(options, kinematics_table(law)));
+      const auto plain = build(scene_text(options, kinematics_table({law.part, ""})));
+      const Body& body = plain->problem().body();
+      for (int axis = 0; axis < d; ++axis) {
+        Point stretch{};
+        stretch[static_cast<std::size_t>(axis)] = 1e-3;
+        const Field with = densities(*corrected, stretch), without = densities(*plain, stretch);
+        double inside = 0, deep = 0;
+        for (const std::int32_t p : body.internal()) {
+          if (distance_to_surface(body, body.position(static_cast<std::size_t>(p))) < 2 * body.horizon()) continue;
+          inside = std::max(inside, std::abs(with.data()[p] / without.data()[p] - 1));
+          deep = without.data()[p];
+        }
+        REQUIRE(deep > 0);
+        CHECK_MESSAGE(inside <= 1e-12, "the inside changes by ", inside);
+        // Mean error of the points, and the error of the whole body, against what the inside stores.
+        double error_with = 0, error_without = 0, total_with = 0, total_without = 0;
+        const double share = 1.0 / static_cast<double>(body.points());
+        for (const std::int32_t p : body.internal()) {
+          const double a = with.data()[p] / deep - 1, b = without.data()[p] / deep - 1;
+          error_with += share * std::abs(a);
+          error_without += share * std::abs(b);
+          total_with += share * a;
+          total_without += share * b;
+        }
+        if (law.part == "ordinary" && d == 1) continue;   // divided by the own weighted volume: nothing to correct on a line
+        CHECK_MESSAGE(error_with < 0.9 * error_without, "points are off by ", error_with, " instead of ", error_without);
+        if (law.part == "bond_based") CHECK_MESSAGE(std::abs(total_with) < 0.1 * std::abs(total_without), "the body is off by ", total_with, " instead of ", total_without);
+      }
+    }
+  }
+}
+
+TEST_CASE("kinematics: pair laws refuse what they do not have, and say what they cannot represent") {
+  for (const Example& law : pair_laws()) {
+    BodyOptions options;
+    options.dimension = 2;
+    const std::string text = scene_text(options, kinematics_table(law));
+    for (const char* field : {"cauchy", "deformation_gradient", "jacobian"}) {
+      const auto refused = [&](const std::string& output) {
+        try {
+          build(text + "[output]\n" + output);
+        } catch (const InputError& error) {
+          const std::string message = error.what();
+          return message.find(field) != std::string::npos && message.find(law.part) != std::string::npos && message.find("contract.toml:") == 0;
+        }
+        return false;
+      };
+      CHECK(refused(fmt::format("fields = [\"displacement\", \"{}\"]\n", field)));
+      CHECK(refused(fmt::format("history = [{{ name = \"a\", set = \"all\", quantity = \"{}\", {}reduce = \"mean\" }}]\n", field,
+                                std::string(field) == "jacobian" ? "" : "component = \"xx\", ")));
+    }
+    CHECK_NOTHROW(build(text + "[output]\nfields = [\"strain_energy_density\", \"damage\", \"reaction\"]\n"));
+    if (law.part != "bond_based") continue;
+    const auto warned = [&](const char* nu, const char* plane) {
+      options.plane = plane;
+      options.material = fmt::format("type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = {}", nu);
+      return build(scene_text(options, kinematics_table(law)))->summary().find("Poisson") != std::string::npos;
+    };
+    CHECK(warned("0.3", "strain"));
+    CHECK(warned("0.25", "stress"));
+    CHECK(!warned("0.25", "strain"));
+    CHECK(!warned("0.3333333333333333", "stress"));
+  }
+}
+
+TEST_CASE("kinematics: a pair law reports points on top of each other") {
+  for (const Example& law : pair_laws())
+    for (const bool cloud : {false, true}) {
+      BodyOptions options;
+      options.dimension = 2;
+      options.cloud = cloud;
+      const auto simulation = build(scene_text(options, kinematics_table(law)));
+      BodyProblem& problem = simulation->problem();
+      const Body& body = problem.body();
+      const auto p = static_cast<std::size_t>(body.internal()[40]), q = static_cast<std::size_t>(body.internal()[41]);
+      const Point x = body.position(p), y = body.position(q);
+      for (int c = 0; c < 2; ++c) problem.displacement().component(c)[q] = x[static_cast<std::size_t>(c)] - y[static_cast<std::size_t>(c)];
+      Field f = problem.make_field(2);
+      const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), f, nullptr);
+      CHECK(!status.ok());
+      CHECK(status.description.find("non-finite length") != std::string::npos);
+    }
+}
