@@ -22,10 +22,12 @@ void ScratchPool::prepare(const Laws& laws) {
 int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
   const int d = dimension(laws_.space()), lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   const bool tangent = work_ == Work::tangent;
-  const SelectiveArrays map{s.Ht, s.Hbar, tangent ? s.dHt : nullptr, s.dHbar};
+  const SelectiveArrays map{s.Ht, s.Hbar, tangent ? s.dHt : nullptr, s.dHbar, s.scale};
   if (selective_) {
-    std::memcpy(s.Ht, s.H, sizeof(double) * static_cast<std::size_t>(d * d) * batch_points);
-    if (tangent) std::memcpy(s.dHt, s.dH, sizeof(double) * static_cast<std::size_t>(d * d) * batch_points);
+    for (int c = 0; c < d * d; ++c) {
+      std::memcpy(s.Ht + c * batch_points, s.H + c * batch_points, sizeof(double) * static_cast<std::size_t>(lanes));
+      if (tangent) std::memcpy(s.dHt + c * batch_points, s.dH + c * batch_points, sizeof(double) * static_cast<std::size_t>(lanes));
+    }
     selective_map(laws_.space(), lanes, map, s.H, s.dH);
   }
   LawBatch batch;

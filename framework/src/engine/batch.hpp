@@ -33,6 +33,7 @@ struct BatchScratch {
   alignas(64) double Hbar[9 * batch_points];
   alignas(64) double dHbar[9 * batch_points];
   alignas(64) double bar[9 * batch_points];
+  alignas(64) double scale[batch_points];
   alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
   alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
   alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane

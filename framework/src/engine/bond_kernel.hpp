@@ -1,6 +1,8 @@
 #pragma once
 /// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points.
 
+#include <cstdint>
+
 #include "perikit/core/simd.hpp"
 #include "perikit/engine/laws.hpp"
 
@@ -54,6 +56,86 @@ void bond_adjoint(int lanes, const BondVectors& v, const double* WP, double* t, 
       force.store(t + c * batch_points + l);
       for (int e = 0; e < D; ++e) (p[e] - force * bond_value<per_slot>(v.xi[e], l)).store(S + (c * D + e) * batch_points + l);
     }
+  }
+}
+
+/// Lattices: H of `slots` bonds of each of the eight points p ... p + 7, straight from the fields, lanes slot by slot.
+/// mean: A = (Hbar_i + Hbar_j)/2, else Hbar_i.
+template <int D, bool per_slot, bool mean>
+void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p, const BondVectors& v, ConstFieldView u, ConstFieldView Hbar,
+                           double* H) noexcept {
+  for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
+    Pack own_u[D], own_H[D * D];
+    for (int c = 0; c < D; ++c) own_u[c] = Pack::load(u.component(c) + p + l);
+    for (int c = 0; c < D * D; ++c) own_H[c] = Pack::load(Hbar.component(c) + p + l);
+    for (int k = 0; k < slots; ++k) {
+      const std::int64_t far = p + shifts[k] + l;
+      const int lane = k * static_cast<int>(padding) + l;
+      Pack xi[D], g[D];
+      for (int e = 0; e < D; ++e) {
+        xi[e] = bond_value<per_slot>(v.xi[e], lane);
+        g[e] = bond_value<per_slot>(v.g[e], lane);
+      }
+      for (int c = 0; c < D; ++c) {
+        Pack a[D];
+        Pack z = Pack::load(u.component(c) + far) - own_u[c];
+        for (int e = 0; e < D; ++e) {
+          a[e] = own_H[c * D + e];
+          if constexpr (mean) a[e] = Pack(0.5) * (a[e] + Pack::load(Hbar.component(c * D + e) + far));
+          z -= a[e] * xi[e];
+        }
+        for (int e = 0; e < D; ++e) (a[e] + z * g[e]).store(H + (c * D + e) * batch_points + lane);
+      }
+    }
+  }
+}
+
+/// to[lanes of mask] += value; other cells are not touched.
+inline void add_to_cells(double* to, Pack value, unsigned mask) noexcept {
+  constexpr unsigned all = (1u << pack_width) - 1;
+  if (mask == all) {
+    (Pack::load(to) + value).store(to);
+    return;
+  }
+  for (int l = 0; l < pack_width; ++l)
+    if (mask >> l & 1) to[l] += value[l];
+}
+
+/// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the stress
+/// on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written.
+template <int D, bool per_slot, bool mean>
+void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v, const double* WP,
+                          FieldView force, FieldView stress) noexcept {
+  const Pack share(mean ? 0.5 : 1.0);
+  for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
+    Pack own_t[D], own_S[D * D];
+    for (int k = 0; k < slots; ++k) {
+      const unsigned mask = masks[k] >> l & ((1u << pack_width) - 1);
+      if (mask == 0) continue;
+      const std::int64_t far = p + shifts[k] + l;
+      const int lane = k * static_cast<int>(padding) + l;
+      Pack xi[D], g[D];
+      for (int e = 0; e < D; ++e) {
+        xi[e] = bond_value<per_slot>(v.xi[e], lane);
+        g[e] = bond_value<per_slot>(v.g[e], lane);
+      }
+      for (int c = 0; c < D; ++c) {
+        Pack w[D], t(0.0);
+        for (int e = 0; e < D; ++e) {
+          w[e] = Pack::load(WP + (c * D + e) * batch_points + lane);
+          t += w[e] * g[e];
+        }
+        own_t[c] += t;
+        add_to_cells(force.component(c) + far, -t, mask);
+        for (int e = 0; e < D; ++e) {
+          const Pack S = share * (w[e] - t * xi[e]);
+          own_S[c * D + e] += S;
+          if constexpr (mean) add_to_cells(stress.component(c * D + e) + far, S, mask);
+        }
+      }
+    }
+    for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
+    for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 namespace perikit {
 
@@ -13,6 +14,8 @@ namespace {
 
 /// Slots of a bond batch: batch_points lanes, chunk_points of them a slot.
 constexpr int slots_at_once = batch_points / chunk_points;
+/// Corrections of families that are not whole are stored by pattern up to this many bytes, else computed when needed.
+constexpr std::size_t stored_corrections = std::size_t{64} << 20;
 
 /// Lanes of a chunk whose bond at a slot exists, as factors.
 struct LaneFactors {
@@ -70,6 +73,29 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
   view.inverse_shape = inverse;
   kinematics_->correction(view, g.data(), size);
   for (int c = 0; c < D; ++c) slot_g_[c].assign(g.begin() + static_cast<std::ptrdiff_t>(c * size), g.begin() + static_cast<std::ptrdiff_t>((c + 1) * size));
+  if (!traits_.g_from_xi_only) store_corrections();
+}
+
+template <int D>
+void LatticeModel<D>::store_corrections() {
+  const std::size_t slots = families_.offsets.size(), groups = (slots + slots_at_once - 1) / slots_at_once, size = groups * D * batch_points;
+  if (families_.patterns.size() * size * sizeof(double) > stored_corrections) return;
+  auto scratch = std::make_unique<BatchScratch>();
+  std::vector<AlignedVector<double>> stored(families_.patterns.size(), AlignedVector<double>(size, 0.0));
+  lane_xi_.assign(size, 0.0);
+  for (std::size_t k = 0; k < stored.size(); ++k) {
+    for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
+      BondVectors vectors;
+      const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
+      bond_vectors({0, static_cast<std::int32_t>(k)}, slot, n, *scratch, vectors);
+      for (std::size_t c = 0; c < D; ++c) {
+        const std::size_t first = (slot / slots_at_once * D + c) * batch_points;
+        std::copy_n(vectors.g[c], n * chunk_points, stored[k].data() + first);
+        std::copy_n(vectors.xi[c], n * chunk_points, lane_xi_.data() + first);
+      }
+    }
+  }
+  pattern_g_ = std::move(stored);
 }
 
 template <int D>
@@ -162,6 +188,15 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
     }
     return;
   }
+  if (!pattern_g_.empty()) {
+    vectors.per_slot = false;
+    const std::size_t first = slot / slots_at_once * D * batch_points;
+    for (std::size_t c = 0; c < D; ++c) {
+      vectors.xi[c] = lane_xi_.data() + first + c * batch_points;
+      vectors.g[c] = pattern_g_[static_cast<std::size_t>(chunk.pattern)].data() + first + c * batch_points;
+    }
+    return;
+  }
   // The correction depends on the family: ask for each lane.
   const LatticePattern& pattern = families_.pattern(chunk);
   double* xi = s.bond[0];
@@ -201,23 +236,6 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   const LaneFactors& factors = lane_factors();
   const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
   const std::int64_t p = chunk.first;
-  const auto gather = [&](ConstFieldView u, ConstFieldView H, double* du, double* A) {
-    for (int k = 0; k < slots; ++k) {
-      const std::int64_t shift = families_.shifts[slot + static_cast<std::size_t>(k)];
-      for (int l = 0; l < chunk_points; l += pack_width) {
-        const int lane = k * chunk_points + l;
-        for (int c = 0; c < D; ++c) {
-          (Pack::load(u.component(c) + p + shift + l) - Pack::load(u.component(c) + p + l)).store(du + c * batch_points + lane);
-        }
-        for (int c = 0; c < D * D; ++c) {
-          const Pack own = Pack::load(H.component(c) + p + l);
-          (mean ? Pack(0.5) * (own + Pack::load(H.component(c) + p + shift + l)) : own).store(A + c * batch_points + lane);
-        }
-      }
-    }
-  };
-  gather(pass.u, gradient_, s.du, s.A);
-  if (tangent) gather(pass.w, direction_, s.dw, s.dA);
   if (traits_.selective) {
     for (int k = 0; k < slots; ++k) {
       for (int c = 0; c < D * D; ++c) {
@@ -229,13 +247,21 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
-  if (vectors.per_slot) {
-    bond_gradient<D, true>(lanes, vectors, s.A, s.du, s.H);
-    if (tangent) bond_gradient<D, true>(lanes, vectors, s.dA, s.dw, s.dH);
-  } else {
-    bond_gradient<D, false>(lanes, vectors, s.A, s.du, s.H);
-    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, s.dH);
-  }
+  const std::int64_t* shifts = families_.shifts.data() + slot;
+  const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* H) {
+    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, slots, p, vectors, u, Hbar, H);
+  };
+  const auto adjoint = [&](auto per_slot, auto of_both) {
+    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, pattern.mask.data() + slot, slots, p, vectors, s.P, pass.out, flux_);
+  };
+  // The kernels are compiled for each way of reading the bond vectors and each base.
+  const auto choose = [&](const auto& kernel, auto... arguments) {
+    using std::false_type, std::true_type;
+    if (vectors.per_slot) mean ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
+    else mean ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
+  };
+  choose(gradient, pass.u, ConstFieldView(gradient_), s.H);
+  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), s.dH);
   for (int k = 0; k < slots; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t shift = families_.shifts[at];
@@ -265,48 +291,15 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
     pass.work.add_samples(lanes, s, *pass.sums);
     return -1;
   }
-  if (vectors.per_slot) bond_adjoint<D, true>(lanes, vectors, s.P, s.t, s.P);
-  else bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
-  // Own ends: summed in registers. Far ends: scattered, and only to live cells, which belong to this block's colour.
-  const Pack share(mean ? 0.5 : 1.0);
-  for (int k = 0; k < slots; ++k) {
-    const std::size_t at = slot + static_cast<std::size_t>(k);
-    if (pattern.mask[at] != 0) scatter_far(pattern.mask[at], p + families_.shifts[at], k, mean, s, pass.out);
-  }
-  for (int l = 0; l < chunk_points; l += pack_width) {
-    const auto add_own = [&](const double* from, double* to, Pack factor) {
-      Pack own(0.0);
-      for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
-      (Pack::load(to + p + l) + factor * own).store(to + p + l);
-    };
-    for (int c = 0; c < D; ++c) add_own(s.t + c * batch_points, pass.out.component(c), Pack(1.0));
-    for (int c = 0; c < D * D; ++c) add_own(s.P + c * batch_points, flux_.component(c), share);
-    for (int c = 0; c < D * D && traits_.selective; ++c) add_own(s.bar + c * batch_points, flux_.component(c), Pack(1.0));
+  choose(adjoint);
+  for (int c = 0; c < D * D && traits_.selective; ++c) {
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack own = Pack::load(flux_.component(c) + p + l);
+      for (int k = 0; k < slots; ++k) own += Pack::load(s.bar + c * batch_points + k * chunk_points + l);
+      own.store(flux_.component(c) + p + l);
+    }
   }
   return -1;
-}
-
-template <int D>
-void LatticeModel<D>::scatter_far(std::uint8_t mask, std::int64_t far, int slot, bool mean, const BatchScratch& s, FieldView out) noexcept {
-  const int lane = slot * chunk_points;
-  if (mask == 0xff) {
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      for (int c = 0; c < D; ++c) {
-        double* f = out.component(c) + far + l;
-        (Pack::load(f) - Pack::load(s.t + c * batch_points + lane + l)).store(f);
-      }
-      for (int c = 0; c < D * D && mean; ++c) {
-        double* f = flux_.component(c) + far + l;
-        (Pack::load(f) + Pack(0.5) * Pack::load(s.P + c * batch_points + lane + l)).store(f);
-      }
-    }
-    return;
-  }
-  for (int l = 0; l < chunk_points; ++l) {
-    if (!(mask >> l & 1)) continue;
-    for (int c = 0; c < D; ++c) out.component(c)[far + l] -= s.t[c * batch_points + lane + l];
-    for (int c = 0; c < D * D && mean; ++c) flux_.component(c)[far + l] += 0.5 * s.P[c * batch_points + lane + l];
-  }
 }
 
 template <int D>
@@ -412,7 +405,8 @@ ModelReport LatticeModel<D>::report() const {
   report.bonds = families_.bonds;
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
-  report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes();
+  report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
+                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);

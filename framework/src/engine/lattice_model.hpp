@@ -33,7 +33,7 @@ class LatticeModel final : public Model {
   void gradient_block(std::size_t b, Pass& pass);
   void bonds_block(std::size_t b, Pass& pass);
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
-  void scatter_far(std::uint8_t mask, std::int64_t far, int slot, bool mean, const BatchScratch& s, FieldView out) noexcept;
+  void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void clean(FieldView out) const noexcept;
 
@@ -49,6 +49,8 @@ class LatticeModel final : public Model {
   Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
   Field scale_;                      ///< V_i / N_i of bond weights
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
+  std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern: [slot group][component][lane]; empty: computed
+  AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
   ScratchPool scratch_;
 };

@@ -1,5 +1,7 @@
 #include "selective_map.hpp"
 
+#include <limits>
+
 #include "perikit/core/simd_math.hpp"
 #include "perikit/core/tensor.hpp"
 #include "perikit/engine/laws.hpp"
@@ -27,10 +29,14 @@ Tensor<Pack, S> inverse_transpose(const Tensor<Pack, S>& H) noexcept {
   return Pack(1.0) / (jacobian_minus_one(H) + Pack(1.0)) * cofactor(F);
 }
 
-/// a - 1, exactly 0 at rest.
+/// a - 1 = cbrt(1 + r) - 1 = r / (a^2 + a + 1) with r = Jbar/Jt - 1: exactly 0 at rest, no digits lost near it. NaN where r < -1.
 template <class S>
 Pack scaling_minus_one(const Tensor<Pack, S>& Ht, const Tensor<Pack, S>& Hbar) noexcept {
-  return expm1((log1p(jacobian_minus_one(Hbar)) - log1p(jacobian_minus_one(Ht))) * Pack(1.0 / 3.0));
+  const Pack jt = jacobian_minus_one(Ht), jbar = jacobian_minus_one(Hbar);
+  const Pack r = (jbar - jt) / (jt + Pack(1.0));
+  const Pack a = cbrt(r + Pack(1.0));
+  const Pack bad = select((jt > Pack(-1.0)) & (jbar > Pack(-1.0)), Pack(0.0), Pack(std::numeric_limits<double>::quiet_NaN()));
+  return r / (a * a + a + Pack(1.0)) + bad;
 }
 
 /// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = a phi.
@@ -40,10 +46,11 @@ Pack scaling_rate(const Tensor<Pack, S>& Ftm, const Tensor<Pack, S>& Fbm, const 
 }
 
 template <class S>
-void map(int lanes, const SelectiveArrays& in, double* H, double* dH) noexcept {
+[[gnu::flatten]] void map(int lanes, const SelectiveArrays& in, double* H, double* dH) noexcept {
   for (int l = 0; l < lanes; l += pack_width) {
     const auto Ht = load_in_space<S>(in.Ht, l), Hbar = load_in_space<S>(in.Hbar, l);
     const Pack grow = scaling_minus_one(Ht, Hbar);
+    grow.store(in.scale + l);
     const auto Ft = add_diagonal(Ht, Pack(1.0));
     const auto Hh = Ht + grow * Ft;
     for (int c = 0; c < S::components; ++c) Hh[c].store(H + c * batch_points + l);
@@ -56,12 +63,12 @@ void map(int lanes, const SelectiveArrays& in, double* H, double* dH) noexcept {
 }
 
 template <class S>
-void pull_back(int lanes, const SelectiveArrays& in, const double* P, const double* dP, double* S_own, double* S_bar) noexcept {
+[[gnu::flatten]] void pull_back(int lanes, const SelectiveArrays& in, const double* P, const double* dP, double* S_own, double* S_bar) noexcept {
   for (int l = 0; l < lanes; l += pack_width) {
     const auto load = [&](const double* x) { return Tensor<Pack, S>::map([&](int c) { return Pack::load(x + c * batch_points + l); }); };
     const auto Ht = load_in_space<S>(in.Ht, l), Hbar = load_in_space<S>(in.Hbar, l);
     const auto Ph = load(P);
-    const Pack a = scaling_minus_one(Ht, Hbar) + Pack(1.0);
+    const Pack a = Pack::load(in.scale + l) + Pack(1.0);
     const auto Fh = a * add_diagonal(Ht, Pack(1.0));
     const auto Ftm = inverse_transpose(Ht), Fbm = inverse_transpose(Hbar);
     const Pack p = inner(Ph, Fh), third(1.0 / 3.0);

@@ -12,6 +12,7 @@ struct SelectiveArrays {
   const double* Hbar;     ///< Fbar - I, in-space
   const double* dHt;      ///< directions; null: no tangent
   const double* dHbar;
+  double* scale;          ///< a - 1 by lane, from the map to the pull-back
 };
 
 /// H <- Fh - I and, for a tangent, dH <- dFh. All components of the space are written; P(0) stays exactly zero at rest.
