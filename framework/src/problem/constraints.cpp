@@ -129,7 +129,7 @@ void BodyProblem::read_loads(bool quasi_static) {
 std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const {
   const int axis = load.face[1] - 'x';
   const double outward = load.face[0] == '+' ? 1.0 : -1.0;
-  const double dx = body_.spacing(), area = body_.uniform_volume() / dx;
+  const double dx = body_.spacing();
   std::map<std::int32_t, double> shares;
   if (const Lattice* lattice = body_.lattice()) {
     // The face lies half a spacing beyond the last layer: 3/2 there and -1/2 one layer further in give the exact total and the
@@ -149,28 +149,31 @@ std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::v
     for (const std::int32_t p : points) {
       if (alive(p, 1)) continue;
       const bool inner = alive(p, -1);
+      const double area = body_.uniform_volume() / dx;
       shares[p] += inner ? 1.5 * area : area;
       if (inner) shares[static_cast<std::int32_t>(p - shift)] -= 0.5 * area;
     }
   } else {
-    // A cloud: the outer two spacings of the set are the layer; linear weights put the resultant on the face.
+    // A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
+    // the set holds a second layer, linear weights over both put the resultant on the face.
+    const auto along = [&](std::int32_t p) { return outward * body_.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)]; };
     double extreme = -std::numeric_limits<double>::infinity();
-    for (const std::int32_t p : points) extreme = std::max(extreme, outward * body_.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)]);
-    double m0 = 0, m1 = 0, m2 = 0;
-    std::vector<std::pair<std::int32_t, double>> layer;   // point, depth below the face
+    for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
+    double total = 0, m0 = 0, m1 = 0, m2 = 0;
+    bool second = false;
     for (const std::int32_t p : points) {
-      const double depth = extreme + 0.5 * dx - outward * body_.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)];
-      if (depth > 2 * dx) continue;
-      const double v = body_.volume(static_cast<std::size_t>(p));
-      layer.emplace_back(p, depth);
+      const double depth = extreme + 0.5 * dx - along(p), v = body_.volume(static_cast<std::size_t>(p));
+      if (depth > 2.2 * dx) continue;
+      if (depth <= 1.2 * dx) total += v / dx;
+      else second = true;
       m0 += v;
       m1 += v * depth;
       m2 += v * depth * depth;
     }
-    const double total = m0 / (2 * dx), det = m0 * m2 - m1 * m1;
-    for (const auto& [p, depth] : layer) {
-      const double v = body_.volume(static_cast<std::size_t>(p));
-      shares[p] = det > 1e-12 * m0 * m2 ? total * v * (m2 - m1 * depth) / det : total * v / m0;
+    for (const std::int32_t p : points) {
+      const double depth = extreme + 0.5 * dx - along(p), v = body_.volume(static_cast<std::size_t>(p));
+      if (depth > 2.2 * dx) continue;
+      shares[p] = second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0;
     }
   }
   if (shares.empty()) {
