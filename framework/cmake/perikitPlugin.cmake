@@ -3,7 +3,7 @@ function(perikit_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   # g++ 12 raises false alarms about its own AVX-512 intrinsics and vector growth; parts are described with designated initializers.
   target_compile_options(${target} PRIVATE -Wall -Wextra -fno-math-errno -fno-trapping-math
-                         -Wno-missing-field-initializers $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-stringop-overflow>)
+                         -Wno-missing-field-initializers $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-uninitialized -Wno-stringop-overflow>)
   if(PERIKIT_NATIVE)
     target_compile_options(${target} PRIVATE -march=native -mprefer-vector-width=512)
   else()

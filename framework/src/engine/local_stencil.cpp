@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "perikit/core/simd.hpp"
+#include "reproducing_kernel.hpp"
 #include "shape_tensor.hpp"
 
 namespace perikit {
@@ -77,7 +78,8 @@ double part_volume(const FamilyArrays& f, const double* omega) {
 template <int D>
 void build(const Kinematics& kinematics, const KinematicsTraits& traits, const FamilyArrays& family, double horizon,
            const double* bond_share, LocalStencil& out, AlignedVector<double>& scratch) {
-  const int parts = kinematics.parts(D);
+  const bool at_points = traits.at == EvaluationPoints::points;   // a point gradient of higher order
+  const int parts = at_points ? 1 : kinematics.parts(D);
   const bool by_bond = parts == 0;
   const FamilyView view = family.view(horizon);
   out.bonds = family.bonds;
@@ -103,6 +105,14 @@ void build(const Kinematics& kinematics, const KinematicsTraits& traits, const F
     }
     return true;
   };
+  if (at_points) {
+    std::vector<double> g;
+    out.fallbacks = reproducing_kernel(family, horizon, traits.order, g) < traits.order;
+    for (std::size_t e = 0; e < D; ++e)
+      for (std::size_t k = 0; k < static_cast<std::size_t>(out.bonds); ++k) out.g[(e * static_cast<std::size_t>(out.bonds) + k) * 8] = g[k * D + e];
+    out.share[0] = 1;
+    return;
+  }
   if (traits.selective) write(0, family.omega.data(), singular_ratio);
   double total = 0;
   for (int q = first; q < out.points; ++q) {

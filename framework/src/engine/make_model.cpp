@@ -9,8 +9,10 @@ namespace {
 
 template <int D>
 std::unique_ptr<Model> make(const ModelParts& parts) {
-  if (parts.kinematics->traits().at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
-  if (parts.kinematics->traits().at == EvaluationPoints::weighted) return std::make_unique<WeightedModel<D>>(parts);
+  const KinematicsTraits traits = parts.kinematics->traits();
+  if (traits.at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
+  // Point gradients of higher order are stencils like any other.
+  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) return std::make_unique<WeightedModel<D>>(parts);
   if (parts.body->lattice()) return std::make_unique<LatticeModel<D>>(parts);
   return std::make_unique<CloudModel<D>>(parts);
 }

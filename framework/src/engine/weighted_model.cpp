@@ -15,7 +15,7 @@ namespace perikit {
 
 template <int D>
 WeightedModel<D>::WeightedModel(const ModelParts& parts)
-    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(kinematics_->parts(D)),
+    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(traits_.at == EvaluationPoints::points ? 1 : kinematics_->parts(D)),
       condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
   normaliser_.assign(body_.stride(), 0.0);
   if (body_.lattice()) prepare_lattice(*parts.influence);

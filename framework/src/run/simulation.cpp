@@ -44,7 +44,7 @@ std::string Simulation::summary() {
                         problem_->model().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
-  if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points use the gradient of the whole family\n", report.fallbacks);
+  if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
   if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());

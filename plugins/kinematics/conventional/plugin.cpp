@@ -20,11 +20,12 @@ PartDescription description() {
   PartDescription part{.name = "conventional",
                        .summary = "one deformation gradient per point; cheap, has zero-energy modes",
                        .parameters = {},
-                       .examples = {"order = 1"},
-                       .equations = "F_i = (sum_j omega V_j y_ij (x) xi_ij) K_i^-1,  K_i = sum_j omega V_j xi_ij (x) xi_ij\nW_i = V_i",
-                       .source = "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.31-3.35",
+                       .examples = {"order = 1", "order = 2"},
+                       .equations = "F_i = (sum_j omega V_j y_ij (x) xi_ij) K_i^-1,  K_i = sum_j omega V_j xi_ij (x) xi_ij\nW_i = V_i\n"
+                                    "order n: g_k = omega V_k (M^-1 q(xi_k))_linear / delta, M = sum omega V q q^T, q: monomials of degree 1 ... n",
+                       .source = "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.31-3.35; order n: 3.43-3.53",
                        .limits = "sawtooth displacements store no energy: add a stabilization wherever fields are not smooth"};
-  part.parameters.integer("order", "order of the point gradient: 1, exact for affine displacements").by_default("1").at_least(1).at_most(1);
+  part.parameters.integer("order", "order of the point gradient: exact for polynomials up to this degree; families too small for it take a lower one").by_default("1").at_least(1).at_most(6);
   return part;
 }
 

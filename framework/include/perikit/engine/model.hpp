@@ -35,7 +35,7 @@ struct ModelReport {
   std::size_t evaluation_points = 0;
   std::size_t broken_bonds = 0;               ///< cut by pre-cracks
   std::size_t singular_families = 0;          ///< points without a gradient of their own: H = 0
-  std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family
+  std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family, or a lower order
   std::size_t dropped_parts = 0;              ///< parts of families without a gradient of their own
   std::vector<SkipNote> skips;
   std::vector<std::string> warnings;          ///< one line each
