@@ -16,90 +16,39 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
     : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
       pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
-      families_(find_families(body_.rows(), body_.points(), D, body_.horizon())), condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
-  build_families(*parts.influence);
+      families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
   u_.resize(n);
   flux_.resize(D * n);
   if (traits_.at == EvaluationPoints::bonds) {
     gradient_.resize(D * n);
     force_.resize(n);
-    colouring_ = colour_cloud(families_, n);
-  }
-}
-
-template <int D>
-void CloudModel<D>::build_families(const InfluenceFunction& influence) {
-  const std::size_t n = body_.points();
-  omega_.resize(families_.neighbour.size());
-  inverse_.assign(6 * n, 0.0);
-  weight_.assign(n, 0.0);
-  scale_.assign(n, 0.0);
-  upper_.assign(n, 0);
-  std::vector<double> r, omega;
-  std::vector<std::int64_t> first(n + 1, 0);
-  std::int64_t kept = 0;
-  for (std::size_t p = 0; p < n; ++p) {
-    const std::int64_t begin = families_.first[p], end = families_.first[p + 1];
-    const Point x = body_.position(p);
-    r.clear();
-    for (std::int64_t k = begin; k < end; ++k) {
-      const Row xi = position_[families_.neighbour[static_cast<std::size_t>(k)]] - position_[p];
-      r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body_.horizon()));
+    colouring_ = colour_cloud(families_.lists, n);
+    upper_.resize(n);
+    scale_.resize(n);
+    for (std::size_t p = 0; p < n; ++p) {
+      const auto family = families_.neighbours(p);
+      upper_[p] = families_.lists.first[p] + (std::upper_bound(family.begin(), family.end(), static_cast<std::int32_t>(p)) - family.begin());
+      scale_[p] = families_.normaliser[p] > 0 ? position_[p][3] / families_.normaliser[p] : 0.0;
     }
-    omega.resize(r.size());
-    influence.evaluate(r, omega);
-    const bool near_crack = std::any_of(body_.cracks().begin(), body_.cracks().end(), [&](const Crack& c) { return c.near(x, body_.horizon()); });
-    double K[6] = {}, whole_omega = 0, intact_omega = 0, normaliser = 0;
-    first[p] = kept;
-    upper_[p] = -1;
-    for (std::int64_t k = begin; k < end; ++k) {
-      const std::int32_t j = families_.neighbour[static_cast<std::size_t>(k)];
-      const double w = omega[static_cast<std::size_t>(k - begin)], volume = position_[j][3];
-      whole_omega += w * volume;
-      normaliser += traits_.weight == BondWeight::kernel ? w * volume : volume;
-      if (near_crack && body_.cut(x, body_.position(static_cast<std::size_t>(j)))) {
-        ++broken_;
-        continue;
-      }
-      intact_omega += w * volume;
-      const Row xi = position_[j] - position_[p];
-      for (int a = 0; a < D; ++a)
-        for (int b = a; b < D; ++b) K[symmetric_index(D, a, b)] += w * volume * xi[a] * xi[b];
-      if (upper_[p] < 0 && static_cast<std::size_t>(j) > p) upper_[p] = kept;
-      // Lists shrink in place where bonds are cut.
-      families_.neighbour[static_cast<std::size_t>(kept)] = j;
-      omega_[static_cast<std::size_t>(kept)] = w;
-      ++kept;
-    }
-    if (upper_[p] < 0) upper_[p] = kept;
-    const double share = whole_omega > 0 ? intact_omega / whole_omega : 0.0;
-    if (!invert_shape<D>(K, &inverse_[6 * p], condition_.data() + p)) ++singular_;
-    weight_[p] = position_[p][3] * share;
-    damage_.data()[p] = whole_omega > 0 ? 1 - share : 0.0;
-    scale_[p] = normaliser > 0 ? position_[p][3] / normaliser : 0.0;
   }
-  first[n] = kept;
-  families_.first = std::move(first);
-  families_.neighbour.resize(static_cast<std::size_t>(kept));
-  omega_.resize(static_cast<std::size_t>(kept));
 }
 
 template <int D>
 void CloudModel<D>::moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept {
   const Row x = position_[p], own = u[p];
   for (int e = 0; e < D; ++e) S[e] = Row{};
-  for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
-    const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]);
+  for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+    const auto j = static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)]);
     const Row xi = position_[j] - x;
-    const Row du = (omega_[static_cast<std::size_t>(k)] * position_[j][3]) * (u[j] - own);
+    const Row du = (families_.omega[static_cast<std::size_t>(k)] * position_[j][3]) * (u[j] - own);
     for (int e = 0; e < D; ++e) S[e] += xi[e] * du;
   }
 }
 
 template <int D>
 void CloudModel<D>::flux_row(std::size_t p, const Row* S, Row* Q) const noexcept {
-  const double* inverse = &inverse_[6 * p];
+  const double* inverse = &families_.inverse[6 * p];
   Row out[D];
   for (int e = 0; e < D; ++e) {
     out[e] = Row{};
@@ -142,7 +91,7 @@ void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
       }
       gradient_lane(p, u_, s.H, l);
       if (pass.work.tangent()) gradient_lane(p, w_, s.dH, l);
-      s.weight[l] = weight_[p];
+      s.weight[l] = families_.weight[p];
       s.owner[l] = static_cast<std::int32_t>(p);
     }
     const int bad = pass.work.evaluate(n, s, false, &energy);
@@ -179,7 +128,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
   const Row x = position_[p];
   const auto gather = [&](const AlignedVector<Row>& u, const AlignedVector<Row>& H, std::int64_t begin, int n, double* du, double* A) {
     for (int l = 0; l < n; ++l) {
-      const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(begin + l)]);
+      const auto j = static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(begin + l)]);
       const Row d = u[j] - u[p];
       for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
       for (int e = 0; e < D; ++e) {
@@ -188,19 +137,19 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       }
     }
   };
-  for (std::int64_t begin = half ? upper_[p] : families_.first[p]; begin < families_.first[p + 1]; begin += batch_points) {
-    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, families_.first[p + 1] - begin));
+  for (std::int64_t begin = half ? upper_[p] : families_.lists.first[p]; begin < families_.lists.first[p + 1]; begin += batch_points) {
+    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, families_.lists.first[p + 1] - begin));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
     for (int l = 0; l < lanes; ++l) {
       const bool real = l < n;
       const auto k = static_cast<std::size_t>(begin + (real ? l : 0));
-      const auto j = static_cast<std::size_t>(families_.neighbour[k]);
+      const auto j = static_cast<std::size_t>(families_.lists.neighbour[k]);
       const Row bond = position_[j] - x;
       for (int c = 0; c < D; ++c) xi[c * batch_points + l] = bond[c];
       length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
-      omega[l] = real ? omega_[k] : 0.0;
+      omega[l] = real ? families_.omega[k] : 0.0;
       volume[l] = real ? position_[j][3] : 0.0;
-      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? omega_[k] : 1.0;
+      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? families_.omega[k] : 1.0;
       s.weight[l] = scale_[p] * position_[j][3] * factor;
       s.far_weight[l] = scale_[j] * x[3] * factor;
       s.owner[l] = static_cast<std::int32_t>(p);
@@ -220,7 +169,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
             if (tangent) s.dHbar[(c * D + e) * batch_points + l] = direction_[D * p + static_cast<std::size_t>(e)][c];
           }
     }
-    const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &inverse_[6 * p], 0};
+    const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &families_.inverse[6 * p], 0};
     kinematics_->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
     bond_gradient<D, false>(lanes, vectors, s.A, s.du, s.H);
@@ -272,10 +221,10 @@ void CloudModel<D>::divergence(std::size_t p, FieldView out) const noexcept {
   const Row x = position_[p];
   Row f = force_.empty() ? Row{} : force_[p];
   const Row* own = &flux_[D * p];
-  for (std::int64_t k = families_.first[p]; k < families_.first[p + 1]; ++k) {
-    const auto j = static_cast<std::size_t>(families_.neighbour[static_cast<std::size_t>(k)]);
+  for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+    const auto j = static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)]);
     const Row far = position_[j], xi = far - x;
-    const double w = omega_[static_cast<std::size_t>(k)], to_own = w * far[3], to_far = w * x[3];
+    const double w = families_.omega[static_cast<std::size_t>(k)], to_own = w * far[3], to_far = w * x[3];
     for (int e = 0; e < D; ++e) f += xi[e] * (to_own * own[e] + to_far * flux_[D * j + static_cast<std::size_t>(e)]);
   }
   for (int c = 0; c < D; ++c) out.component(c)[p] = f[c];
@@ -329,22 +278,15 @@ EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) 
 }
 
 template <int D>
-Field CloudModel<D>::damage() {
-  return damage_;
-}
-
-template <int D>
 ModelReport CloudModel<D>::report() const {
   ModelReport report;
-  report.bonds = families_.neighbour.size();
-  report.broken_bonds = broken_;
-  report.singular_families = singular_;
+  report.bonds = families_.bonds();
+  report.broken_bonds = families_.broken;
+  report.singular_families = families_.singular;
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
-  report.bytes = families_.neighbour.size() * (sizeof(std::int32_t) + sizeof(double)) + families_.first.size() * 16 +
-                 (inverse_.size() + weight_.size() + scale_.size()) * sizeof(double) +
-                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) +
-                 condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  report.bytes = families_.bytes() + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) + scratch_.bytes();
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {
     report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", report.bonds / 2, report.bonds)});

@@ -4,6 +4,7 @@
 #include "batch.hpp"
 #include "blocks.hpp"
 #include "bond_kernel.hpp"
+#include "cloud_families.hpp"
 #include "cloud_rows.hpp"
 #include "perikit/engine/model.hpp"
 
@@ -19,14 +20,13 @@ class CloudModel final : public Model {
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) override;
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus sample(ConstFieldView u, PointSamples& samples) override;
-  Field shape_tensor_condition() override { return condition_; }
-  Field damage() override;
+  Field shape_tensor_condition() override { return families_.condition; }
+  Field damage() override { return families_.damage; }
   ModelReport report() const override;
 
  private:
   static constexpr std::size_t block_points = cloud_block_points;
 
-  void build_families(const InfluenceFunction& influence);
   EvaluationStatus run(Pass& pass);
   /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
@@ -46,13 +46,9 @@ class CloudModel final : public Model {
   KinematicsTraits traits_;
   bool pairs_;
   const Row* position_;                        ///< {x, y, z, V}
-  FamilyLists families_;                       ///< intact bonds
-  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
-  AlignedVector<double> omega_;                ///< by bond
-  AlignedVector<double> inverse_;              ///< K^-1 by point, rows of 6
-  AlignedVector<double> weight_, scale_;       ///< W_i and V_i / N_i
-  Field condition_, damage_;
-  std::size_t broken_ = 0, singular_ = 0;
+  CloudFamilies families_;
+  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index (bonds)
+  AlignedVector<double> scale_;                ///< V_i / N_i (bonds)
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                   ///< mirrors
   AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point

@@ -102,48 +102,16 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
 
 template <int D>
 void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
-  cloud_ = find_families(body_.rows(), body_.points(), D, body_.horizon());
-  omega_.resize(cloud_.neighbour.size());
-  std::vector<double> r, omega;
-  std::vector<std::int64_t> first(body_.points() + 1, 0);
-  std::int64_t kept = 0;
+  const CloudFamilies& f = cloud_.emplace(body_, influence, traits_.weight);
+  bonds_ = f.bonds();
+  broken_ = f.broken;
+  singular_ = f.singular;
+  condition_ = f.condition;
+  damage_ = f.damage;
   for (std::size_t p = 0; p < body_.points(); ++p) {
-    const Point x = body_.position(p);
-    const std::int64_t begin = cloud_.first[p], end = cloud_.first[p + 1];
-    r.clear();
-    for (std::int64_t k = begin; k < end; ++k) {
-      const Point y = body_.position(static_cast<std::size_t>(cloud_.neighbour[static_cast<std::size_t>(k)]));
-      r.push_back(std::min(1.0, std::sqrt((y[0] - x[0]) * (y[0] - x[0]) + (y[1] - x[1]) * (y[1] - x[1]) + (y[2] - x[2]) * (y[2] - x[2])) / body_.horizon()));
-    }
-    omega.resize(r.size());
-    influence.evaluate(r, omega);
-    first[p] = kept;
-    double K[6] = {}, inverse[6], whole = 0, intact = 0, normaliser = 0;
-    for (std::int64_t k = begin; k < end; ++k) {
-      const std::int32_t j = cloud_.neighbour[static_cast<std::size_t>(k)];
-      const double w = omega[static_cast<std::size_t>(k - begin)], volume = body_.volume(static_cast<std::size_t>(j));
-      const Point y = body_.position(static_cast<std::size_t>(j));
-      whole += w * volume;
-      normaliser += traits_.weight == BondWeight::kernel ? w * volume : volume;
-      if (body_.cut(x, y)) {
-        ++broken_;
-        continue;
-      }
-      intact += w * volume;
-      for (std::size_t a = 0; a < D; ++a)
-        for (std::size_t b = a; b < D; ++b) K[symmetric_index(D, static_cast<int>(a), static_cast<int>(b))] += w * volume * (y[a] - x[a]) * (y[b] - x[b]);
-      cloud_.neighbour[static_cast<std::size_t>(kept)] = j;
-      omega_[static_cast<std::size_t>(kept++)] = w;
-    }
-    if (!invert_shape<D>(K, inverse, condition_.data() + p)) ++singular_;
-    normaliser_[p] = normaliser;
-    damage_.data()[p] = whole > 0 ? 1 - intact / whole : 0.0;
+    normaliser_[p] = f.normaliser[p];
     groups_.push_back({static_cast<std::int32_t>(p), -1, -1, false});
   }
-  first[body_.points()] = kept;
-  cloud_.first = std::move(first);
-  cloud_.neighbour.resize(static_cast<std::size_t>(kept));
-  bonds_ = static_cast<std::size_t>(kept);
   for (std::size_t p = 0; p < body_.points(); p += cloud_block) block_first_.push_back(p);
   block_first_.push_back(body_.points());
   Memory m;
@@ -156,8 +124,7 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   for (std::size_t b = 0; b < blocks; ++b) {
     touches[b].push_back(static_cast<std::int32_t>(b));
     for (std::size_t p = block_first_[b]; p < block_first_[b + 1]; ++p)
-      for (std::int64_t k = cloud_.first[p]; k < cloud_.first[p + 1]; ++k)
-        touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(cloud_.neighbour[static_cast<std::size_t>(k)]) / cloud_block));
+      for (const std::int32_t j : f.neighbours(p)) touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
     std::sort(touches[b].begin(), touches[b].end());
     touches[b].erase(std::unique(touches[b].begin(), touches[b].end()), touches[b].end());
   }
@@ -171,29 +138,26 @@ void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
   if (lattice_) {
     for (const std::uint16_t s : lattice_bonds_[static_cast<std::size_t>(group.bonds)]) m.index.push_back(static_cast<std::int32_t>(group.first + lattice_->shifts[s]));
   } else {
-    m.index.assign(cloud_.neighbour.begin() + cloud_.first[p], cloud_.neighbour.begin() + cloud_.first[p + 1]);
+    const auto family = cloud_->neighbours(p);
+    m.index.assign(family.begin(), family.end());
   }
   if (group.family >= 0) return;
-  m.family.resize(D, static_cast<int>(m.index.size()));
-  m.share.assign(m.family.size, 0.0);
-  const Point x = body_.position(p);
-  for (std::size_t k = 0; k < m.index.size(); ++k) {
-    std::array<double, 3> xi{};
-    double omega = 0;
-    if (lattice_) {
-      const std::uint16_t s = lattice_bonds_[static_cast<std::size_t>(group.bonds)][k];
-      xi = lattice_->bond(s);
-      omega = lattice_->omega[s];
-    } else {
-      const Point y = body_.position(static_cast<std::size_t>(m.index[k]));
-      for (std::size_t c = 0; c < D; ++c) xi[c] = y[c] - x[c];
-      omega = omega_[static_cast<std::size_t>(cloud_.first[p]) + k];
+  if (lattice_) {
+    const std::vector<std::uint16_t>& slots = lattice_bonds_[static_cast<std::size_t>(group.bonds)];
+    m.family.resize(D, static_cast<int>(slots.size()));
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      const std::array<double, 3> xi = lattice_->bond(slots[k]);
+      for (std::size_t c = 0; c < D; ++c) m.family.xi[c][k] = xi[c];
+      m.family.length[k] = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+      m.family.omega[k] = lattice_->omega[slots[k]];
+      m.family.volume[k] = lattice_->volume;
     }
-    for (std::size_t c = 0; c < D; ++c) m.family.xi[c][k] = xi[c];
-    m.family.length[k] = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
-    m.family.omega[k] = omega;
-    m.family.volume[k] = body_.volume(static_cast<std::size_t>(m.index[k]));
-    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? omega : 1.0) / normaliser_[p];
+  } else {
+    cloud_->load(p, m.family);
+  }
+  m.share.assign(m.family.size, 0.0);
+  for (std::size_t k = 0; k < m.index.size(); ++k) {
+    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / normaliser_[p];
   }
   build_stencil(*kinematics_, traits_, m.family, body_.horizon(), m.share.data(), m.stencil, m.weights);
   if (parts_ > 0) {
@@ -370,8 +334,7 @@ ModelReport WeightedModel<D>::report() const {
   report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
   for (const LocalStencil& s : stencils_) stencils += s.bytes();
-  report.bytes = (lattice_ ? lattice_->bytes() : 0) + stencils + groups_.size() * sizeof(Group) + cloud_.neighbour.size() * 4 +
-                 cloud_.first.size() * 8 + (omega_.size() + normaliser_.size()) * 8 + condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) + normaliser_.size() * 8 + condition_.bytes() + damage_.bytes() + scratch_.bytes();
   if (lattice_) {
     report.skips.push_back({"stencils of equal families", fmt::format("{} stored for {} points", stencils_.size(), body_.points()),
                             fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6,

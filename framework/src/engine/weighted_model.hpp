@@ -4,6 +4,7 @@
 
 #include "batch.hpp"
 #include "blocks.hpp"
+#include "cloud_families.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
 #include "perikit/engine/model.hpp"
@@ -62,8 +63,7 @@ class WeightedModel final : public Model {
   std::optional<LatticeFamilies> lattice_;
   std::vector<std::vector<std::uint16_t>> lattice_bonds_;   ///< slots of each class of family
   std::vector<LocalStencil> stencils_;
-  FamilyLists cloud_;
-  AlignedVector<double> omega_;                             ///< cloud, by bond
+  std::optional<CloudFamilies> cloud_;
   AlignedVector<double> normaliser_;                        ///< N_i of bond weights, by point
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;

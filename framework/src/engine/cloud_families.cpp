@@ -1,0 +1,118 @@
+#include "cloud_families.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "cloud_rows.hpp"
+#include "perikit/core/parallel.hpp"
+#include "shape_tensor.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr double cut_bond = -1;   ///< in place of the influence, until the lists are compacted
+
+}  // namespace
+
+CloudFamilies::CloudFamilies(const Body& b, const InfluenceFunction& influence, BondWeight kind)
+    : body(b), lists(find_families(b.rows(), b.points(), b.dimension(), b.horizon())), condition(b.make_field(1)), damage(b.make_field(1)) {
+  const std::size_t n = body.points();
+  omega.resize(bonds());
+  inverse.assign(6 * n, 0.0);
+  weight.assign(n, 0.0);
+  normaliser.assign(n, 0.0);
+  switch (body.dimension()) {
+    case 1: measure<1>(influence, kind); break;
+    case 2: measure<2>(influence, kind); break;
+    default: measure<3>(influence, kind);
+  }
+  if (broken > 0) compact();
+}
+
+template <int D>
+void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind) {
+  const Row* position = reinterpret_cast<const Row*>(body.rows().data());
+  std::atomic<std::size_t> cut{0}, irregular{0};
+  parallel_for(cloud_blocks(body.points()), [&](std::size_t b) {
+    std::vector<double> r;
+    for (std::size_t p = b * cloud_block_points; p < std::min(body.points(), (b + 1) * cloud_block_points); ++p) {
+      const std::span<const std::int32_t> family = neighbours(p);
+      double* value = omega.data() + lists.first[p];
+      const Point x = body.position(p);
+      r.clear();
+      for (const std::int32_t j : family) {
+        const Row xi = position[j] - position[p];
+        r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body.horizon()));
+      }
+      influence.evaluate(r, {value, family.size()});
+      const bool near_crack = std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
+      double K[6] = {}, whole = 0, intact = 0;
+      for (std::size_t k = 0; k < family.size(); ++k) {
+        const std::int32_t j = family[k];
+        const double w = value[k] * position[j][3];
+        whole += w;
+        normaliser[p] += kind == BondWeight::kernel ? w : position[j][3];
+        if (near_crack && body.cut(x, body.position(static_cast<std::size_t>(j)))) {
+          value[k] = cut_bond;
+          ++cut;
+          continue;
+        }
+        intact += w;
+        const Row xi = position[j] - position[p];
+        for (int a = 0; a < D; ++a)
+          for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+      }
+      if (!invert_shape<D>(K, &inverse[6 * p], condition.data() + p)) ++irregular;
+      const double share = whole > 0 ? intact / whole : 0.0;
+      weight[p] = position[p][3] * share;
+      damage.data()[p] = whole > 0 ? 1 - share : 0.0;
+    }
+  });
+  broken = cut;
+  singular = irregular;
+}
+
+void CloudFamilies::compact() {
+  std::size_t kept = 0;
+  std::int64_t begin = 0;
+  for (std::size_t p = 0; p < body.points(); ++p) {
+    const std::int64_t end = lists.first[p + 1];
+    for (; begin < end; ++begin) {
+      const auto k = static_cast<std::size_t>(begin);
+      if (omega[k] == cut_bond) continue;
+      lists.neighbour[kept] = lists.neighbour[k];
+      omega[kept++] = omega[k];
+    }
+    lists.first[p + 1] = static_cast<std::int64_t>(kept);
+  }
+  lists.neighbour.resize(kept);
+  omega.resize(kept);
+}
+
+void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
+  const std::span<const std::int32_t> family = neighbours(p);
+  const Point x = body.position(p);
+  out.resize(body.dimension(), static_cast<int>(family.size()));
+  for (std::size_t k = 0; k < family.size(); ++k) {
+    const auto j = static_cast<std::size_t>(family[k]);
+    const Point y = body.position(j);
+    double r2 = 0;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(out.dimension); ++c) {
+      out.xi[c][k] = y[c] - x[c];
+      r2 += out.xi[c][k] * out.xi[c][k];
+    }
+    out.length[k] = std::sqrt(r2);
+    out.omega[k] = omega[static_cast<std::size_t>(lists.first[p]) + k];
+    out.volume[k] = body.volume(j);
+  }
+  std::copy_n(&inverse[6 * p], 6, out.inverse_shape);
+}
+
+std::size_t CloudFamilies::bytes() const noexcept {
+  return lists.neighbour.size() * sizeof(std::int32_t) + lists.first.size() * sizeof(std::int64_t) +
+         (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes();
+}
+
+}  // namespace perikit

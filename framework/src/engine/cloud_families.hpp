@@ -1,0 +1,42 @@
+#pragma once
+/// Families of a cloud: lists of intact bonds, their influence, and what point gradients and weights need of them.
+
+#include <cstdint>
+#include <span>
+
+#include "local_stencil.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/body/influence.hpp"
+#include "perikit/model/kinematics.hpp"
+
+namespace perikit {
+
+struct CloudFamilies {
+  CloudFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight);
+
+  const Body& body;
+  FamilyLists lists;                  ///< intact bonds
+  AlignedVector<double> omega;        ///< by bond
+  AlignedVector<double> inverse;      ///< K^-1 by point, rows of 6; 0 where singular
+  AlignedVector<double> weight;       ///< W_i = V_i (1 - D_i) of the point shape
+  AlignedVector<double> normaliser;   ///< N_i of bond weights over the whole family: sum V_j or sum omega V_j
+  Field condition;                    ///< of K
+  Field damage;                       ///< D_i
+  std::size_t broken = 0, singular = 0;
+
+  std::size_t bonds() const noexcept { return lists.neighbour.size(); }
+  std::span<const std::int32_t> neighbours(std::size_t p) const noexcept {
+    return {lists.neighbour.data() + lists.first[p], static_cast<std::size_t>(lists.first[p + 1] - lists.first[p])};
+  }
+  /// The family of p as arrays over its bonds.
+  void load(std::size_t p, FamilyArrays& out) const;
+  std::size_t bytes() const noexcept;
+
+ private:
+  template <int D>
+  void measure(const InfluenceFunction& influence, BondWeight kind);
+  /// Takes the bonds that are marked as cut out of the lists.
+  void compact();
+};
+
+}  // namespace perikit
