@@ -4,7 +4,9 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tests/validation/scenes.hpp"
@@ -31,6 +33,29 @@ Sample sample(const std::string& scene, const std::string& set, std::vector<std:
   const ModelReport report = problem.model().report();
   const double H = samples.H.components() > 0 ? samples.H.component(0)[points[0]] : 0.0;   // pair laws have none
   return {samples.strain_energy_density.data()[points[0]], H, report.fallbacks, report.dropped_parts};
+}
+
+/// The first example of a kinematics as an override of a scene.
+std::string example_table(const std::string& kinematics) {
+  std::string keys = registry().describe(Kind::kinematics, kinematics).examples.front();
+  for (std::size_t at = keys.find('\n'); at != std::string::npos; at = keys.find('\n')) keys.replace(at, 1, ", ");
+  return fmt::format("kinematics={{ type = \"{}\"{}{} }}", kinematics, keys.empty() ? "" : ", ", keys);
+}
+
+/// What the gradient of order n keeps of the amplitude of sin(pi s) on [-1, 1] at 0, in the limit of a fine lattice and a constant
+/// influence: the linear coefficient of the best approximation by odd powers up to n, over pi.
+double kept_amplitude(int order) {
+  const int terms = (order + 1) / 2;
+  Eigen::MatrixXd M(terms, terms);
+  Eigen::VectorXd b(terms);
+  double moment = 1 / std::numbers::pi;   // of s^i sin(pi s) over [0, 1], i = 1, 3, ...: (1 - i (i - 1) moment_(i-2) / pi) / pi
+  for (int k = 0; k < terms; ++k) {
+    const int i = 2 * k + 1;
+    if (k > 0) moment = (1 - i * (i - 1) * moment / std::numbers::pi) / std::numbers::pi;
+    b(k) = moment;
+    for (int m = 0; m < terms; ++m) M(k, m) = 1.0 / (i + 2 * m + 2);
+  }
+  return M.fullPivLu().solve(b)(0) / std::numbers::pi;
 }
 
 }  // namespace
@@ -66,11 +91,8 @@ TEST_CASE("zig-zag: F = 1 in the conventional model, energy in every other one")
   for (const std::string& kinematics : registry().names(Kind::kinematics)) {
     if (kinematics == "conventional") continue;
     INFO(kinematics);
-    std::string table = registry().describe(Kind::kinematics, kinematics).examples.front();
-    for (std::size_t at = table.find('\n'); at != std::string::npos; at = table.find('\n')) table.replace(at, 1, ", ");
     // Pair laws have no gradients to show; the selective map needs uniaxial strain.
-    CHECK(sample("partmann/zigzag.toml", "inside", {fmt::format("kinematics={{ type = \"{}\"{}{} }}", kinematics, table.empty() ? "" : ", ", table),
-                                                    "output.fields=[\"strain_energy_density\"]", "output.history=[]", "body.line=strain"}).density > 1e-3);
+    CHECK(sample("partmann/zigzag.toml", "inside", {example_table(kinematics), "output.fields=[\"strain_energy_density\"]", "output.history=[]", "body.line=strain"}).density > 1e-3);
   }
   // By hand: two half-horizons of F - 1 = -+ 0.04; four parts hold one bond each, F - 1 = -+ 0.2 (inner) and 0 (outer).
   CHECK(sample("partmann/zigzag.toml", "inside", {}).density == doctest::Approx(0.8).epsilon(1e-12));
@@ -108,11 +130,39 @@ TEST_CASE("bond_associated: domains that are too poor use the whole family") {
   CHECK(bar.density == doctest::Approx(0.5 * 1000 * 0.2 * 0.2).epsilon(1e-12));
 }
 
-TEST_CASE("sine: the conventional model keeps 3/pi^2 of the amplitude") {
-  const double limit = 3 / (std::numbers::pi * std::numbers::pi);
-  CHECK(std::abs(sample("chowdhury/sine.toml", "crest", {}).H / 0.9 - limit) <= 1e-4);
+TEST_CASE("sine: order 1 keeps 3/pi^2 of the amplitude, orders 3 and 6 approach all of it") {
+  CHECK(kept_amplitude(1) == doctest::Approx(3 / (std::numbers::pi * std::numbers::pi)).epsilon(1e-14));
+  CHECK(kept_amplitude(3) > 0.85);
+  CHECK(kept_amplitude(6) > 0.98);
   // Ten times finer: the error falls with the square of the spacing.
   const double dx = 0.1 / 500.5;
-  const std::vector<std::string> finer{fmt::format("body.lattice={{ spacing = {0:.17g}, lower = [{1:.17g}], upper = [{2:.17g}] }}", dx, -1001.5 * dx, 1001.5 * dx)};
-  CHECK(std::abs(sample("chowdhury/sine.toml", "crest", finer).H / 0.9 - limit) <= 1e-6);
+  const std::string finer = fmt::format("body.lattice={{ spacing = {0:.17g}, lower = [{1:.17g}], upper = [{2:.17g}] }}", dx, -1001.5 * dx, 1001.5 * dx);
+  for (const int order : {1, 3, 6}) {
+    const std::string key = fmt::format("kinematics.order={}", order);
+    const double limit = kept_amplitude(order);
+    const double coarse = std::abs(sample("chowdhury/sine.toml", "crest", {key}).H / 0.9 - limit);
+    CHECK(coarse <= 2e-3);
+    CHECK(std::abs(sample("chowdhury/sine.toml", "crest", {key, finer}).H / 0.9 - limit) <= 0.015 * coarse);
+  }
+}
+
+TEST_CASE("spectrum: the energy of short waves vanishes for conventional alone") {
+  const auto spectrum = [](const std::string& kinematics, int k) {
+    const auto simulation = load("chowdhury/spectrum.toml", {kinematics, fmt::format("constants.k={}", k), "body.lattice.spacing=0.002", "body.line=strain"});
+    BodyProblem& problem = simulation->problem();
+    PointSamples samples;
+    REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+    double sum = 0;
+    for (const std::int32_t p : problem.body().set("inside")) sum += samples.strain_energy_density.data()[p];
+    return sum;
+  };
+  for (const std::string& name : registry().names(Kind::kinematics)) {
+    INFO(name);
+    const std::string kinematics = example_table(name);
+    const double longest = spectrum(kinematics, 10);
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 50; k <= 500; k += 50) least = std::min(least, spectrum(kinematics, k) / longest);
+    if (name == "conventional") CHECK(spectrum(kinematics, 500) <= 1e-20 * longest);
+    else CHECK(least > 1);
+  }
 }
