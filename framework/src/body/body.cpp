@@ -8,15 +8,19 @@
 #include <random>
 
 #include "perikit/body/point_file.hpp"
+#include "size_check.hpp"
 
 namespace perikit {
 
 namespace {
 
-constexpr double most_points = 2.0e9;   // indices are 32 bit
-
 /// Uniform in [-1, 1), the same on every platform.
 double centred(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0; }
+
+void check_cloud(const Scene& scene, std::size_t points, double ratio) {
+  check_index(scene, static_cast<double>(points));
+  check_memory(scene, static_cast<double>(points), ratio, true);
+}
 
 }  // namespace
 
@@ -32,6 +36,7 @@ Body::Body(const Scene& scene) : dimension_(scene.body.dimension), space_(scene.
     for (double& v : cloud.volume) total += v;
     spacing_ = std::pow(total / section_ / static_cast<double>(cloud.volume.size()), 1.0 / dimension_);
     horizon_ = scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing_;
+    check_cloud(scene, cloud.volume.size(), horizon_ / spacing_);
     place_cloud(std::move(cloud.position), std::move(cloud.volume));
   }
   if (internal_.empty()) throw InputError(scene.body.position, "body", "no point is left; `inside` or the box keeps none");
@@ -42,9 +47,10 @@ void Body::place_lattice(const Scene& scene) {
   const LatticeDescription& description = *scene.body.lattice;
   double estimate = 1;
   for (int a = 0; a < dimension_; ++a) estimate *= std::max(1.0, (description.upper[a] - description.lower[a]) / spacing_ + 1);
-  if (estimate > most_points) {
-    throw InputError(scene.body.position, "body.lattice", fmt::format("about {:.3g} points; at most {:.3g} are possible", estimate, most_points));
-  }
+  const bool jittered = description.jitter > 0;
+  // What `inside` leaves is known after it was asked for every cell.
+  check_index(scene, estimate);
+  if (!description.inside) check_memory(scene, estimate, horizon_ / spacing_, jittered);
   Lattice lattice = make_lattice(dimension_, spacing_, description.lower, description.upper, horizon_);
   std::array<std::int64_t, 3> cells{1, 1, 1}, along{};
   for (int k = 0; k < 3; ++k) {
@@ -70,19 +76,21 @@ void Body::place_lattice(const Scene& scene) {
   const double volume = std::pow(spacing_, dimension_) * section_;
   // Jitter needs a cloud; so does a body that fills so little of its box that dead cells would dominate.
   const bool sparse = static_cast<double>(internal_.size()) < 0.08 * static_cast<double>(cells[0] * cells[1] * cells[2]);
-  if (description.jitter > 0 || (sparse && !internal_.empty())) {
+  if (jittered || (sparse && !internal_.empty())) {
     std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
+    check_cloud(scene, internal_.size(), horizon_ / spacing_);
     std::vector<Point> positions;
     positions.reserve(internal_.size());
     for (const std::int32_t index : internal_) {
       Point x = lattice.position(index);
-      for (int a = 0; a < dimension_ && description.jitter > 0; ++a) x[static_cast<std::size_t>(a)] += description.jitter * spacing_ * centred(random);
+      for (int a = 0; a < dimension_ && jittered; ++a) x[static_cast<std::size_t>(a)] += description.jitter * spacing_ * centred(random);
       positions.push_back(x);
     }
     std::vector<double> volumes(positions.size(), volume);
     place_cloud(std::move(positions), std::move(volumes));
     return;
   }
+  check_memory(scene, static_cast<double>(lattice.cells), horizon_ / spacing_, false);
   stride_ = static_cast<std::size_t>(lattice.cells);
   margin_ = padding;
   uniform_volume_ = volume;

@@ -1,0 +1,57 @@
+/// Bodies that cannot be held are refused before anything of their size is allocated.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <string>
+
+#include "perikit/body/body.hpp"
+#include "unit/fake_catalogue.hpp"
+
+using namespace perikit;
+using namespace perikit::test;
+
+namespace {
+
+std::string refusal(double spacing, double ratio, double jitter, const char* inside = "") {
+  const std::string text = fmt::format(R"(format = 1
+[body]
+dimension = 3
+[body.lattice]
+spacing = {}
+lower = [0, 0, 0]
+upper = [1, 1, 1]
+jitter = {}
+{}
+[family]
+horizon_ratio = {}
+[kinematics]
+type = "baqp"
+[material]
+type = "neo_hookean"
+shear_modulus = 1.0
+bulk_modulus = 2.0
+[integrator]
+type = "newton"
+)",
+                                       spacing, jitter, inside, ratio);
+  FakeCatalogue parts;
+  const Scene scene = parse_scene(text, "plate.toml", parts);
+  try {
+    Body body(scene);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("bodies: more than memory holds is refused with the numbers, before it is allocated") {
+  CHECK(refusal(1.0 / 1200, 10, 0.1).find("points with a horizon of 10 spacings need") != std::string::npos);
+  CHECK(refusal(1.0 / 200, 60, 0.1).find("GB or more; this machine offers") != std::string::npos);
+  CHECK(refusal(1.0 / 100, 40, 0).find("at most 65535 are possible on a lattice") != std::string::npos);
+  CHECK(refusal(1.0 / 100, 40, 0).find("plate.toml:2:1: family:") == 0);
+  // What counts is what `inside` leaves.
+  CHECK(refusal(1.0 / 100, 60, 0.1, "inside = \"x + y + z < 0.06\"").empty());
+}
