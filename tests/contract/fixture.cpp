@@ -59,6 +59,38 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   return text;
 }
 
+std::string Case::label() const {
+  return fmt::format("{} ({}) {}D {}{}{}{}", example.part, example.table, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
+                     body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
+}
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const Example& example : examples(Kind::kinematics)) {
+    const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
+    const bool selective = subject().registry.kinematics(*part)->traits().selective;
+    for (int d = 1; d <= 3; ++d) {
+      for (const bool cloud : {false, true}) {
+        BodyOptions body;
+        body.dimension = d;
+        body.cloud = cloud;
+        all.push_back({example, body});
+        if (d > 1) {
+          body.crack = true;
+          body.two_materials = true;
+          all.push_back({example, body});
+        }
+        if (d == 2 && !cloud && !selective) {
+          body.crack = body.two_materials = false;
+          body.plane = "stress";
+          all.push_back({example, body});
+        }
+      }
+    }
+  }
+  return all;
+}
+
 std::unique_ptr<Simulation> build(const std::string& text) {
   return std::make_unique<Simulation>(parse_scene(text, "contract.toml", subject().registry), subject().registry);
 }

@@ -52,6 +52,15 @@ std::string scene_text(const BodyOptions& options, const std::string& kinematics
 std::unique_ptr<Simulation> build(const std::string& text);
 std::string kinematics_table(const Example& example);
 
+/// A kinematics on a body.
+struct Case {
+  Example example;
+  BodyOptions body;
+  std::string label() const;
+};
+/// Every kinematics in every space, on lattices and clouds, intact and cracked.
+std::vector<Case> cases();
+
 /// Uniform in [-1, 1).
 class Noise {
  public:

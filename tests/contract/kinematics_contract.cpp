@@ -15,42 +15,6 @@ using namespace perikit::contract;
 
 namespace {
 
-struct Case {
-  Example example;
-  BodyOptions body;
-  std::string label() const {
-    return fmt::format("{} ({}) {}D {}{}{}{}", example.part, example.table, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
-                       body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
-  }
-};
-
-std::vector<Case> cases() {
-  std::vector<Case> all;
-  for (const Example& example : examples(Kind::kinematics)) {
-    const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
-    const bool selective = subject().registry.kinematics(*part)->traits().selective;
-    for (int d = 1; d <= 3; ++d) {
-      for (const bool cloud : {false, true}) {
-        BodyOptions body;
-        body.dimension = d;
-        body.cloud = cloud;
-        all.push_back({example, body});
-        if (d > 1) {
-          body.crack = true;
-          body.two_materials = true;
-          all.push_back({example, body});
-        }
-        if (d == 2 && !cloud && !selective) {
-          body.crack = body.two_materials = false;
-          body.plane = "stress";
-          all.push_back({example, body});
-        }
-      }
-    }
-  }
-  return all;
-}
-
 /// Poisoned output: whatever a kernel forgets to write shows.
 Field poisoned(const BodyProblem& problem) {
   Field f = problem.make_field(problem.dimension());

@@ -13,9 +13,7 @@ void ScratchPool::prepare(const Laws& laws) {
   while (scratch_.size() < static_cast<std::size_t>(thread_count())) {
     // Value-initialised: components that no kernel writes (lateral H) stay zero.
     scratch_.push_back(std::make_unique<BatchScratch>());
-    std::size_t constants = 1;
-    for (const MaterialRecord& record : laws.records()) constants = std::max(constants, static_cast<std::size_t>(record.traits.constants));
-    scratch_.back()->law.constants.assign(constants * batch_points, 0.0);
+    laws.prepare(scratch_.back()->law, false);
   }
 }
 

@@ -13,7 +13,7 @@ namespace perikit {
 
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
-    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
       pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {

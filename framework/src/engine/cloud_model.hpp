@@ -6,14 +6,14 @@
 #include "bond_kernel.hpp"
 #include "cloud_families.hpp"
 #include "cloud_rows.hpp"
-#include "perikit/engine/model.hpp"
+#include "engine/assembly/assembly.hpp"
 
 namespace perikit {
 
 /// Any point or bond kinematics on an irregular cloud: one point at a time over sorted neighbour lists; gathered quantities are
 /// mirrored point-major.
 template <int D>
-class CloudModel final : public Model {
+class CloudModel final : public AssemblingModel {
  public:
   explicit CloudModel(const ModelParts& parts);
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "local_stencil.hpp"
 #include "shape_tensor.hpp"
 
 namespace perikit {
@@ -190,6 +191,24 @@ void LatticeFamilies::make_patterns(BondWeight weight) {
     }
     chunk.pattern = entry->second;
     singular += static_cast<std::size_t>(__builtin_popcount(patterns[static_cast<std::size_t>(entry->second)].singular));
+  }
+}
+
+std::vector<std::uint16_t> LatticeFamilies::intact_slots(const LatticePattern& pattern, int lane) const {
+  std::vector<std::uint16_t> slots;
+  for (std::size_t s = 0; s < offsets.size(); ++s)
+    if (intact(pattern, s, lane)) slots.push_back(static_cast<std::uint16_t>(s));
+  return slots;
+}
+
+void LatticeFamilies::load(std::span<const std::uint16_t> slots, FamilyArrays& out) const {
+  out.resize(lattice.dimension, static_cast<int>(slots.size()));
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const std::array<double, 3> xi = bond(slots[k]);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(lattice.dimension); ++c) out.xi[c][k] = xi[c];
+    out.length[k] = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+    out.omega[k] = omega[slots[k]];
+    out.volume[k] = volume;
   }
 }
 

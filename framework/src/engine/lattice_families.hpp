@@ -3,6 +3,7 @@
 /// eight points that are not whole. Chunks with the same masks share one pattern.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "perikit/model/kinematics.hpp"
 
 namespace perikit {
+
+struct FamilyArrays;
 
 inline constexpr int chunk_points = static_cast<int>(padding);
 
@@ -92,6 +95,9 @@ class LatticeFamilies {
     for (std::size_t k = 0; k < 3; ++k) xi[static_cast<std::size_t>(lattice.axis[k])] = offsets[slot][k] * spacing;
     return xi;
   }
+  std::vector<std::uint16_t> intact_slots(const LatticePattern& pattern, int lane) const;
+  /// The family of the bonds at these slots as arrays; its inverse shape tensor is left alone.
+  void load(std::span<const std::uint16_t> slots, FamilyArrays& out) const;
   /// K^-1 of a lane with the components of the input axes and the volumes in K [1/m^2 per volume]: what a FamilyView holds.
   void inverse_shape(const LatticePattern& pattern, int lane, double* out) const noexcept;
   std::size_t bytes() const noexcept;

@@ -34,7 +34,7 @@ const LaneFactors& lane_factors() {
 
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
-    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
       pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_),
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
   const auto alive = body_.alive_bits();

@@ -7,7 +7,7 @@
 #include "bond_kernel.hpp"
 #include "lattice_families.hpp"
 #include "lattice_kernels.hpp"
-#include "perikit/engine/model.hpp"
+#include "engine/assembly/assembly.hpp"
 
 namespace perikit {
 
@@ -15,7 +15,7 @@ namespace perikit {
 ///   points: gradient -> law -> flux                              | divergence
 ///   bonds:  gradient of points | bonds by colour: law, scatter   | flux | divergence
 template <int D>
-class LatticeModel final : public Model {
+class LatticeModel final : public AssemblingModel {
  public:
   explicit LatticeModel(const ModelParts& parts);
 

@@ -29,6 +29,13 @@ double Laws::density(std::size_t p) const noexcept {
   return record.densities.empty() ? record.density : record.densities[p];
 }
 
+void Laws::prepare(LawScratch& scratch, bool tangents) const {
+  std::size_t constants = 1;
+  for (const MaterialRecord& record : records_) constants = std::max(constants, static_cast<std::size_t>(record.traits.constants));
+  scratch.constants.assign(constants * batch_points, 0.0);
+  if (tangents) scratch.A.assign(static_cast<std::size_t>(components() * components()) * batch_points, 0.0);
+}
+
 Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept {
   MaterialBatch call;
   call.n = batch.n;
@@ -38,6 +45,7 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.psi = batch.psi;
   call.P = batch.P;
   call.dP = batch.dP;
+  call.A = batch.A;
   call.lateral = batch.lateral;
   call.constants = record.constants.data();
   if (!record.uniform) {
@@ -72,6 +80,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     part.psi = batch.psi ? scratch.psi : nullptr;
     part.P = batch.P ? scratch.P : nullptr;
     part.dP = batch.dP ? scratch.dP : nullptr;
+    part.A = batch.A ? scratch.A.data() : nullptr;
     const Status one = evaluate_one(records_[m], part, scratch);
     if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
     const auto keep = [&](double* to, const double* from, int components) {
@@ -83,6 +92,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     keep(batch.psi, scratch.psi, 1);
     keep(batch.P, scratch.P, components());
     keep(batch.dP, scratch.dP, components());
+    keep(batch.A, scratch.A.data(), components() * components());
   }
   return status;
 }

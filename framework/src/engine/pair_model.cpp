@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/assembly/pair_assembly.hpp"
 #include "samples.hpp"
 
 namespace perikit {
@@ -69,7 +70,7 @@ std::vector<FamilyBond> regular_family(const Body& body, const InfluenceFunction
 
 template <int D>
 PairModel<D>::PairModel(const ModelParts& parts)
-    : body_(*parts.body), law_(parts.kinematics), traits_(law_->traits()), skip_(parts.skip), damage_(body_.make_field(1)) {
+    : AssemblingModel(parts), body_(*parts.body), law_(parts.kinematics), traits_(law_->traits()), skip_(parts.skip), damage_(body_.make_field(1)) {
   const PairLoopParts loop{body_, *parts.influence, *law_, fields_, skip_};
   loop_ = body_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (traits_.dilatation) {
@@ -211,6 +212,11 @@ EvaluationStatus PairModel<D>::tangent(ConstFieldView u, ConstFieldView w, Field
     if (!status.ok()) return status;
   }
   return status_at(body_, loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr}));
+}
+
+template <int D>
+std::unique_ptr<Assembly> PairModel<D>::make_assembly(const ModelParts& parts) const {
+  return std::make_unique<PairAssembly<D>>(parts, PairPoints{fields_, scale_, dilatation_modulus_});
 }
 
 template <int D>

@@ -1,12 +1,12 @@
 #pragma once
 #include "pair_loop.hpp"
-#include "perikit/engine/model.hpp"
+#include "engine/assembly/assembly.hpp"
 
 namespace perikit {
 
 /// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
 template <int D>
-class PairModel final : public Model {
+class PairModel final : public AssemblingModel {
  public:
   explicit PairModel(const ModelParts& parts);
 
@@ -20,6 +20,7 @@ class PairModel final : public Model {
   ModelReport report() const override;
 
  private:
+  std::unique_ptr<Assembly> make_assembly(const ModelParts& parts) const override;
   void set_moduli(const Laws& laws);
   void set_correction(const Laws& laws, const InfluenceFunction& influence);
   PairPoint point(const Laws& laws, std::size_t p) const;

@@ -15,7 +15,7 @@ namespace perikit {
 
 template <int D>
 WeightedModel<D>::WeightedModel(const ModelParts& parts)
-    : body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(traits_.at == EvaluationPoints::points ? 1 : kinematics_->parts(D)),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(traits_.at == EvaluationPoints::points ? 1 : kinematics_->parts(D)),
       condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
   normaliser_.assign(body_.stride(), 0.0);
   if (body_.lattice()) prepare_lattice(*parts.influence);
@@ -43,9 +43,7 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
         lane_class[k].push_back(-1);
         continue;
       }
-      std::vector<std::uint16_t> bonds;
-      for (std::size_t s = 0; s < slots; ++s)
-        if (LatticeFamilies::intact(pattern, s, l)) bonds.push_back(static_cast<std::uint16_t>(s));
+      std::vector<std::uint16_t> bonds = f.intact_slots(pattern, l);
       const auto [entry, fresh] = classes.try_emplace({bonds, pattern.scale[l]}, static_cast<std::int32_t>(lattice_bonds_.size()));
       if (fresh) lattice_bonds_.push_back(std::move(bonds));
       lane_class[k].push_back(entry->second);
@@ -143,15 +141,7 @@ void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
   }
   if (group.family >= 0) return;
   if (lattice_) {
-    const std::vector<std::uint16_t>& slots = lattice_bonds_[static_cast<std::size_t>(group.bonds)];
-    m.family.resize(D, static_cast<int>(slots.size()));
-    for (std::size_t k = 0; k < slots.size(); ++k) {
-      const std::array<double, 3> xi = lattice_->bond(slots[k]);
-      for (std::size_t c = 0; c < D; ++c) m.family.xi[c][k] = xi[c];
-      m.family.length[k] = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
-      m.family.omega[k] = lattice_->omega[slots[k]];
-      m.family.volume[k] = lattice_->volume;
-    }
+    lattice_->load(lattice_bonds_[static_cast<std::size_t>(group.bonds)], m.family);
   } else {
     cloud_->load(p, m.family);
   }

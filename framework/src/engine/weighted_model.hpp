@@ -7,14 +7,14 @@
 #include "cloud_families.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
-#include "perikit/engine/model.hpp"
+#include "engine/assembly/assembly.hpp"
 
 namespace perikit {
 
 /// Any weighted kinematics. On a lattice, points with the same family share one stencil (a class), and eight neighbours in a row
 /// are one small matrix product; classes beyond a cap in bytes, and clouds, build their stencil when they need it.
 template <int D>
-class WeightedModel final : public Model {
+class WeightedModel final : public AssemblingModel {
  public:
   explicit WeightedModel(const ModelParts& parts);
 

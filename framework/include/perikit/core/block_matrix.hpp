@@ -23,4 +23,10 @@ struct BlockMatrix {
   bool has_pattern() const noexcept { return !row_first.empty(); }
 };
 
+/// What an assembled tangent takes.
+struct AssembledSize {
+  std::size_t blocks = 0;                     ///< of dimension x dimension
+  std::size_t bytes = 0;                      ///< of the matrix and of what its assembly keeps
+};
+
 }  // namespace perikit

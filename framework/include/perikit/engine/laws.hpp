@@ -31,6 +31,7 @@ struct LawScratch {
   alignas(64) double P[9 * batch_points];
   alignas(64) double dP[9 * batch_points];
   AlignedVector<double> constants;
+  AlignedVector<double> A;               ///< only where tangents are asked for
 };
 
 struct LawBatch {
@@ -41,6 +42,7 @@ struct LawBatch {
   double* psi = nullptr;
   double* P = nullptr;
   double* dP = nullptr;
+  double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
   double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
 };
 
@@ -63,6 +65,8 @@ class Laws {
   Moduli moduli(std::size_t p) const;
   double density(std::size_t p) const noexcept;
 
+  /// Memory for evaluations; `tangents`: with LawBatch::A.
+  void prepare(LawScratch& scratch, bool tangents) const;
   Status evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept;
 
  private:

@@ -8,6 +8,7 @@
 
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
+#include "perikit/core/block_matrix.hpp"
 #include "perikit/engine/laws.hpp"
 #include "perikit/model/kinematics.hpp"
 #include "perikit/problem/integrator.hpp"
@@ -48,6 +49,12 @@ class Model {
   virtual EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) = 0;
   /// Kw <- d2Pi/du2 w [N], fully overwritten.
   virtual EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  /// K <- d2Pi/du2 [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
+  /// from this model and stays as it is. Values are overwritten; undefined after a failure.
+  virtual EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K) = 0;
+  /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
+  /// no more points.
+  virtual AssembledSize assembled_size() = 0;
   virtual EvaluationStatus sample(ConstFieldView u, PointSamples& samples) = 0;
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   virtual bool has_gradients() const noexcept { return true; }

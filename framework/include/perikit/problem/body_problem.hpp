@@ -39,6 +39,8 @@ class BodyProblem final : public Problem {
 
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return model_->assemble(u, K); }
+  AssembledSize assembled_size() override { return model_->assembled_size(); }
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "perikit/core/block_matrix.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/model/material.hpp"
@@ -89,6 +90,11 @@ class Problem {
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
   /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
   virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must
+  /// come from this problem. Values are overwritten; undefined after a failure.
+  virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
+  /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
+  virtual AssembledSize assembled_size() = 0;
   /// Loads at time (or load parameter) t [N].
   virtual void evaluate_loads(double t, FieldView force) = 0;
   virtual bool any_load() const noexcept = 0;

@@ -1,0 +1,82 @@
+#include "engine/assembly/point_families.hpp"
+
+#include <algorithm>
+
+#include "engine/reproducing_kernel.hpp"
+#include "engine/shape_tensor.hpp"
+
+namespace perikit {
+
+PointFamilies::PointFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight) : body_(body), weight_(weight) {
+  for (std::size_t p = 0; p < body.stride(); ++p)
+    if (body.alive(p)) point_.push_back(static_cast<std::int32_t>(p));
+  if (body.lattice()) {
+    lattice_.emplace(body, influence, weight);
+    read_lattice();
+    return;
+  }
+  const CloudFamilies& f = cloud_.emplace(body, influence, weight);   // clouds have no padding in between: rows are field indices
+  normaliser_ = f.normaliser;
+  damage_.assign(f.damage.data(), f.damage.data() + rows());
+}
+
+void PointFamilies::read_lattice() {
+  const LatticeFamilies& f = *lattice_;
+  std::vector<std::int32_t> row_of(body_.stride(), -1), pattern_of(body_.stride() / chunk_points, -1);
+  for (std::size_t r = 0; r < rows(); ++r) row_of[point(r)] = static_cast<std::int32_t>(r);
+  for (const LatticeChunk& chunk : f.chunks) pattern_of[static_cast<std::size_t>(chunk.first / chunk_points)] = chunk.pattern;
+  normaliser_.assign(rows(), 0.0);
+  damage_.assign(rows(), 0.0);
+  whole_.assign(rows(), 0);
+  inverse_.assign(6 * rows(), 0.0);
+  lattice_lists_.first.push_back(0);
+  for (std::size_t r = 0; r < rows(); ++r) {
+    const std::size_t p = point(r);
+    const int lane = static_cast<int>(p % chunk_points);
+    const std::int32_t index = pattern_of[p / chunk_points];
+    const LatticePattern& pattern = index < 0 ? f.whole : f.patterns[static_cast<std::size_t>(index)];
+    std::vector<std::uint16_t> slots = f.intact_slots(pattern, lane);
+    std::sort(slots.begin(), slots.end(), [&](std::uint16_t a, std::uint16_t b) { return f.shifts[a] < f.shifts[b]; });
+    for (const std::uint16_t s : slots) lattice_lists_.neighbour.push_back(row_of[static_cast<std::size_t>(static_cast<std::int64_t>(p) + f.shifts[s])]);
+    slot_.insert(slot_.end(), slots.begin(), slots.end());
+    lattice_lists_.first.push_back(static_cast<std::int64_t>(slot_.size()));
+    f.inverse_shape(pattern, lane, &inverse_[6 * r]);
+    normaliser_[r] = pattern.scale[lane] > 0 ? f.volume / pattern.scale[lane] : 0.0;
+    damage_[r] = pattern.damage[lane];
+    whole_[r] = slots.size() == f.offsets.size();
+  }
+}
+
+void PointFamilies::load(std::size_t row, FamilyArrays& out) const {
+  if (cloud_) return cloud_->load(row, out);
+  lattice_->load({slot_.data() + first(row), first(row + 1) - first(row)}, out);
+  std::copy_n(&inverse_[6 * row], 6, out.inverse_shape);
+}
+
+void PointFamilies::bond_shares(std::size_t row, const FamilyArrays& family, AlignedVector<double>& share) const {
+  share.assign(family.size, 0.0);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k)
+    share[k] = family.volume[k] * (weight_ == BondWeight::kernel ? family.omega[k] : 1.0) / normaliser_[row];
+}
+
+std::size_t PointFamilies::bytes() const noexcept {
+  return (lattice_ ? lattice_->bytes() : cloud_->bytes()) + rows() * 4 + lattice_lists_.neighbour.size() * 6 + lattice_lists_.first.size() * 8 +
+         (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size();
+}
+
+void point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
+  if (order > 1) {
+    reproducing_kernel(family, horizon, order, g);
+    return;
+  }
+  const int d = family.dimension;
+  g.assign(static_cast<std::size_t>(family.bonds * d), 0.0);
+  for (int k = 0; k < family.bonds; ++k)
+    for (int e = 0; e < d; ++e)
+      for (int a = 0; a < d; ++a) {
+        const auto bond = static_cast<std::size_t>(k);
+        g[static_cast<std::size_t>(k * d + e)] += family.omega[bond] * family.volume[bond] * family.inverse_shape[symmetric_index(d, a, e)] * family.xi[a][bond];
+      }
+}
+
+}  // namespace perikit

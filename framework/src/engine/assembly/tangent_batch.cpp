@@ -1,0 +1,100 @@
+#include "engine/assembly/tangent_batch.hpp"
+
+#include <algorithm>
+
+#include "engine/assembly/selective_tangent.hpp"
+#include "engine/selective_map.hpp"
+
+namespace perikit {
+
+template <int D>
+TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), selective_(selective) {
+  laws.prepare(scratch_, true);
+  A_.assign(static_cast<std::size_t>(laws.components() * laws.components()) * batch_points, 0.0);
+  if (!selective) return;
+  P_.assign(9 * batch_points, 0.0);
+  mapped_.assign(9 * batch_points, 0.0);
+  scale_.assign(batch_points, 0.0);
+}
+
+template <int D>
+int TangentBatch<D>::add(std::int32_t owner, double weight) {
+  const int lane = lanes_++;
+  if (static_cast<std::size_t>(lane) == owner_.size()) {
+    const std::size_t size = owner_.size() + batch_points;
+    owner_.resize(size);
+    weight_.resize(size);
+    H_.resize(size * stored, 0.0);
+    own_.resize(size * entries);
+    if (selective_) {
+      Hbar_.resize(size * stored, 0.0);
+      mixed_.resize(size * entries);
+      bar_.resize(size * entries);
+    }
+  }
+  owner_[static_cast<std::size_t>(lane)] = owner;
+  weight_[static_cast<std::size_t>(lane)] = weight;
+  return lane;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate() {
+  for (int first = 0; first < lanes_; first += batch_points) {
+    const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
+    for (int lane = first + n; lane < last; ++lane) {   // padding at rest
+      owner_[static_cast<std::size_t>(lane)] = owner_[static_cast<std::size_t>(first)];
+      for (int c = 0; c < components; ++c) {
+        H(lane, c) = 0;
+        if (selective_) owner_H(lane, c) = 0;
+      }
+    }
+    const int bad = selective_ ? evaluate_selective(first, n) : evaluate_plain(first, n);
+    if (bad >= 0) return first + bad;
+  }
+  return -1;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate_plain(int first, int n) {
+  LawBatch batch;
+  batch.n = n;
+  batch.H = &H(first, 0);
+  batch.points = owner_.data() + first;
+  batch.A = A_.data();
+  const Status status = laws_.evaluate(batch, scratch_);
+  if (!status.ok()) return status.inadmissible;
+  const int all = laws_.components();
+  for (int l = 0; l < n; ++l) {
+    double* out = own_.data() + static_cast<std::size_t>(first + l) * entries;
+    const double weight = weight_[static_cast<std::size_t>(first + l)];
+    for (int r = 0; r < components; ++r)
+      for (int c = 0; c < components; ++c) out[r * components + c] = weight * A_[static_cast<std::size_t>((r * all + c) * batch_points + l)];
+  }
+  return -1;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate_selective(int first, int n) {
+  const SelectiveArrays map{&H(first, 0), &owner_H(first, 0), nullptr, nullptr, scale_.data()};
+  selective_map(laws_.space(), static_cast<int>(padded(static_cast<std::size_t>(n))), map, mapped_.data(), nullptr);
+  LawBatch batch;
+  batch.n = n;
+  batch.H = mapped_.data();
+  batch.points = owner_.data() + first;
+  batch.P = P_.data();
+  batch.A = A_.data();
+  const Status status = laws_.evaluate(batch, scratch_);
+  if (!status.ok()) return status.inadmissible;
+  for (int l = 0; l < n; ++l) {
+    const std::size_t lane = static_cast<std::size_t>(first + l) * entries;
+    selective_tangent<D>({map.Ht + l, map.Hbar + l, P_.data() + l, A_.data() + l, scale_[static_cast<std::size_t>(l)] + 1, weight_[static_cast<std::size_t>(first + l)]},
+                         own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
+  }
+  return -1;
+}
+
+template class TangentBatch<1>;
+template class TangentBatch<2>;
+template class TangentBatch<3>;
+
+}  // namespace perikit

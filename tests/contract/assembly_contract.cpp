@@ -1,0 +1,167 @@
+/// What the assembled tangent of every kinematics must fulfil with every material: it is the tangent action, symmetric, bitwise the same
+/// for any number of threads and with a pattern that is there already.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "perikit/core/parallel.hpp"
+#include "tests/contract/fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+std::vector<std::string> materials() {
+  std::vector<std::string> all;
+  Registry& registry = subject().registry;
+  for (const std::string& name : registry.names(Kind::material)) {
+    for (const std::string& table : registry.describe(Kind::material, name).examples) all.push_back(fmt::format("type = \"{}\"\n{}", name, table));
+  }
+  return all;
+}
+
+BlockMatrix assembled(BodyProblem& problem, ConstFieldView u) {
+  BlockMatrix K;
+  const EvaluationStatus status = problem.assemble_tangent(u, K);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return K;
+}
+
+Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w) {
+  Field out = problem.make_field(K.dimension);
+  const auto d = static_cast<std::size_t>(K.dimension);
+  for (std::size_t r = 0; r < K.rows(); ++r)
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t c = 0; c < d; ++c)
+          out.component(static_cast<int>(a))[K.point[r]] += K.values[(b * d + a) * d + c] * w.component(static_cast<int>(c))[K.point[static_cast<std::size_t>(K.column[b])]];
+  return out;
+}
+
+double largest_value(const BlockMatrix& K) {
+  double most = 0;
+  for (const double value : K.values) most = std::isnan(value) ? INFINITY : std::max(most, std::abs(value));
+  return most;
+}
+
+/// Largest difference of a block from the transpose of its mirror; infinite where the mirror is missing.
+double asymmetry(const BlockMatrix& K) {
+  double worst = 0;
+  const auto d = static_cast<std::size_t>(K.dimension);
+  for (std::size_t r = 0; r < K.rows(); ++r)
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b) {
+      const auto column = static_cast<std::size_t>(K.column[b]);
+      const auto begin = K.column.begin() + K.row_first[column], end = K.column.begin() + K.row_first[column + 1];
+      const auto found = std::lower_bound(begin, end, static_cast<std::int32_t>(r));
+      if (found == end || *found != static_cast<std::int32_t>(r)) return INFINITY;
+      const auto mirror = static_cast<std::size_t>(found - K.column.begin());
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t c = 0; c < d; ++c) worst = std::max(worst, std::abs(K.values[(b * d + a) * d + c] - K.values[(mirror * d + c) * d + a]));
+    }
+  return worst;
+}
+
+bool same_pattern(const BlockMatrix& a, const BlockMatrix& b) { return a.point == b.point && a.row_first == b.row_first && a.column == b.column; }
+
+}  // namespace
+
+TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric, with every material") {
+  for (Case c : cases()) {
+    for (const std::string& material : materials()) {
+      c.body.material = material;
+      INFO(c.label(), " ", material);
+      const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+      BodyProblem& problem = simulation->problem();
+      const Body& body = problem.body();
+      deform(body, problem.displacement(), 71, 0.02);
+      Field w = problem.make_field(problem.dimension()), expected = problem.make_field(problem.dimension());
+      Noise random(72);
+      set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
+      expected.fill(std::numeric_limits<double>::quiet_NaN());
+      REQUIRE(problem.tangent_action(problem.displacement(), w, expected).ok());
+      const BlockMatrix K = assembled(problem, problem.displacement());
+      REQUIRE(K.dimension == body.dimension());
+      REQUIRE(K.rows() == body.points());
+      CHECK(std::is_sorted(K.point.begin(), K.point.end()));
+      const Field Kw = product(problem, K, w);
+      double worst = 0;
+      for (const std::int32_t p : body.internal())
+        for (int a = 0; a < Kw.components(); ++a) worst = std::max(worst, std::abs(Kw.component(a)[p] - expected.component(a)[p]));
+      const double scale = largest(body, expected);
+      REQUIRE(scale > 0);
+      CHECK_MESSAGE(worst <= 1e-12 * scale, "K w is off by ", worst / scale);
+      CHECK_MESSAGE(asymmetry(K) <= 1e-12 * largest_value(K), "asymmetric by ", asymmetry(K) / largest_value(K));
+    }
+  }
+}
+
+TEST_CASE("kinematics: the assembled tangent is bitwise the same for one and two threads and with a known pattern") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    BodyOptions options = c.body;
+    if (options.dimension == 1) options.cells = 2000;
+    if (options.dimension == 2) options.cells = 36;
+    const auto simulation = build(scene_text(options, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    deform(problem.body(), problem.displacement(), 81, 0.02);
+    const int threads = thread_count();
+    set_thread_count(1);
+    const BlockMatrix one = assembled(problem, problem.displacement());
+    set_thread_count(2);
+    BlockMatrix two = assembled(problem, problem.displacement());
+    set_thread_count(threads);
+    CHECK(same_pattern(one, two));
+    CHECK_MESSAGE(one.values == two.values, "the values depend on the number of threads");
+    // A second state into the same matrix, and back.
+    const Field rest = problem.make_field(problem.dimension());
+    const double* values = two.values.data();
+    REQUIRE(problem.assemble_tangent(rest, two).ok());
+    CHECK(one.values != two.values);
+    REQUIRE(problem.assemble_tangent(problem.displacement(), two).ok());
+    CHECK(values == two.values.data());
+    CHECK(same_pattern(one, two));
+    CHECK_MESSAGE(one.values == two.values, "the values depend on what was there before");
+  }
+}
+
+TEST_CASE("kinematics: the size of an assembled tangent is known before") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const AssembledSize size = problem.assembled_size();
+    const BlockMatrix K = assembled(problem, problem.displacement());
+    const double ratio = static_cast<double>(size.blocks) / static_cast<double>(K.blocks());
+    if (problem.points() <= 256) CHECK(size.blocks == K.blocks());
+    CHECK(std::abs(ratio - 1) <= 0.05);
+    CHECK(size.bytes > K.values.size() * sizeof(double) * 9 / 10);
+  }
+}
+
+TEST_CASE("kinematics: assembling reports an inadmissible deformation") {
+  for (const Case& c : cases()) {
+    BodyOptions options = c.body;
+    if (options.crack || options.plane == "stress") continue;
+    INFO(c.label());
+    const auto simulation = build(scene_text(options, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    // Inside out, or (pair laws) all on one point.
+    const double factor = problem.model().has_gradients() ? -1.5 : -1.0;
+    set_field(body, problem.displacement(), [&](const Point& x) { return Point{factor * x[0], 0, 0}; });
+    if (!problem.model().has_gradients())
+      set_field(body, problem.displacement(), [&](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
+    Field f = problem.make_field(problem.dimension());
+    const EvaluationStatus expected = problem.evaluate_forces(problem.displacement(), f, nullptr);
+    BlockMatrix K;
+    const EvaluationStatus status = problem.assemble_tangent(problem.displacement(), K);
+    REQUIRE(!expected.ok());
+    CHECK(!status.ok());
+    CHECK(status.description.find("point") != std::string::npos);
+  }
+}
