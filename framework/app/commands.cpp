@@ -30,34 +30,55 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Adds a line to run.log; a full disk must not hide why the run ended.
+void log_end(RunRecorder& recorder, const std::string& line) {
+  try {
+    recorder.log(line);
+  } catch (const RunError&) {
+  }
+}
+
 void run(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
+  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
-  RunRecorder recorder(simulation, folder, !options.quiet);
-  recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), simulation.summary()));
+  RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh);
+  recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
+  if (options.resume) {
+    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().time())
+                                                          : "no checkpoint to resume from: the run starts from its initial state";
+    recorder.log(from);
+    if (!options.quiet) fmt::print("{}\n", from);
+  }
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused()) recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
   const auto running = std::chrono::steady_clock::now();
+  BodyProblem& problem = simulation.problem();
+  const std::int64_t first_step = problem.step();
   try {
     simulation.run(recorder);
   } catch (const RunError& error) {
     const std::string reason = fmt::format("{}; last good frame: {}", error.what(), recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");
-    recorder.log(fmt::format("failed: {}", reason));
+    log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
   const double spent = seconds_since(running);
-  const BodyProblem& problem = simulation.problem();
-  const auto steps = static_cast<double>(const_cast<BodyProblem&>(problem).step());
+  const auto steps = static_cast<double>(problem.step() - first_step);
   const std::string end = fmt::format("set-up {:.2f} s, run {:.2f} s, {:.0f} steps, {:.3g} ns a point and step, {} frames in {}", set_up, spent, steps,
                                       steps > 0 ? spent / steps / static_cast<double>(problem.points()) * 1e9 : 0.0, recorder.frames(), folder.string());
-  recorder.log(end);
+  log_end(recorder, end);
   if (!options.quiet) fmt::print("{}\n", end);
-  if (recorder.cancelled()) throw RunError("stopped by a signal; every finished frame was kept");
+  if (recorder.cancelled()) {
+    const std::string stopped = fmt::format("stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
+                                            problem.step(), problem.time(), recorder.frames() - 1, folder.string());
+    log_end(recorder, stopped);
+    throw RunError(stopped);
+  }
 }
 
 void check(const Options& options) {
@@ -139,6 +160,7 @@ void add_commands(CLI::App& app, Options& options) {
   CLI::App* run_command = add("run", "Run a scene", run);
   with_scene(run_command);
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
+  run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
   CLI::App* study_command = add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
