@@ -1,9 +1,12 @@
 #include "commands.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <system_error>
 
 #include "bench.hpp"
 #include "describe.hpp"
@@ -139,6 +142,18 @@ void measure(const Options& options) {
   bench(*registry, options.kinematics, options.dimension, options.cells);
 }
 
+/// Becomes the program of the contract suites, which lies beside this one.
+void contract(const Options& options) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "perikit-contract";
+  std::vector<std::string> words{program.string(), "--library=" + options.library.string()};
+  for (const auto& folder : options.plugin_path) words.push_back("--plugin-path=" + folder.string());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  execv(program.c_str(), arguments.data());
+  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
+}
+
 }  // namespace
 
 std::string version() { return PERIKIT_VERSION; }
@@ -185,6 +200,8 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
   bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
+  add("contract", "Run the contract suites on every part of a library", contract)
+      ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
   add("describe", "Describe a part: parameters, equations, source, limits", describe)->add_option("part", options.part, "KIND/NAME")->required();
 }

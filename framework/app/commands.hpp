@@ -10,7 +10,7 @@
 namespace perikit::app {
 
 struct Options {
-  std::filesystem::path scene, output;
+  std::filesystem::path scene, output, library;
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0;
