@@ -10,6 +10,7 @@
 
 #include "bench.hpp"
 #include "describe.hpp"
+#include "new_project.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -142,6 +143,11 @@ void measure(const Options& options) {
   bench(*registry, options.kinematics, options.dimension, options.cells);
 }
 
+void start_project(const Options& options) {
+  const auto registry = open_registry(options);
+  fmt::print("{}", new_project(*registry, options.kind, options.part));
+}
+
 /// Becomes the program of the contract suites, which lies beside this one.
 void contract(const Options& options) {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "perikit-contract";
@@ -200,6 +206,9 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
   bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
+  CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
+  new_command->add_option("kind", options.kind, "Kind of the part: material, kinematics, ...")->required();
+  new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   add("contract", "Run the contract suites on every part of a library", contract)
       ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
