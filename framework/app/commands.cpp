@@ -124,7 +124,9 @@ void list(const Options& options) {
 
 void describe(const Options& options) {
   const auto registry = open_registry(options);
-  fmt::print("{}", describe_part(*registry, options.part));
+  if (!options.markdown && options.part.empty()) throw InputError("name what to describe: KIND/NAME, scene or scene/SECTION; --markdown describes everything");
+  if (options.markdown && !options.part.empty()) throw InputError("--markdown describes everything: name no part");
+  fmt::print("{}", options.markdown ? reference_page(*registry) : describe_part(*registry, options.part));
 }
 
 void draw(const Options& options) {
@@ -212,7 +214,9 @@ void add_commands(CLI::App& app, Options& options) {
   add("contract", "Run the contract suites on every part of a library", contract)
       ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
-  add("describe", "Describe a part: parameters, equations, source, limits", describe)->add_option("part", options.part, "KIND/NAME")->required();
+  CLI::App* describe_command = add("describe", "Describe a part, or the keys of the scene: parameters, equations, source, limits", describe);
+  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output");
+  describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }
 
 }  // namespace perikit::app

@@ -14,7 +14,7 @@ struct Options {
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0;
-  bool explain = false, quiet = false, trust = false, resume = false;
+  bool explain = false, quiet = false, trust = false, resume = false, markdown = false;
   std::string kind, part;
   PlotOptions plot;
   std::int64_t frame = -1;

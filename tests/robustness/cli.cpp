@@ -80,6 +80,31 @@ TEST_CASE("cli: list and describe show every part") {
   for (const std::string word : {"shear_modulus", "[Pa]", "density", "kg/m^3", "volumetric", "Default"}) CHECK_MESSAGE(contains(rubber, word), "no ", word);
 }
 
+TEST_CASE("cli: describe shows the keys of the scene and the whole reference") {
+  const Desk desk;
+  CHECK(contains(desk.perikit("describe scene/output").out, "checkpoint_every"));
+  CHECK(!contains(desk.perikit("describe scene/output").out, "horizon_ratio"));
+  CHECK(contains(desk.perikit("describe scene").out, "horizon_ratio"));
+  const Result unknown = desk.perikit("describe scene/ouput");
+  CHECK(unknown.status == 2);
+  CHECK(contains(unknown.err, "did you mean 'output'"));
+  CHECK(desk.perikit("describe").status == 2);
+  const std::string page = desk.perikit("describe --markdown").out;
+  for (const std::string& line : lines(desk.perikit("list material").out)) CHECK(contains(page, "### material/" + line.substr(0, line.find(' ')) + "\n"));
+  CHECK(contains(page, "| `checkpoint_every` |"));
+}
+
+TEST_CASE("cli: libraries that a scene lists are opened with --trust alone") {
+  const Desk desk(replaced(replaced(plate, "format = 1", fmt::format("format = 1\nplugins = [\"{}/company.so\"]", PERIKIT_LIES)),
+                           "horizon_ratio = 2.015", "horizon_ratio = 2.015\ninfluence = \"company\""));
+  const Result refused = desk.perikit("run scene.toml --quiet -o out");
+  CHECK(refused.status == 2);
+  CHECK_MESSAGE(contains(refused.err, "opened only with --trust"), refused.err);
+  CHECK(!fs::exists(desk.path("out")));
+  const Result run = desk.perikit("run scene.toml --quiet -o out --trust");
+  CHECK_MESSAGE(run.status == 0, run.err);
+}
+
 TEST_CASE("cli: check prints a scene that is the same when read again") {
   const Desk desk;
   const Result first = desk.perikit("check scene.toml --set integrator.end_time=0.5");
