@@ -1,12 +1,16 @@
 #include "commands.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <system_error>
 
 #include "bench.hpp"
 #include "describe.hpp"
+#include "new_project.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -30,34 +34,55 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Adds a line to run.log; a full disk must not hide why the run ended.
+void log_end(RunRecorder& recorder, const std::string& line) {
+  try {
+    recorder.log(line);
+  } catch (const RunError&) {
+  }
+}
+
 void run(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
+  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
-  RunRecorder recorder(simulation, folder, !options.quiet);
-  recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), simulation.summary()));
+  RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh);
+  recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
+  if (options.resume) {
+    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().time())
+                                                          : "no checkpoint to resume from: the run starts from its initial state";
+    recorder.log(from);
+    if (!options.quiet) fmt::print("{}\n", from);
+  }
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused()) recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
   const auto running = std::chrono::steady_clock::now();
+  BodyProblem& problem = simulation.problem();
+  const std::int64_t first_step = problem.step();
   try {
     simulation.run(recorder);
   } catch (const RunError& error) {
     const std::string reason = fmt::format("{}; last good frame: {}", error.what(), recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");
-    recorder.log(fmt::format("failed: {}", reason));
+    log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
   const double spent = seconds_since(running);
-  const BodyProblem& problem = simulation.problem();
-  const auto steps = static_cast<double>(const_cast<BodyProblem&>(problem).step());
+  const auto steps = static_cast<double>(problem.step() - first_step);
   const std::string end = fmt::format("set-up {:.2f} s, run {:.2f} s, {:.0f} steps, {:.3g} ns a point and step, {} frames in {}", set_up, spent, steps,
                                       steps > 0 ? spent / steps / static_cast<double>(problem.points()) * 1e9 : 0.0, recorder.frames(), folder.string());
-  recorder.log(end);
+  log_end(recorder, end);
   if (!options.quiet) fmt::print("{}\n", end);
-  if (recorder.cancelled()) throw RunError("stopped by a signal; every finished frame was kept");
+  if (recorder.cancelled()) {
+    const std::string stopped = fmt::format("stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
+                                            problem.step(), problem.time(), recorder.frames() - 1, folder.string());
+    log_end(recorder, stopped);
+    throw RunError(stopped);
+  }
 }
 
 void check(const Options& options) {
@@ -99,7 +124,9 @@ void list(const Options& options) {
 
 void describe(const Options& options) {
   const auto registry = open_registry(options);
-  fmt::print("{}", describe_part(*registry, options.part));
+  if (!options.markdown && options.part.empty()) throw InputError("name what to describe: KIND/NAME, scene or scene/SECTION; --markdown describes everything");
+  if (options.markdown && !options.part.empty()) throw InputError("--markdown describes everything: name no part");
+  fmt::print("{}", options.markdown ? reference_page(*registry) : describe_part(*registry, options.part));
 }
 
 void draw(const Options& options) {
@@ -116,6 +143,23 @@ void measure(const Options& options) {
   const auto registry = open_registry(options);
   if (options.threads > 0) set_thread_count(options.threads);
   bench(*registry, options.kinematics, options.dimension, options.cells);
+}
+
+void start_project(const Options& options) {
+  const auto registry = open_registry(options);
+  fmt::print("{}", new_project(*registry, options.kind, options.part));
+}
+
+/// Becomes the program of the contract suites, which lies beside this one.
+void contract(const Options& options) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "perikit-contract";
+  std::vector<std::string> words{program.string(), "--library=" + options.library.string()};
+  for (const auto& folder : options.plugin_path) words.push_back("--plugin-path=" + folder.string());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  execv(program.c_str(), arguments.data());
+  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace
@@ -139,6 +183,7 @@ void add_commands(CLI::App& app, Options& options) {
   CLI::App* run_command = add("run", "Run a scene", run);
   with_scene(run_command);
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
+  run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
   CLI::App* study_command = add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
@@ -163,8 +208,15 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
   bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
+  CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
+  new_command->add_option("kind", options.kind, "Kind of the part: material, kinematics, ...")->required();
+  new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
+  add("contract", "Run the contract suites on every part of a library", contract)
+      ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
-  add("describe", "Describe a part: parameters, equations, source, limits", describe)->add_option("part", options.part, "KIND/NAME")->required();
+  CLI::App* describe_command = add("describe", "Describe a part, or the keys of the scene: parameters, equations, source, limits", describe);
+  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output");
+  describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }
 
 }  // namespace perikit::app

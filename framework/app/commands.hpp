@@ -10,11 +10,11 @@
 namespace perikit::app {
 
 struct Options {
-  std::filesystem::path scene, output;
+  std::filesystem::path scene, output, library;
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0;
-  bool explain = false, quiet = false, trust = false;
+  bool explain = false, quiet = false, trust = false, resume = false, markdown = false;
   std::string kind, part;
   PlotOptions plot;
   std::int64_t frame = -1;

@@ -4,6 +4,8 @@
 
 #include <cstdlib>
 
+#include "perikit/scene/scene.hpp"
+
 namespace perikit::app {
 
 namespace {
@@ -29,7 +31,35 @@ void indent(std::string& out, const std::string& text) {
   }
 }
 
+std::string parameter_lines(const ParameterTable& table) {
+  std::string out;
+  for (const Parameter& p : table.parameters()) {
+    const std::string range = allowed(p);
+    out += fmt::format("  {:<20} [{}] {}{}{}\n", p.name, p.unit.empty() ? "-" : p.unit, p.text,
+                       p.required ? " Required." : p.default_text.empty() ? "" : fmt::format(" Default {}.", p.default_text),
+                       range.empty() ? "" : fmt::format(" Allowed: {}.", range));
+  }
+  for (const ParameterGroup& g : table.groups()) out += "  " + group_line(g) + "\n";
+  return out;
+}
+
+/// The keys of the scene, or of one of its sections.
+std::string describe_scene(const std::string& section) {
+  std::string out;
+  std::vector<std::string> known;
+  for (const auto& [name, table] : scene_sections()) {
+    known.push_back(name.empty() ? "top" : name);
+    if (section.empty() || section == known.back()) out += fmt::format("[{}]\n{}\n", name.empty() ? "top level" : name, parameter_lines(table));
+  }
+  if (out.empty()) throw InputError(fmt::format("unknown section '{}'{}; known: {}", section, did_you_mean(section, known), fmt::join(known, ", ")));
+  return out;
+}
+
 }  // namespace
+
+std::string group_line(const ParameterGroup& group) {
+  return fmt::format("{} {} of: {}", group.count >= 0 ? "exactly" : "at most", std::abs(group.count), fmt::join(group.names, ", "));
+}
 
 std::string list_parts(Registry& registry, const std::string& kind) {
   std::string out;
@@ -47,7 +77,8 @@ std::string list_parts(Registry& registry, const std::string& kind) {
 
 std::string describe_part(Registry& registry, const std::string& part) {
   const std::size_t slash = part.find('/');
-  if (slash == std::string::npos) throw InputError(fmt::format("'{}': expected KIND/NAME, e.g. material/neo_hookean", part));
+  if (part.substr(0, slash) == "scene") return describe_scene(slash == std::string::npos ? "" : part.substr(slash + 1));
+  if (slash == std::string::npos) throw InputError(fmt::format("'{}': expected KIND/NAME, e.g. material/neo_hookean, or scene/SECTION, e.g. scene/output", part));
   const Kind kind = parse_kind(part.substr(0, slash));
   const PartDescription& d = registry.describe(kind, part.substr(slash + 1));
   std::string out = fmt::format("{}/{}: {}\n", name(kind), d.name, d.summary);
@@ -60,15 +91,7 @@ std::string describe_part(Registry& registry, const std::string& part) {
   section("Source", d.source);
   section("Limits", d.limits);
   if (!d.parameters.parameters().empty()) out += "\nParameters\n";
-  for (const Parameter& p : d.parameters.parameters()) {
-    const std::string range = allowed(p);
-    out += fmt::format("  {:<20} [{}] {}{}{}\n", p.name, p.unit.empty() ? "-" : p.unit, p.text,
-                       p.required ? " Required." : p.default_text.empty() ? "" : fmt::format(" Default {}.", p.default_text),
-                       range.empty() ? "" : fmt::format(" Allowed: {}.", range));
-  }
-  for (const ParameterGroup& g : d.parameters.groups()) {
-    out += fmt::format("  {} {} of: {}\n", g.count >= 0 ? "exactly" : "at most", std::abs(g.count), fmt::join(g.names, ", "));
-  }
+  out += parameter_lines(d.parameters);
   out += "\nExample\n";
   for (const std::string& example : d.examples) {
     std::string table = fmt::format("[{}]\ntype = \"{}\"\n{}", name(kind), d.name, example);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdlib>
@@ -13,6 +15,12 @@
 namespace {
 
 enum Exit { done = 0, run_failed = 1, input_refused = 2 };
+
+/// The first signal ends the run after its step; a second one ends the program at once.
+void stop(int signal) {
+  perikit::request_stop();
+  std::signal(signal, SIG_DFL);
+}
 
 }  // namespace
 
@@ -41,8 +49,9 @@ int main(int argc, char** argv) {
     app.exit(e);
     return input_refused;
   }
-  std::signal(SIGINT, [](int) { request_stop(); });
-  std::signal(SIGTERM, [](int) { request_stop(); });
+  std::signal(SIGINT, stop);
+  std::signal(SIGTERM, stop);
+  std::signal(SIGXFSZ, SIG_IGN);   // a file at its size limit is then an error of the write, with a message
   try {
     options.command(options);
     return done;

@@ -1,30 +1,56 @@
-/// Runs the contract suites: perikit_contract --parts=kinematics/baqp,material/hencky (default: all known parts).
+/// Runs the contract suites.
+///   perikit-contract --parts=kinematics/baqp,material/hencky   known parts (default: all), in this process
+///   perikit-contract --library=FILE.so                         every part of a library, each in a process of its own
+/// --plugin-path=FOLDER (repeatable); whatever else is doctest's. Exit status: 0 kept, 1 broken, 2 refused.
 
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <cstdlib>
-#include <cstring>
+#include <string_view>
 
 #include "tests/contract/fixture.hpp"
+#include "tests/contract/library.hpp"
+
+namespace {
+
+using namespace perikit;
+
+struct Arguments {
+  std::string parts;
+  std::filesystem::path library;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+Arguments parse(int argc, char** argv) {
+  Arguments arguments;
+  for (int k = 1; k < argc; ++k) {
+    const std::string_view word = argv[k];
+    const auto value = [&](std::string_view option) { return word.starts_with(option) ? word.substr(option.size()) : std::string_view(); };
+    if (const auto parts = value("--parts="); !parts.empty()) arguments.parts = std::string(parts) + ",";
+    if (const auto library = value("--library="); !library.empty()) arguments.library = library;
+    if (const auto folder = value("--plugin-path="); !folder.empty()) arguments.plugin_path.emplace_back(folder);
+  }
+  return arguments;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-  using namespace perikit;
   contract::Subject& subject = contract::subject();
+  const Arguments arguments = parse(argc, argv);
   try {
-    for (const auto& folder : Registry::standard_search_path({PERIKIT_PLUGIN_FOLDER})) subject.registry.add_folder(folder);
-    std::string wanted;
-    for (int k = 1; k < argc; ++k) {
-      if (std::strncmp(argv[k], "--parts=", 8) == 0) wanted = std::string(argv[k] + 8) + ",";
-    }
+    // First: a library that replaces a known part is the one to test.
+    if (!arguments.library.empty()) subject.registry.open(arguments.library);
+    for (const auto& folder : Registry::standard_search_path(arguments.plugin_path)) subject.registry.add_folder(folder);
+    if (!arguments.library.empty()) return contract::run_library(arguments.library, argc, argv);
     for (const Kind kind : all_kinds) {
       for (const std::string& part : subject.registry.names(kind)) {
-        if (wanted.empty() || wanted.find(fmt::format("{}/{},", name(kind), part)) != std::string::npos) subject.parts.emplace_back(kind, part);
+        if (arguments.parts.empty() || arguments.parts.find(fmt::format("{}/{},", name(kind), part)) != std::string::npos) subject.parts.emplace_back(kind, part);
       }
     }
     if (subject.parts.empty()) {
-      fmt::print(stderr, "no such part: {}\n", wanted);
+      fmt::print(stderr, "no such part: {}\n", arguments.parts);
       return 2;
     }
   } catch (const InputError& error) {

@@ -40,9 +40,7 @@ std::vector<double> constants_of(const Material& material, const Example& exampl
 
 std::string label(const Example& example) { return fmt::format("{} ({})", example.part, example.table); }
 
-}  // namespace
-
-TEST_CASE("material: the law keeps its contract in every space") {
+void in_every_space(void (MaterialContract::*identity)()) {
   for (const Example& example : examples(Kind::material)) {
     INFO(label(example));
     const auto material = subject().registry.material(*values_of(example));
@@ -58,9 +56,28 @@ TEST_CASE("material: the law keeps its contract in every space") {
                     " becomes ", scaled[k], " where all moduli are multiplied by ", factor);
       options.moduli.push_back(modulus);
     }
-    check_material(*material, constants, options);
+    check_material(*material, constants, options, identity);
   }
 }
+
+}  // namespace
+
+TEST_CASE("material: no energy and no stress at rest, and linear elasticity for small strains") {
+  in_every_space(&MaterialContract::reference_state);
+  in_every_space(&MaterialContract::small_strains);
+}
+
+TEST_CASE("material: stress is the derivative of the energy, the tangent that of the stress") { in_every_space(&MaterialContract::derivatives); }
+
+TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") { in_every_space(&MaterialContract::tangent_action); }
+
+TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
+
+TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") { in_every_space(&MaterialContract::rotations); }
+
+TEST_CASE("material: stress, energy and tangent have the unit of the moduli") { in_every_space(&MaterialContract::units); }
+
+TEST_CASE("material: an inadmissible deformation is named, and its neighbours do not notice") { in_every_space(&MaterialContract::inadmissible); }
 
 TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {
   for (const Example& example : examples(Kind::material)) {

@@ -1,174 +1,18 @@
 /// The program as a user meets it: exit statuses, messages, the files of a run, and what is left when a run is killed or fails.
 
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <hdf5.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <csignal>
-#include <fstream>
 #include <set>
-#include <sstream>
 #include <thread>
 
 #include "perikit/output/recorder.hpp"
-#include "unit/temporary_folder.hpp"
+#include "robustness/desk.hpp"
 
-namespace fs = std::filesystem;
-
-namespace {
-
-constexpr std::size_t points = 8 * 5;
-
-/// A plate that is pulled for 1 s in steps of 0.02 s.
-const std::string plate = R"(format = 1
-title = "Pulled plate"
-
-[body]
-dimension = 2
-plane = "strain"
-[body.lattice]
-spacing = 1.0
-lower = [0, 0]
-upper = [8, 5]
-
-[sets]
-left = "x < 2"
-right = "x > 6"
-
-[family]
-horizon_ratio = 2.015
-
-[kinematics]
-type = "baqp"
-
-[material]
-type = "neo_hookean"
-density = 1.0
-shear_modulus = 0.8
-bulk_modulus = 2.0
-
-[[boundary]]
-set = "left"
-displacement = [0, 0]
-[[boundary]]
-set = "right"
-velocity = [0.1, "free"]
-
-[integrator]
-type = "verlet"
-time_step = 0.02
-end_time = 1.0
-
-[output]
-frames = 5
-history_every = 1
-history = [ { name = "pull", set = "right", quantity = "reaction", component = "x", reduce = "sum" } ]
-)";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
-}
-
-std::string read(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-struct Result {
-  int status;
-  std::string out, err;
-};
-
-/// A folder with a scene, and the program run in it.
-class Desk {
- public:
-  explicit Desk(const std::string& scene = plate) { write("scene.toml", scene); }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
-  fs::path path(const std::string& name) const { return folder_.path / name; }
-  std::string text(const std::string& name) const { return read(path(name)); }
-
-  Result perikit(const std::string& arguments) const {
-    const std::string command = fmt::format("cd '{}' && '{}' {} > stdout.txt 2> stderr.txt", folder_.path.string(), PERIKIT_PROGRAM, arguments);
-    const int status = std::system(command.c_str());
-    REQUIRE(WIFEXITED(status));
-    return {WEXITSTATUS(status), text("stdout.txt"), text("stderr.txt")};
-  }
-
-  /// Starts the program and returns its process.
-  pid_t start(const std::vector<std::string>& arguments) const {
-    const pid_t child = fork();
-    if (child != 0) return child;
-    std::vector<char*> words{const_cast<char*>(PERIKIT_PROGRAM)};
-    for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
-    words.push_back(nullptr);
-    const int null = open("/dev/null", O_WRONLY);
-    dup2(null, STDOUT_FILENO);
-    dup2(null, STDERR_FILENO);
-    if (chdir(folder_.path.c_str()) == 0) execv(PERIKIT_PROGRAM, words.data());
-    _exit(127);
-  }
-
- private:
-  TemporaryFolder folder_;
-};
-
-/// Time, step and the number of values of `displacement` of one frame file; -1 values where it cannot be read.
-struct Frame {
-  double time = NAN;
-  std::int64_t step = -1;
-  hssize_t values = -1;
-};
-
-Frame read_frame(const fs::path& file, const std::string& group = "/") {
-  Frame frame;
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  const hid_t handle = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (handle < 0) return frame;
-  const auto attribute = [&](const char* name, hid_t type, void* to) {
-    const hid_t a = H5Aopen_by_name(handle, group.c_str(), name, H5P_DEFAULT, H5P_DEFAULT);
-    if (a < 0) return;
-    H5Aread(a, type, to);
-    H5Aclose(a);
-  };
-  attribute("time", H5T_NATIVE_DOUBLE, &frame.time);
-  attribute("step", H5T_NATIVE_INT64, &frame.step);
-  if (const hid_t set = H5Dopen2(handle, (group + "/displacement").c_str(), H5P_DEFAULT); set >= 0) {
-    const hid_t space = H5Dget_space(set);
-    const hssize_t values = H5Sget_simple_extent_npoints(space);
-    std::vector<double> data(static_cast<std::size_t>(values));
-    if (H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()) >= 0) frame.values = values;
-    H5Sclose(space);
-    H5Dclose(set);
-  }
-  H5Fclose(handle);
-  return frame;
-}
-
-std::vector<Frame> read_frames(const fs::path& folder) {
-  std::vector<Frame> frames;
-  for (std::size_t k = 0; fs::exists(folder / fmt::format("frames/{:08}.h5", k)); ++k) frames.push_back(read_frame(folder / fmt::format("frames/{:08}.h5", k)));
-  return frames;
-}
-
-std::vector<std::string> lines(const std::string& text) {
-  std::vector<std::string> all;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) all.push_back(line);
-  return all;
-}
-
-}  // namespace
+using namespace perikit::test;
 
 TEST_CASE("cli: exit status 0 for what is done, 2 for what is refused") {
   const Desk desk;
@@ -234,6 +78,31 @@ TEST_CASE("cli: list and describe show every part") {
   CHECK(parts >= 10);
   const std::string rubber = desk.perikit("describe material/neo_hookean").out;
   for (const std::string word : {"shear_modulus", "[Pa]", "density", "kg/m^3", "volumetric", "Default"}) CHECK_MESSAGE(contains(rubber, word), "no ", word);
+}
+
+TEST_CASE("cli: describe shows the keys of the scene and the whole reference") {
+  const Desk desk;
+  CHECK(contains(desk.perikit("describe scene/output").out, "checkpoint_every"));
+  CHECK(!contains(desk.perikit("describe scene/output").out, "horizon_ratio"));
+  CHECK(contains(desk.perikit("describe scene").out, "horizon_ratio"));
+  const Result unknown = desk.perikit("describe scene/ouput");
+  CHECK(unknown.status == 2);
+  CHECK(contains(unknown.err, "did you mean 'output'"));
+  CHECK(desk.perikit("describe").status == 2);
+  const std::string page = desk.perikit("describe --markdown").out;
+  for (const std::string& line : lines(desk.perikit("list material").out)) CHECK(contains(page, "### material/" + line.substr(0, line.find(' ')) + "\n"));
+  CHECK(contains(page, "| `checkpoint_every` |"));
+}
+
+TEST_CASE("cli: libraries that a scene lists are opened with --trust alone") {
+  const Desk desk(replaced(replaced(plate, "format = 1", fmt::format("format = 1\nplugins = [\"{}/company.so\"]", PERIKIT_LIES)),
+                           "horizon_ratio = 2.015", "horizon_ratio = 2.015\ninfluence = \"company\""));
+  const Result refused = desk.perikit("run scene.toml --quiet -o out");
+  CHECK(refused.status == 2);
+  CHECK_MESSAGE(contains(refused.err, "opened only with --trust"), refused.err);
+  CHECK(!fs::exists(desk.path("out")));
+  const Result run = desk.perikit("run scene.toml --quiet -o out --trust");
+  CHECK_MESSAGE(run.status == 0, run.err);
 }
 
 TEST_CASE("cli: check prints a scene that is the same when read again") {

@@ -11,6 +11,13 @@ namespace perikit {
 /// Replaces `file` by `bytes`. Throws RunError with the file's name and the system's reason; an earlier `file` is then untouched.
 void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes);
 
+/// Creates a folder with those above it; removes a file if it is there. Throw RunError.
+void make_folder(const std::filesystem::path& folder);
+void remove_file(const std::filesystem::path& file);
+
+/// The whole file; empty where it cannot be read.
+std::string read_text(const std::filesystem::path& file);
+
 /// The name under which `file` is written before it is renamed.
 std::filesystem::path temporary_name(const std::filesystem::path& file);
 

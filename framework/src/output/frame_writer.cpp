@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 #include <system_error>
 
@@ -15,19 +16,6 @@ namespace perikit {
 namespace fs = std::filesystem;
 
 namespace {
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!error && !fs::is_directory(folder, error) && !error) error = std::make_error_code(std::errc::not_a_directory);
-  if (error) throw_system_error(folder, "cannot create the folder", error.value());
-}
-
-void remove_file(const fs::path& file) {
-  std::error_code error;
-  fs::remove(file, error);
-  if (error) throw_system_error(file, "cannot remove", error.value());
-}
 
 /// Frames from `first_frame` on, and temporaries that a killed run left behind.
 void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
@@ -151,6 +139,8 @@ void FrameWriter::write(double time, std::int64_t step, std::span<const OutputFi
     }
     store_atomically(file, image.bytes());
   }
+  // In the order in which a resumed run finds them.
+  std::ranges::sort(listed, {}, &XdmfField::name);
   self.list(index, time, listed);
   self.store_results();
   self.store_sidecar();

@@ -88,6 +88,10 @@ void Image::dataset(const std::string& path, std::span<const std::int64_t> value
   write_dataset(file_.get(), path, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()});
 }
 
+void Image::dataset(const std::string& path, std::span<const std::byte> values) {
+  write_dataset(file_.get(), path, H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), {values.size()});
+}
+
 void Image::group(const std::string& path) {
   checked(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose, path);
 }
@@ -188,6 +192,15 @@ Source::Array Source::read(const std::string& path) const {
   if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
     refuse(path, "cannot be read");
   return array;
+}
+
+std::vector<std::byte> Source::read_bytes(const std::string& path) const {
+  std::vector<std::byte> bytes(shape(path)[0]);
+  const Handle data = dataset(path);
+  const Handle type(H5Dget_type(data.get()), H5Tclose);
+  if (H5Tequal(type.get(), H5T_STD_U8LE) <= 0 || shape(path).size() != 1) refuse(path, "must be a flat dataset of bytes");
+  if (H5Dread(data.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0) refuse(path, "cannot be read");
+  return bytes;
 }
 
 Handle Source::attribute(const std::string& group, const std::string& name) const {

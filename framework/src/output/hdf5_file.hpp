@@ -38,6 +38,7 @@ class Image {
   /// `values` as a dataset of shape (n) for width 1, else (n, width).
   void dataset(const std::string& path, std::span<const double> values, int width = 1);
   void dataset(const std::string& path, std::span<const std::int64_t> values);
+  void dataset(const std::string& path, std::span<const std::byte> values);
   void group(const std::string& path);
   /// Attributes of the root group; text is stored as UTF-8 of variable length, which has no 64 kB limit.
   void attribute(const std::string& name, double value);
@@ -69,6 +70,8 @@ class Source {
   bool contains(const std::string& path) const;
   /// Any numeric dataset of one or two dimensions, converted to double.
   Array read(const std::string& path) const;
+  /// A flat dataset that was written from bytes.
+  std::vector<std::byte> read_bytes(const std::string& path) const;
   std::vector<std::size_t> shape(const std::string& path) const;
   double real(const std::string& group, const std::string& attribute) const;
   std::int64_t integer(const std::string& group, const std::string& attribute) const;

@@ -63,6 +63,7 @@ struct HistoryWriter::Implementation {
   std::vector<std::string> columns;
   Descriptor descriptor;
   off_t size = 0;
+  std::int64_t rows = 0;
 };
 
 HistoryWriter::HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows)
@@ -73,7 +74,7 @@ HistoryWriter::HistoryWriter(const std::filesystem::path& file, std::vector<std:
   write_file_atomically(file, text);
   Descriptor descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   if (!descriptor) throw_system_error(file, "cannot write", errno);
-  *implementation_ = {file, std::move(columns), std::move(descriptor), static_cast<off_t>(text.size())};
+  *implementation_ = {file, std::move(columns), std::move(descriptor), static_cast<off_t>(text.size()), std::max<std::int64_t>(keep_rows, 0)};
 }
 
 HistoryWriter::~HistoryWriter() {
@@ -98,6 +99,15 @@ void HistoryWriter::row(std::span<const double> values) {
     throw_system_error(self.file, "cannot write", code);
   }
   self.size += static_cast<off_t>(line.size());
+  ++self.rows;
+}
+
+void HistoryWriter::sync() {
+  if (::fsync(implementation_->descriptor.get()) != 0) throw_system_error(implementation_->file, "cannot write", errno);
+}
+
+std::int64_t HistoryWriter::rows() const noexcept {
+  return implementation_->rows;
 }
 
 }  // namespace perikit

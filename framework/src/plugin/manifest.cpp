@@ -8,8 +8,10 @@
 #include <atomic>
 #include <fstream>
 #include <random>
+#include <span>
 #include <toml++/toml.h>
 
+#include "core/fingerprint.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "plugin/registrar.hpp"
 
@@ -25,14 +27,12 @@ constexpr std::uintmax_t largest_manifest = 1 << 20;  // [bytes]: far more parts
 std::string checksum(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::array<char, 1 << 16> buffer;
-  std::uint64_t hash = 0xcbf29ce484222325u;
+  Fingerprint fingerprint;
   do {
     in.read(buffer.data(), buffer.size());
-    for (std::streamsize i = 0; i < in.gcount(); ++i) {
-      hash = (hash ^ static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)])) * 0x100000001b3u;
-    }
+    fingerprint.add(std::span<const char>(buffer.data(), static_cast<std::size_t>(in.gcount())));
   } while (in);
-  return fmt::format("{:016x}", hash);
+  return fingerprint.text();
 }
 
 SourcePosition place(const toml::node& node, const fs::path& file) {

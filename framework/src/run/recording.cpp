@@ -6,8 +6,11 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
+#include "output/atomic_file.hpp"
 #include "perikit/run/simulation.hpp"
+#include "run/checkpoint.hpp"
 
 namespace perikit {
 
@@ -16,6 +19,8 @@ namespace {
 std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
+
+bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.body();
@@ -48,7 +53,7 @@ std::vector<std::string> history_columns(const Scene& scene) {
   return columns;
 }
 
-RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress)
+RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start)
     : simulation_(simulation), folder_(std::move(folder)), show_progress_(show_progress),
       fields_(simulation.problem(), simulation.dynamic()), start_(std::chrono::steady_clock::now()), shown_(start_) {
   const Scene& scene = simulation.scene();
@@ -61,10 +66,34 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   }
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
-  writer_ = std::make_unique<FrameWriter>(folder_, reference_of(simulation.problem()), RunAttributes{PERIKIT_VERSION, scene.title, scene.text});
-  write_file_atomically(folder_ / "scene.toml", scene.resolved);
   columns_ = perikit::history_columns(scene);
-  history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_);
+  const ReferenceData reference = reference_of(simulation.problem());
+  body_ = body_fingerprint(reference);
+  make_folder(folder_);
+  remove_file(temporary_name(checkpoint_file(folder_)));   // of a run that was killed
+  const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
+  if (earlier) start_from_checkpoint();
+  else start_fresh(start);
+  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
+}
+
+void RunRecorder::start_fresh(RunStart start) {
+  const Scene& scene = simulation_.scene();
+  // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
+  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml")) check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
+  // Before any other file: no checkpoint may stand beside the frames of another run.
+  remove_file(checkpoint_file(folder_));
+  write_file_atomically(folder_ / "scene.toml", scene.resolved);
+}
+
+void RunRecorder::start_from_checkpoint() {
+  const Checkpoint checkpoint = read_checkpoint(folder_);
+  check_checkpoint(checkpoint, simulation_.scene(), body_, folder_);
+  simulation_.problem().restore(checkpoint.state);
+  done_ = checkpoint.output;
+  resumed_step_ = checkpoint.step;
+  log_text_ = read_text(folder_ / "run.log");
 }
 
 RunRecorder::~RunRecorder() {
@@ -80,45 +109,65 @@ void RunRecorder::log(std::string_view message) {
 bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
-  return (steps_expected_ > 0 && step >= steps_expected_) || (end_time_ > 0 && time >= end_time_ * (1 - 1e-12));
+  return (done_.steps_expected > 0 && step >= done_.steps_expected) || (done_.end_time > 0 && time >= done_.end_time * (1 - 1e-12));
 }
 
 bool RunRecorder::frame_due(std::int64_t step, double time) const {
   const OutputDescription& output = simulation_.scene().output;
-  if (!frame_times_.empty()) return next_time_ < frame_times_.size() && time >= frame_times_[next_time_] - 1e-9 * std::abs(frame_times_[next_time_]);
+  const auto next = static_cast<std::size_t>(done_.next_time);
+  if (!frame_times_.empty()) return next < frame_times_.size() && reached(time, frame_times_[next]);
   if (output.every) return step % *output.every == 0 || last(step, time);
   if (step == 0) return true;
-  if (end_time_ <= 0) return true;
+  if (done_.end_time <= 0) return true;
   const auto frames = static_cast<double>(output.frames.value_or(default_frames));
-  return time >= static_cast<double>(writer_->frames()) * end_time_ / frames * (1 - 1e-9) || last(step, time);
+  return time >= static_cast<double>(done_.frames) * done_.end_time / frames * (1 - 1e-9) || last(step, time);
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || history_every_ <= 1 || step % history_every_ == 0 || (steps_expected_ > 0 && step >= steps_expected_);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
-bool RunRecorder::wants_sample(std::int64_t step, double time) { return frame_due(step, time) || history_due(step); }
+bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
+  const std::int64_t every = simulation_.scene().output.checkpoint_every;
+  return every > 0 && step > 0 && (step % every == 0 || last(step, time));
+}
+
+bool RunRecorder::wants_sample(std::int64_t step, double time) {
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
+  // run after the next step.
+  stopping_ = stop_requested();
+  return stopping_ || frame_due(step, time) || history_due(step);
+}
 
 void RunRecorder::step_done(const StepReport& report) {
-  end_time_ = report.end_time;
-  steps_expected_ = report.steps_expected;
-  if (history_every_ == 0) {
+  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
+  done_.end_time = report.end_time;
+  done_.steps_expected = report.steps_expected;
+  if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    history_every_ = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
+    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
-  // Read once a step: a signal that comes while this step is written ends the run after the next one, whose state is then kept.
-  stopping_ = stop_requested();
-  if (history_due(report.step) || stopping_) write_history(report);
-  if (frame_due(report.step, report.time) || stopping_) write_frame(report);
+  // What only the stop asks for is written but not counted: the run that goes on writes what the run without a stop had written.
+  const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
+  if (row || stopping_) write_history(report);
+  if (frame || stopping_) write_frame(report);
+  done_.history_rows += row;
+  done_.frames += frame;
+  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
+  if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   progress(report);
+}
+
+void RunRecorder::keep_checkpoint(const StepReport& report) {
+  history_->sync();   // frames are on the disk already
+  write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, done_, report.step, report.time, simulation_.problem().snapshot()});
 }
 
 void RunRecorder::write_frame(const StepReport& report) {
   std::vector<OutputField> fields;
   for (const std::string& name : frame_fields_) fields.push_back(fields_.get(name));
   writer_->write(report.time, report.step, fields);
-  while (next_time_ < frame_times_.size() && report.time >= frame_times_[next_time_] - 1e-9 * std::abs(frame_times_[next_time_])) ++next_time_;
 }
 
 double RunRecorder::reduce(const HistoryDescription& record) {

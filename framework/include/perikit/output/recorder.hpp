@@ -56,6 +56,9 @@ class HistoryWriter {
   /// One value per column. Throws RunError naming the column where a value is not finite (the row is not written), or where the disk
   /// is full (the file then ends with the row before).
   void row(std::span<const double> values);
+  /// The rows so far survive a machine that stops. Throws RunError.
+  void sync();
+  std::int64_t rows() const noexcept;
 
  private:
   struct Implementation;

@@ -34,7 +34,8 @@ struct StepReport {
 class Observer {
  public:
   virtual ~Observer() = default;
-  /// True when the state after this step will be sampled: energies and work must be up to date when step_done is called.
+  /// Asked once before every step_done: true when the state after this step will be sampled, so that energies, work and velocity
+  /// must be up to date when step_done is called.
   virtual bool wants_sample(std::int64_t step, double time) = 0;
   /// Called after every step (and once with step 0). May write frames and history.
   virtual void step_done(const StepReport& report) = 0;
@@ -136,7 +137,7 @@ class Integrator {
   virtual IntegratorTraits traits() const noexcept = 0;
   /// What `perikit check` prints: "12 000 steps of 1.2e-7 s". May evaluate the tangent.
   virtual std::string plan(Problem&) { return {}; }
-  /// Runs from the problem's present state to the end. Throws RunError.
+  /// Runs from the problem's present state, which may be one that `restore` brought back, to the end. Throws RunError.
   virtual void run(Problem&, Observer&) = 0;
 };
 

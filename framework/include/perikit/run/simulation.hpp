@@ -44,11 +44,26 @@ class Simulation {
 /// The columns of history.csv: the standard ones, then those that the scene asks for.
 std::vector<std::string> history_columns(const Scene& scene);
 
-/// Writes frames, history and log of a run, and shows progress.
+enum class RunStart {
+  fresh,   ///< from the initial state; what an earlier run left in the folder is replaced
+  resume,  ///< from checkpoint.h5 in the folder; from the initial state where there is none
+};
+
+/// Where the output of a run stands: what a checkpoint holds besides the state.
+struct OutputProgress {
+  std::int64_t frames = 0, history_rows = 0;   ///< those that the scene asks for; not the ones of a stop
+  std::int64_t next_time = 0;                  ///< of [output] times
+  std::int64_t history_every = 0;              ///< 0: not known before the first step
+  std::int64_t steps_expected = 0;
+  double end_time = 0;
+};
+
+/// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
-  /// show_progress: a live line on a terminal, a line now and then elsewhere.
-  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress);
+  /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into the
+  /// problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or body.
+  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh);
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -58,8 +73,14 @@ class RunRecorder final : public Observer {
 
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
+  /// The step of the checkpoint that the run goes on from; -1: from the initial state.
+  std::int64_t resumed_step() const noexcept { return resumed_step_; }
 
  private:
+  void start_fresh(RunStart start);
+  void start_from_checkpoint();
+  bool checkpoint_due(std::int64_t step, double time) const;
+  void keep_checkpoint(const StepReport& report);
   bool frame_due(std::int64_t step, double time) const;
   bool history_due(std::int64_t step) const;
   bool last(std::int64_t step, double time) const;
@@ -77,11 +98,9 @@ class RunRecorder final : public Observer {
   std::unique_ptr<FrameWriter> writer_;
   std::unique_ptr<HistoryWriter> history_;
   std::vector<double> frame_times_;
-  std::size_t next_time_ = 0;
-  std::int64_t history_every_ = 0;
-  std::int64_t history_rows_ = 0;
-  double end_time_ = 0;
-  std::int64_t steps_expected_ = 0;
+  OutputProgress done_;
+  std::int64_t resumed_step_ = -1;
+  std::string body_;               ///< fingerprint
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;

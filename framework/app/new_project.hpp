@@ -1,0 +1,14 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "perikit/plugin/registry.hpp"
+
+namespace perikit::app {
+
+/// Writes a project for a new part into the folder `part` (relative to the working folder): source, scene, CMakeLists.txt and README of
+/// its kind's template. Returns what to do next. Throws InputError where the kind has no template, the name is none or taken, or
+/// the folder exists.
+std::string new_project(const Registry& registry, const std::string& kind, const std::string& part);
+
+}  // namespace perikit::app

@@ -1,0 +1,63 @@
+#include <fmt/format.h>
+
+#include "describe.hpp"
+#include "perikit/scene/scene.hpp"
+
+namespace perikit::app {
+
+namespace {
+
+std::string cell(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '|') out += '\\';
+    out += c == '\n' ? ' ' : c;
+  }
+  return out;
+}
+
+std::string code(const std::string& text) { return text.empty() ? "" : fmt::format("`{}`", cell(text)); }
+
+std::string table_of(const ParameterTable& table) {
+  if (table.parameters().empty()) return "No keys of its own.\n";
+  std::string out = "| key | unit | default | allowed | meaning |\n|---|---|---|---|---|\n";
+  for (const Parameter& p : table.parameters()) {
+    out += fmt::format("| {} | {} | {} | {} | {} |\n", code(p.name), p.unit.empty() ? "-" : cell(p.unit), p.required ? "required" : code(p.default_text),
+                       cell(allowed(p)), cell(p.text));
+  }
+  for (const ParameterGroup& group : table.groups()) out += fmt::format("\nOf these, {}.\n", group_line(group));
+  return out;
+}
+
+std::string fenced(const std::string& text, const std::string& language = {}) { return fmt::format("```{}\n{}\n```\n", language, text); }
+
+std::string part_of(Kind kind, const PartDescription& d) {
+  std::string out = fmt::format("### {}/{}\n\n{}\n\n", name(kind), d.name, d.summary);
+  if (!d.equations.empty()) out += fmt::format("{}\n", fenced(d.equations));
+  if (!d.source.empty()) out += fmt::format("Source: {}\n\n", d.source);
+  if (!d.limits.empty()) out += fmt::format("Limits: {}\n\n", d.limits);
+  out += table_of(d.parameters);
+  for (const std::string& example : d.examples) {
+    out += fmt::format("\n{}", fenced(fmt::format("[{}]\ntype = \"{}\"{}{}", name(kind), d.name, example.empty() ? "" : "\n", example), "toml"));
+  }
+  return out + "\n";
+}
+
+}  // namespace
+
+std::string reference_page(Registry& registry) {
+  std::string out = "# Reference\n\nWritten by `perikit describe --markdown` from the tables that the program reads its input with.\n\n## The scene\n\n";
+  for (const auto& [section, table] : scene_sections()) {
+    out += fmt::format("### {}\n\n{}\n", section.empty() ? "Top level" : fmt::format("[{}]", section), table_of(table));
+  }
+  for (const Kind kind : all_kinds) {
+    const auto names = registry.names(kind);
+    if (names.empty()) continue;
+    out += fmt::format("## Parts: {}\n\n", name(kind));
+    for (const std::string& part : names) out += part_of(kind, registry.describe(kind, part));
+  }
+  while (out.ends_with("\n\n")) out.pop_back();
+  return out;
+}
+
+}  // namespace perikit::app

@@ -1,0 +1,37 @@
+#pragma once
+/// checkpoint.h5: everything that a run continues from, bit for bit.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "perikit/run/simulation.hpp"
+
+namespace perikit {
+
+struct Checkpoint {
+  std::string perikit_version;
+  std::string scene;             ///< resolved
+  std::string body;              ///< fingerprint of points, volumes, materials and sets
+  OutputProgress output;
+  std::int64_t step = 0;
+  double time = 0;
+  std::vector<std::byte> state;  ///< Problem::snapshot
+};
+
+std::filesystem::path checkpoint_file(const std::filesystem::path& folder);
+std::string body_fingerprint(const ReferenceData& body);
+
+/// Replaces the checkpoint of the folder. Throws RunError; an earlier one is then untouched.
+void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& checkpoint);
+/// Throws InputError where it cannot be read.
+Checkpoint read_checkpoint(const std::filesystem::path& folder);
+
+/// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body and version.
+void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::filesystem::path& folder);
+
+/// Throws InputError naming the keys where the scene of an earlier run in `folder` was another.
+void check_same_scene(const std::string& before, const Scene& scene, const std::filesystem::path& folder);
+
+}  // namespace perikit

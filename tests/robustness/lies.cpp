@@ -1,0 +1,59 @@
+/// Parts that lie (tests/contract/lies) are caught by `perikit contract`, each by the test case that states what it breaks.
+
+#include <doctest/doctest.h>
+
+#include <set>
+
+#include "robustness/desk.hpp"
+
+using namespace perikit::test;
+
+namespace {
+
+struct Lie {
+  std::string name, kind;
+  std::set<std::string> broken;   ///< test cases
+};
+
+const std::vector<Lie> lies{
+    {"fixed_axes", "material", {"material: stress turns with the body, and an isotropic law has no directions"}},
+    {"wrong_tangent", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
+    {"wrong_stress", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
+    {"forgotten_lane", "material", {"material: a batch is its points one at a time, writes all of its outputs and nothing else"}},
+    {"one_sided", "kinematics", {"kinematics: bitwise the same for one and two threads, and to rounding without savings"}},
+    {"opposite_force", "kinematics", {"kinematics: force = -dE/du, tangent = dF/du, symmetric"}},
+    {"company", "influence", {"influence: bitwise the same for one point, for many, and again"}},
+    {"forgetful", "integrator", {"integrator: a run that continues from a saved state is bitwise the run without a stop"}},
+    {"first_order", "integrator", {"integrator: displacements and energy converge with the square of the time step"}},
+    {"free_lunch", "integrator", {"integrator: a constant load gives a free body its momentum, and work is force times distance"}},
+};
+
+std::set<std::string> broken_cases(const std::string& out) {
+  std::set<std::string> names;
+  for (const std::string& line : lines(out))
+    if (line.starts_with("broken: ")) names.insert(line.substr(8));
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("contract: every lie is caught by the test case of what it breaks") {
+  const Desk desk;
+  for (const Lie& lie : lies) {
+    const Result result = desk.perikit(fmt::format("contract '{}/{}.so'", PERIKIT_LIES, lie.name));
+    INFO(lie.name);
+    CHECK(result.status == 1);
+    const std::set<std::string> broken = broken_cases(result.out);
+    for (const std::string& name : lie.broken) CHECK_MESSAGE(broken.contains(name), "not caught by '", name, "' but by ", fmt::format("{}", fmt::join(broken, "; ")));
+    CHECK(contains(result.out, fmt::format("{}/{} breaks its contract", lie.kind, lie.name)));
+  }
+}
+
+TEST_CASE("contract: exit status 2 for what is no library of parts") {
+  const Desk desk;
+  for (const std::string file : {"nowhere.so", "scene.toml"}) {
+    const Result result = desk.perikit("contract " + file);
+    CHECK(result.status == 2);
+    CHECK_MESSAGE(contains(result.err, file + ": this library is refused: "), result.err);
+  }
+}

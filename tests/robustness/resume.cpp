@@ -1,0 +1,160 @@
+/// Runs that are stopped, killed or out of disk, and go on: what they leave is what a run without a stop leaves.
+
+#include <doctest/doctest.h>
+
+#include <chrono>
+#include <csignal>
+#include <random>
+#include <thread>
+
+#include "robustness/desk.hpp"
+
+using namespace perikit::test;
+
+namespace {
+
+/// Frames, history and checkpoints that fall on different steps.
+std::string long_plate() {
+  return replaced(replaced(plate, "end_time = 1.0", "end_time = 6.0"), "frames = 5\nhistory_every = 1", "every = 23\nhistory_every = 3\ncheckpoint_every = 7");
+}
+
+void check_same_results(const Desk& desk, const std::string& folder, const std::string& whole) {
+  const std::vector<Frame> frames = read_frames(desk.path(folder)), expected = read_frames(desk.path(whole));
+  REQUIRE(frames.size() == expected.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const bool same = frames[k] == expected[k], linked = read_frame(desk.path(folder + "/results.h5"), fmt::format("/frames/{:08}", k)) == expected[k];
+    CHECK_MESSAGE(same, "frame ", k, " differs");
+    CHECK_MESSAGE(linked, "results.h5 does not show frame ", k);
+  }
+  for (const std::string file : {"/history.csv", "/results.xdmf"}) {
+    const bool same = desk.text(folder + file) == desk.text(whole + file);
+    CHECK_MESSAGE(same, file, " differs");
+  }
+}
+
+int wait_for(pid_t child) {
+  int status = 0;
+  waitpid(child, &status, 0);
+  return status;
+}
+
+}  // namespace
+
+TEST_CASE("resume: killed at any moment, again and again, a run ends as without a stop") {
+  const Desk desk(long_plate());
+  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
+  const auto seed = std::random_device{}();
+  INFO("seed ", seed);
+  std::mt19937 random(seed);
+  int kills = 0, status = -1;
+  while (status != 0) {
+    REQUIRE_MESSAGE(kills < 100, "the run does not get on");
+    const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
+    // Later and later, so that the run also gets to its end.
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % static_cast<unsigned>(80 + 40 * kills)));
+    kill(child, SIGKILL);
+    status = wait_for(child);
+    if (WIFSIGNALED(status)) ++kills;
+    else REQUIRE_MESSAGE(status == 0, "a resumed run failed with status ", WEXITSTATUS(status));
+  }
+  MESSAGE(kills, " kills");
+  check_same_results(desk, "out", "whole");
+  // A run that has come to its end stays as it is.
+  const Result again = desk.perikit("run scene.toml --resume -o out");
+  CHECK_MESSAGE(again.status == 0, again.err);
+  CHECK(contains(again.out, "resumed after step 300"));
+  check_same_results(desk, "out", "whole");
+}
+
+TEST_CASE("resume: a signal keeps the state, and the run goes on from it") {
+  const std::string scene = replaced(replaced(long_plate(), "checkpoint_every = 7\n", ""), "every = 23", "frames = 17");
+  const Desk desk(scene);
+  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
+  std::size_t frames = 0;
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
+    const auto start = std::chrono::steady_clock::now();
+    const auto rows = lines(desk.text("out/history.csv")).size();
+    while (lines(desk.text("out/history.csv")).size() < rows + 30 && std::chrono::steady_clock::now() - start < std::chrono::seconds(30)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    kill(child, signal);
+    const int status = wait_for(child);
+    REQUIRE(WIFEXITED(status));
+    CHECK(WEXITSTATUS(status) == 1);
+    CHECK(contains(desk.text("out/run.log"), "stopped by a signal after step"));
+    CHECK(fs::exists(desk.path("out/checkpoint.h5")));
+    // The state of the stop is the last row and the last frame, energies and velocities included.
+    const std::vector<Frame> kept = read_frames(desk.path("out"));
+    CHECK(kept.size() > frames);
+    frames = kept.size();
+    CHECK(lines(desk.text("out/history.csv")).back().starts_with(fmt::format("{},", kept.back().step)));
+  }
+  const Result last = desk.perikit("run scene.toml --resume -o out --threads 1");
+  CHECK_MESSAGE(last.status == 0, last.err);
+  CHECK(contains(last.out, "resumed after step"));
+  check_same_results(desk, "out", "whole");
+}
+
+TEST_CASE("resume: another scene is refused with what differs") {
+  const Desk desk(replaced(long_plate(), "end_time = 6.0", "end_time = 1.0"));
+  REQUIRE(desk.perikit("run scene.toml --quiet -o out").status == 0);
+  const std::vector<Frame> before = read_frames(desk.path("out"));
+  const auto refuse = [&](const std::string& change, const std::vector<std::string>& words) {
+    const Result result = desk.perikit("run scene.toml --resume -o out " + change);
+    CHECK(result.status == 2);
+    for (const std::string& word : words) CHECK_MESSAGE(contains(result.err, word), "no '", word, "' in: ", result.err);
+    CHECK(read_frames(desk.path("out")) == before);
+  };
+  refuse("--set material.shear_modulus=0.9", {"material.shear_modulus: 0.8, now 0.9"});
+  refuse("--set integrator.end_time=2.0 --set output.every=24", {"integrator.end_time: 1.0, now 2.0", "output.every: 23, now 24"});
+  // Also where the run has left no checkpoint.
+  fs::remove(desk.path("out/checkpoint.h5"));
+  refuse("--set material.shear_modulus=0.9", {"material.shear_modulus: 0.8, now 0.9"});
+  const Result again = desk.perikit("run scene.toml --resume -o out");
+  CHECK_MESSAGE(again.status == 0, again.err);
+  CHECK(contains(again.out, "no checkpoint to resume from"));
+  CHECK(read_frames(desk.path("out")) == before);
+  // A damaged checkpoint is named.
+  desk.write("out/checkpoint.h5", "no HDF5");
+  refuse("", {"checkpoint.h5", "not an HDF5 file"});
+}
+
+TEST_CASE("resume: a body from another file is refused") {
+  std::string cloud = "x,y,z,volume\n";
+  for (int k = 0; k < 40; ++k) cloud += fmt::format("{},{},0,1\n", k % 8 + 0.5, k / 8 + 0.5);
+  const Desk desk(replaced(long_plate(), "[body.lattice]\nspacing = 1.0\nlower = [0, 0]\nupper = [8, 5]\n", "[body.points]\nfile = \"cloud.csv\"\n"));
+  desk.write("cloud.csv", cloud);
+  const Result first = desk.perikit("run scene.toml --quiet -o out --set integrator.end_time=1.0");
+  REQUIRE_MESSAGE(first.status == 0, first.err);
+  desk.write("cloud.csv", replaced(cloud, "\n1.5,0.5,0,1\n", "\n1.5,0.5,0,0.9\n"));
+  const Result result = desk.perikit("run scene.toml --resume -o out --set integrator.end_time=1.0");
+  CHECK(result.status == 2);
+  CHECK_MESSAGE(contains(result.err, "another body"), result.err);
+}
+
+TEST_CASE("disk: a full disk is one clear error, nothing earlier is lost, and the run goes on when there is room") {
+  const Desk desk(replaced(replaced(long_plate(), "end_time = 6.0", "end_time = 1.4"), "every = 23", "every = 2"));
+  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
+  // Blocks of 512 bytes. The longest file reaches the limit after more than half of the frames.
+  const std::string limit = fmt::format("ulimit -f {};", fs::file_size(desk.path("whole/results.xdmf")) * 2 / 3 / 512);
+  const Result full = desk.perikit("run scene.toml --quiet -o out", limit);
+  INFO(full.err);
+  CHECK(full.status == 1);
+  CHECK(contains(full.err, "results.xdmf: cannot write: File too large; last good frame: "));
+  CHECK_MESSAGE(lines(full.err).size() == 1, "more than one line");
+  const std::vector<Frame> frames = read_frames(desk.path("out"));
+  CHECK(frames.size() > 1);
+  for (const Frame& frame : frames) CHECK(frame.values == 3 * points);
+  CHECK(desk.text("out/history.csv").back() == '\n');
+  REQUIRE(desk.perikit("run scene.toml --quiet --resume -o out").status == 0);
+  check_same_results(desk, "out", "whole");
+}
+
+TEST_CASE("disk: a folder that cannot be written is one clear error") {
+  const Desk desk;
+  const Result result = desk.perikit("run scene.toml -o scene.toml/out");
+  CHECK(result.status == 1);
+  CHECK_MESSAGE(contains(result.err, "scene.toml/out: cannot create the folder: Not a directory"), result.err);
+  CHECK(lines(result.err).size() == 1);
+}
