@@ -213,8 +213,8 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
   const std::size_t first = families().first(row), bonds = families().first(row + 1) - first;
   const auto add = [&](const double* g, bool own, const double* Q, std::int32_t j) {
     double* C = m.C.data() + strip * m.reach.place(j);
-    for (std::size_t s = 0; s < D; ++s)
-      for (std::size_t x = 0; x < strip; ++x) C[x] += g[s] * Q[s * strip + x];
+    for (std::size_t x = 0; x < strip; ++x)
+      for (std::size_t s = 0; s < D; ++s) C[x] += g[s] * Q[s * strip + x];
     if (own)
       for (std::size_t x = 0; x < strip; ++x) C[x] += Q[D * strip + x];
   };
@@ -235,8 +235,8 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     if (n >= gradients) continue;
     const auto add_gradient = [&](const double* g, std::int32_t l) {
       double* to = m.places.block(K, l, entries);
-      for (std::size_t s = 0; s < D; ++s)
-        for (std::size_t x = 0; x < entries; ++x) to[x] += g[s] * C[s * entries + x];
+      for (std::size_t x = 0; x < entries; ++x)
+        for (std::size_t s = 0; s < D; ++s) to[x] += g[s] * C[s * entries + x];
     };
     const auto j = static_cast<std::size_t>(near[n]);
     add_gradient(&own_gradient_[D * j], near[n]);
