@@ -8,20 +8,24 @@
 
 namespace perikit {
 
-Assembly::Assembly(const ModelParts& parts, int steps) : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), steps_(steps) {}
+Assembly::Assembly(const ModelParts& parts, int steps)
+    : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), steps_(steps) {}
 
 EvaluationStatus Assembly::assemble(ConstFieldView u, BlockMatrix& K) {
   if (!K.has_pattern()) make_pattern(families_, steps_, K);
   constexpr std::size_t piece = 1 << 16;
   parallel_for((K.values.size() + piece - 1) / piece, [&](std::size_t b) {
-    std::fill(K.values.begin() + static_cast<std::ptrdiff_t>(b * piece), K.values.begin() + static_cast<std::ptrdiff_t>(std::min(K.values.size(), (b + 1) * piece)), 0.0);
+    std::fill(K.values.begin() + static_cast<std::ptrdiff_t>(b * piece),
+              K.values.begin() + static_cast<std::ptrdiff_t>(std::min(K.values.size(), (b + 1) * piece)), 0.0);
   });
   return status_at(families_.body(), fill(u, K));
 }
 
 AssembledSize Assembly::size() const {
-  const std::size_t blocks = predict_blocks(families_, steps_), entries = static_cast<std::size_t>(families_.body().dimension() * families_.body().dimension());
-  return {blocks, blocks * (entries * sizeof(double) + sizeof(std::int32_t)) + families_.rows() * 12 + families_.bytes() + work_bytes()};
+  const std::size_t blocks = predict_blocks(families_, steps_),
+                    entries = static_cast<std::size_t>(families_.body().dimension() * families_.body().dimension());
+  return {blocks,
+          blocks * (entries * sizeof(double) + sizeof(std::int32_t)) + families_.rows() * 12 + families_.bytes() + work_bytes()};
 }
 
 namespace {
@@ -36,9 +40,12 @@ std::unique_ptr<Assembly> make(const ModelParts& parts) {
 
 std::unique_ptr<Assembly> AssemblingModel::make_assembly(const ModelParts& parts) const {
   switch (parts.body->dimension()) {
-    case 1: return make<1>(parts);
-    case 2: return make<2>(parts);
-    default: return make<3>(parts);
+    case 1:
+      return make<1>(parts);
+    case 2:
+      return make<2>(parts);
+    default:
+      return make<3>(parts);
   }
 }
 

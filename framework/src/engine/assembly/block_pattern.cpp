@@ -45,7 +45,9 @@ void make_pattern(const PointFamilies& families, int steps, BlockMatrix& K) {
   });
   for (std::size_t r = 0; r < rows; ++r) K.row_first[r + 1] += K.row_first[r];
   K.column.resize(static_cast<std::size_t>(K.row_first[rows]));
-  parallel_for(blocks, [&](std::size_t b) { std::copy(columns[b].begin(), columns[b].end(), K.column.begin() + K.row_first[b * block_rows]); });
+  parallel_for(blocks, [&](std::size_t b) {
+    std::copy(columns[b].begin(), columns[b].end(), K.column.begin() + K.row_first[b * block_rows]);
+  });
   K.values.resize(K.column.size() * static_cast<std::size_t>(K.dimension * K.dimension));
 }
 

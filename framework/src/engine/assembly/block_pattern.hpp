@@ -21,7 +21,7 @@ class Reach {
   std::size_t place(std::int32_t row) const noexcept { return static_cast<std::size_t>(place_[static_cast<std::size_t>(row)]); }
 
  private:
-  std::vector<std::int32_t> place_;        ///< by row; -1: not found
+  std::vector<std::int32_t> place_;  ///< by row; -1: not found
   std::vector<std::int32_t> found_;
 };
 
@@ -31,7 +31,8 @@ class RowPlaces {
   /// Columns of this row -> places of their blocks. O(blocks of the row).
   void open(const BlockMatrix& K, std::size_t row) {
     place_.resize(K.rows());
-    for (std::int64_t b = K.row_first[row]; b < K.row_first[row + 1]; ++b) place_[static_cast<std::size_t>(K.column[static_cast<std::size_t>(b)])] = b;
+    for (std::int64_t b = K.row_first[row]; b < K.row_first[row + 1]; ++b)
+      place_[static_cast<std::size_t>(K.column[static_cast<std::size_t>(b)])] = b;
   }
   double* block(BlockMatrix& K, std::int32_t column, std::size_t entries) const noexcept {
     return K.values.data() + static_cast<std::size_t>(place_[static_cast<std::size_t>(column)]) * entries;

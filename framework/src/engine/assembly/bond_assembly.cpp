@@ -20,8 +20,11 @@ void over_rows(std::size_t rows, Body&& body) {
 
 template <int D>
 BondAssembly<D>::BondAssembly(const ModelParts& parts)
-    : Assembly(parts, parts.kinematics->traits().base == BondBase::mean ? 3 : 2), laws_(*parts.laws), traits_(parts.kinematics->traits()),
-      mean_(traits_.base == BondBase::mean), symmetric_(traits_.pair_symmetric && !traits_.selective && parts.skip),
+    : Assembly(parts, parts.kinematics->traits().base == BondBase::mean ? 3 : 2),
+      laws_(*parts.laws),
+      traits_(parts.kinematics->traits()),
+      mean_(traits_.base == BondBase::mean),
+      symmetric_(traits_.pair_symmetric && !traits_.selective && parts.skip),
       colouring_(colour_cloud(families().lists(), families().rows())) {
   read_bonds(parts);
 }
@@ -57,7 +60,9 @@ void BondAssembly<D>::read_bonds(const ModelParts& parts) {
       bond.weight = families().volume(i) * s.share[k];
       const auto j = static_cast<std::size_t>(neighbours[k]);
       const auto back = families().neighbours(j);
-      bond.reverse = families().first(j) + static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(i)) - back.begin());
+      bond.reverse =
+          families().first(j) +
+          static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(i)) - back.begin());
     }
   });
 }
@@ -89,7 +94,8 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const Bond& bond = bond_[k];
   const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
   const std::size_t p = families().point(i), q = families().point(j);
-  const int lane = m.batch.add(static_cast<std::int32_t>(p), bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0));
+  const int lane =
+      m.batch.add(static_cast<std::int32_t>(p), bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0));
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
   const double* own = Hbar_.data() + entries * i;
@@ -107,8 +113,8 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   }
 }
 
-// On y = [columns of A_b, du]: H_ae = sum_s R_es y_as with R_es = delta_es - xi_s g_e (s < D), g_e (s = D), so that the matrix of the
-// bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (1/2 or 1, -1) of i and (1/2 or 0, 1) of j.
+// On y = [columns of A_b, du]: H_ae = sum_s R_es y_as with R_es = delta_es - xi_s g_e (s < D), g_e (s = D), so that the matrix of
+// the bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (1/2 or 1, -1) of i and (1/2 or 0, 1) of j.
 template <int D>
 void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept {
   const Bond& bond = bond_[k];
@@ -130,7 +136,7 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
   double* ij = off_diagonal_.data() + coupling * k;
   double* ji = off_diagonal_.data() + coupling * bond.reverse;
   // Half-way products N[a][e][b][s] = sum_f A_(ae)(bf) R_fs, then M_(as)(bs') = sum_e R_es N.
-  const auto right = [&](const double* A, double (&N)[D][D][D][slots]) {
+  const auto right = [&](const double* A, double(&N)[D][D][D][slots]) {
     for (std::size_t a = 0; a < D; ++a)
       for (std::size_t e = 0; e < D; ++e)
         for (std::size_t b = 0; b < D; ++b)
@@ -213,17 +219,19 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
   const std::size_t first = families().first(row), bonds = families().first(row + 1) - first;
   const auto add = [&](const double* g, bool own, const double* Q, std::int32_t j) {
     double* C = m.C.data() + strip * m.reach.place(j);
-    for (std::size_t s = 0; s < D; ++s)
-      for (std::size_t x = 0; x < strip; ++x) C[x] += g[s] * Q[s * strip + x];
+    for (std::size_t x = 0; x < strip; ++x)
+      for (std::size_t s = 0; s < D; ++s) C[x] += g[s] * Q[s * strip + x];
     if (own)
       for (std::size_t x = 0; x < strip; ++x) C[x] += Q[D * strip + x];
   };
   const auto add_row = [&](std::size_t i, const double* g, bool own) {
     add(g, own, diagonal_.data() + coupling * i, static_cast<std::int32_t>(i));
-    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k) add(g, own, off_diagonal_.data() + coupling * k, families().lists().neighbour[k]);
+    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k)
+      add(g, own, off_diagonal_.data() + coupling * k, families().lists().neighbour[k]);
   };
   add_row(row, &own_gradient_[D * row], true);
-  for (std::size_t k = first; k < first + bonds; ++k) add_row(static_cast<std::size_t>(families().lists().neighbour[k]), bond_[bond_[k].reverse].gradient, false);
+  for (std::size_t k = first; k < first + bonds; ++k)
+    add_row(static_cast<std::size_t>(families().lists().neighbour[k]), bond_[bond_[k].reverse].gradient, false);
 
   m.places.open(K, row);
   // Only with the mean base do gradients two bonds away matter; the others have none in C.
@@ -235,12 +243,13 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     if (n >= gradients) continue;
     const auto add_gradient = [&](const double* g, std::int32_t l) {
       double* to = m.places.block(K, l, entries);
-      for (std::size_t s = 0; s < D; ++s)
-        for (std::size_t x = 0; x < entries; ++x) to[x] += g[s] * C[s * entries + x];
+      for (std::size_t x = 0; x < entries; ++x)
+        for (std::size_t s = 0; s < D; ++s) to[x] += g[s] * C[s * entries + x];
     };
     const auto j = static_cast<std::size_t>(near[n]);
     add_gradient(&own_gradient_[D * j], near[n]);
-    for (std::size_t k = families().first(j); k < families().first(j + 1); ++k) add_gradient(bond_[k].gradient, families().lists().neighbour[k]);
+    for (std::size_t k = families().first(j); k < families().first(j + 1); ++k)
+      add_gradient(bond_[k].gradient, families().lists().neighbour[k]);
   }
 }
 
@@ -254,7 +263,8 @@ std::int64_t BondAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
   over_rows(rows, [&](std::size_t r) {
     point_gradients(r, u);
     std::fill_n(diagonal_.data() + coupling * r, coupling, 0.0);
-    std::fill_n(off_diagonal_.data() + coupling * families().first(r), coupling * (families().first(r + 1) - families().first(r)), 0.0);
+    std::fill_n(off_diagonal_.data() + coupling * families().first(r), coupling * (families().first(r + 1) - families().first(r)),
+                0.0);
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
@@ -268,7 +278,8 @@ std::int64_t BondAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
 
 template <int D>
 std::size_t BondAssembly<D>::work_bytes() const noexcept {
-  return bond_.size() * sizeof(Bond) + (families().rows() * (coupling + entries + D) + families().bonds() * coupling) * sizeof(double);
+  return bond_.size() * sizeof(Bond) +
+         (families().rows() * (coupling + entries + D) + families().bonds() * coupling) * sizeof(double);
 }
 
 template class BondAssembly<1>;

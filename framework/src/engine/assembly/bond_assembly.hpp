@@ -5,9 +5,9 @@
 
 namespace perikit {
 
-/// Bond shape. With the point gradients kept as unknowns every bond is a small matrix on X_i = [Hbar_i, u_i] and X_j; their sum Q is
-/// condensed with X = G u, row by row:  K = G^T Q G.
-/// Component s < D of X_i belongs to column s of Hbar_i, component D to u_i; G_ik has g_ik there, and 1 at (i, i) for u.
+/// Bond shape. With the point gradients kept as unknowns every bond is a small matrix on X_i = [Hbar_i, u_i] and X_j; their sum Q
+/// is condensed with X = G u, row by row:  K = G^T Q G. Component s < D of X_i belongs to column s of Hbar_i, component D to u_i;
+/// G_ik has g_ik there, and 1 at (i, i) for u.
 template <int D>
 class BondAssembly final : public Assembly {
  public:
@@ -25,15 +25,15 @@ class BondAssembly final : public Assembly {
     std::vector<std::size_t> bond_of_lane, row_of_lane;
     Reach reach;
     RowPlaces places;
-    AlignedVector<double> C;          ///< row k of G^T Q: [j][s'][a][b]
+    AlignedVector<double> C;  ///< row k of G^T Q: [j][s'][a][b]
   };
   /// Reference data of a bond i -> j.
   struct Bond {
     double xi[D];
-    double correction[D];             ///< g_b
-    double gradient[D];               ///< g_ij of Hbar_i
-    double weight;                    ///< V_i w_ij
-    std::size_t reverse;              ///< the bond j -> i
+    double correction[D];  ///< g_b
+    double gradient[D];    ///< g_ij of Hbar_i
+    double weight;         ///< V_i w_ij
+    std::size_t reverse;   ///< the bond j -> i
   };
 
   std::int64_t fill(ConstFieldView u, BlockMatrix& K) override;
@@ -51,9 +51,9 @@ class BondAssembly final : public Assembly {
   KinematicsTraits traits_;
   bool mean_, symmetric_;
   std::vector<Bond> bond_;
-  AlignedVector<double> own_gradient_;            ///< g_ii by row, D each
-  AlignedVector<double> Hbar_;                    ///< by row
-  AlignedVector<double> diagonal_, off_diagonal_; ///< Q by row, by bond
+  AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
+  AlignedVector<double> Hbar_;                     ///< by row
+  AlignedVector<double> diagonal_, off_diagonal_;  ///< Q by row, by bond
   Colouring colouring_;
   PerThread<Memory> memory_;
 };

@@ -66,16 +66,18 @@ void ElementAssembly<D>::scatter(const PointElement<D>& element, BlockMatrix& K,
     const std::int32_t* column = K.column.data() + K.row_first[row];
     double* block = K.values.data() + K.row_first[row] * (D * D);
     for (std::size_t l = 0; l < nodes; ++l, ++column, block += D * D) {
-      for (; *column != m.nodes[l]; ++column) block += D * D;   // both ascend
-      const bool upper = k / padding <= l / padding;            // the rest by symmetry
+      for (; *column != m.nodes[l]; ++column) block += D * D;  // both ascend
+      const bool upper = k / padding <= l / padding;           // the rest by symmetry
       for (std::size_t a = 0; a < D; ++a)
-        for (std::size_t b = 0; b < D; ++b) block[a * D + b] += upper ? S[((a * D + b) * width + k) * width + l] : S[((b * D + a) * width + l) * width + k];
+        for (std::size_t b = 0; b < D; ++b)
+          block[a * D + b] += upper ? S[((a * D + b) * width + k) * width + l] : S[((b * D + a) * width + l) * width + k];
     }
   }
 }
 
 template <int D>
-std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, ConstFieldView u, BlockMatrix& K, Memory& m) const {
+std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, ConstFieldView u, BlockMatrix& K,
+                                           Memory& m) const {
   m.batch.clear();
   m.of_row.clear();
   m.elements.resize(std::max(m.elements.size(), last - first));
@@ -103,7 +105,8 @@ std::int64_t ElementAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
   memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.traits.selective); });
   // Enough points at once to fill batches of the materials.
   const std::size_t bonds = families().bonds() / families().rows() + 1;
-  const std::size_t at_once = std::max<std::size_t>(1, batch_points / (shape_.parts > 0 ? static_cast<std::size_t>(shape_.parts) : bonds));
+  const std::size_t at_once =
+      std::max<std::size_t>(1, batch_points / (shape_.parts > 0 ? static_cast<std::size_t>(shape_.parts) : bonds));
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
     const std::size_t end = std::min(families().rows(), (b + 1) * cloud_block_points);

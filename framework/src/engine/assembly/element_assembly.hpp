@@ -6,7 +6,8 @@
 
 namespace perikit {
 
-/// Point and weighted shapes: everything that a point owns depends on its family, so that K is a sum of one dense matrix per point.
+/// Point and weighted shapes: everything that a point owns depends on its family, so that K is a sum of one dense matrix per
+/// point.
 template <int D>
 class ElementAssembly final : public Assembly {
  public:
@@ -18,7 +19,7 @@ class ElementAssembly final : public Assembly {
     explicit Memory(const Laws& laws, bool selective) : batch(laws, selective) {}
     TangentBatch<D> batch;
     ElementScratch<D> scratch;
-    std::vector<PointElement<D>> elements;          ///< of points that are not whole
+    std::vector<PointElement<D>> elements;  ///< of points that are not whole
     std::vector<const PointElement<D>*> of_row;
     std::vector<std::int32_t> nodes;
     AlignedVector<double> u;
@@ -33,7 +34,7 @@ class ElementAssembly final : public Assembly {
 
   const Laws& laws_;
   ElementShape shape_;
-  std::optional<PointElement<D>> whole_;            ///< of rows with the whole family
+  std::optional<PointElement<D>> whole_;  ///< of rows with the whole family
   Colouring colouring_;
   PerThread<Memory> memory_;
 };

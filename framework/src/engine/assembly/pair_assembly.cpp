@@ -14,12 +14,16 @@ constexpr std::size_t block_rows = 64;
 
 template <int D>
 PairAssembly<D>::PairAssembly(const ModelParts& parts, const PairPoints& points)
-    : Assembly(parts, parts.kinematics->traits().dilatation ? 2 : 1), law_(parts.kinematics), traits_(law_->traits()), points_(points) {}
+    : Assembly(parts, parts.kinematics->traits().dilatation ? 2 : 1),
+      law_(parts.kinematics),
+      traits_(law_->traits()),
+      points_(points) {}
 
 template <int D>
 bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) const {
   families().load(row, m.family);
-  for (AlignedVector<double>* x : {&m.omega, &m.extension, &m.inverse_length, &m.modulus, &m.force, &m.stiffness}) x->assign(m.family.size, 0.0);
+  for (AlignedVector<double>* x : {&m.omega, &m.extension, &m.inverse_length, &m.modulus, &m.force, &m.stiffness})
+    x->assign(m.family.size, 0.0);
   for (auto* vector : {&m.direction, &m.du})
     for (AlignedVector<double>& x : *vector) x.assign(m.family.size, 0.0);
   const auto neighbours = families().neighbours(row);
@@ -99,10 +103,12 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
   double* own = m.places.block(K, static_cast<std::int32_t>(row), entries);
   stretch(row, u, m);
   moduli(row, m);
-  law_->bond_law({static_cast<int>(neighbours.size()), m.family.length.data(), m.omega.data(), m.extension.data(), m.modulus.data(), nullptr, m.force.data(), m.stiffness.data()});
+  law_->bond_law({static_cast<int>(neighbours.size()), m.family.length.data(), m.omega.data(), m.extension.data(),
+                  m.modulus.data(), nullptr, m.force.data(), m.stiffness.data()});
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     double T = m.force[k];
-    if (traits_.dilatation) T += m.omega[k] * m.family.length[k] * (pressure_[row] + pressure_[static_cast<std::size_t>(neighbours[k])]);
+    if (traits_.dilatation)
+      T += m.omega[k] * m.family.length[k] * (pressure_[row] + pressure_[static_cast<std::size_t>(neighbours[k])]);
     const double volumes = families().volume(row) * m.family.volume[k], turn = T * m.inverse_length[k];
     double* block = m.places.block(K, neighbours[k], entries);
     for (std::size_t a = 0; a < D; ++a)
@@ -121,13 +127,15 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
         for (std::size_t b = 0; b < D; ++b) block[a * D + b] += stiffness_[i] * slope[a] * other[b];
     };
     couple(&own_slope_[D * i], static_cast<std::int32_t>(i));
-    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k) couple(&slope_[D * k], families().lists().neighbour[k]);
+    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k)
+      couple(&slope_[D * k], families().lists().neighbour[k]);
   };
   add(row, &own_slope_[D * row]);
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     const auto i = static_cast<std::size_t>(neighbours[k]);
     const auto back = families().neighbours(i);
-    const auto at = static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(row)) - back.begin());
+    const auto at =
+        static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(row)) - back.begin());
     add(i, &slope_[D * (families().first(i) + at)]);
   }
 }
@@ -149,7 +157,8 @@ std::int64_t PairAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
     });
   };
   over_rows([&](std::size_t r, Memory& m) {
-    if (!(traits_.dilatation ? dilatation(r, u, m) : stretch(r, u, m))) bad.report(static_cast<std::int64_t>(families().point(r)));
+    if (!(traits_.dilatation ? dilatation(r, u, m) : stretch(r, u, m)))
+      bad.report(static_cast<std::int64_t>(families().point(r)));
   });
   if (bad.point() >= 0) return bad.point();
   over_rows([&](std::size_t r, Memory& m) { fill_row(r, u, K, m); });

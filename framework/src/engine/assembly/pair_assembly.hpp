@@ -7,12 +7,12 @@ namespace perikit {
 /// What a pair model knows of its points.
 struct PairPoints {
   const PairFields& fields;
-  const Field& scale;                  ///< d/m_i; empty without dilatation
-  const Field& dilatation_modulus;     ///< k_i
+  const Field& scale;               ///< d/m_i; empty without dilatation
+  const Field& dilatation_modulus;  ///< k_i
 };
 
-/// Pair laws: with the force dE/de = T of a bond, K is the sum over bonds of (w'' n (x) n + T/|y| (I - n (x) n)) on both ends, and over
-/// points of V_i phi'' dtheta_i (x) dtheta_i, where theta_i depends on the family.
+/// Pair laws: with the force dE/de = T of a bond, K is the sum over bonds of (w'' n (x) n + T/|y| (I - n (x) n)) on both ends,
+/// and over points of V_i phi'' dtheta_i (x) dtheta_i, where theta_i depends on the family.
 template <int D>
 class PairAssembly final : public Assembly {
  public:
@@ -36,10 +36,10 @@ class PairAssembly final : public Assembly {
   std::shared_ptr<const Kinematics> law_;
   KinematicsTraits traits_;
   PairPoints points_;
-  AlignedVector<double> pressure_;     ///< q_i = phi' d/m, by row
-  AlignedVector<double> stiffness_;    ///< V_i phi'', by row
-  AlignedVector<double> slope_;        ///< dtheta_i/du_j by bond, D each
-  AlignedVector<double> own_slope_;    ///< dtheta_i/du_i by row
+  AlignedVector<double> pressure_;   ///< q_i = phi' d/m, by row
+  AlignedVector<double> stiffness_;  ///< V_i phi'', by row
+  AlignedVector<double> slope_;      ///< dtheta_i/du_j by bond, D each
+  AlignedVector<double> own_slope_;  ///< dtheta_i/du_i by row
   PerThread<Memory> memory_;
 };
 

@@ -24,14 +24,16 @@ void write_point(PointElement<D>& out, int q, Gradient&& gradient) {
 }  // namespace
 
 template <int D>
-void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out, ElementScratch<D>& s) {
+void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out,
+                   ElementScratch<D>& s) {
   const auto neighbours = families.neighbours(row);
   out.nodes = static_cast<int>(neighbours.size()) + 1;
-  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) - neighbours.begin());
+  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) -
+                             neighbours.begin());
   out.width = padded(static_cast<std::size_t>(out.nodes));
   out.weight.clear();
   out.points = 0;
-  if (neighbours.empty()) {   // nothing to stretch
+  if (neighbours.empty()) {  // nothing to stretch
     out.g.assign(D * out.width, 0.0);
     return;
   }
@@ -51,7 +53,7 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
   out.g.assign(static_cast<std::size_t>(s.stencil.points * D) * out.width, 0.0);
   for (int q = 0, to = 0; q < s.stencil.points; ++q) {
     const double share = s.stencil.share[static_cast<std::size_t>(q)];
-    if (q >= owners && share == 0) continue;   // a dropped part
+    if (q >= owners && share == 0) continue;  // a dropped part
     write_point<D>(out, to++, [&](int k, int e) { return s.stencil.row(e, q / 8)[k * 8 + q % 8]; });
     if (q < owners) continue;
     out.weight.push_back(share * (shape.parts > 0 ? intact : families.volume(row)));
@@ -59,16 +61,20 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
   }
 }
 
-// K_kl = sum over rows r, s of g_rk M_rs g_sl. Eight columns l at a time: T_r = sum_s M_rs g_sl, then products with g_rk, all for each
-// pair (a, b) of displacement components.
+// K_kl = sum over rows r, s of g_rk M_rs g_sl. Eight columns l at a time: T_r = sum_s M_rs g_sl, then products with g_rk, all for
+// each pair (a, b) of displacement components.
 template <int D>
-void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective, ElementScratch<D>& s) {
+void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective,
+               ElementScratch<D>& s) {
   constexpr int n = D * D, packs = static_cast<int>(tile) / pack_width;
-  const std::size_t width = element.width, owners = selective ? 1 : 0, rows = (owners + static_cast<std::size_t>(element.points)) * D;
+  const std::size_t width = element.width, owners = selective ? 1 : 0,
+                    rows = (owners + static_cast<std::size_t>(element.points)) * D;
   s.T.resize(n * rows * tile);
   s.K.resize(n * width * width);
   for (std::size_t column = 0; column < width; column += tile) {
-    const auto T = [&](int a, int b, std::size_t r) { return s.T.data() + (static_cast<std::size_t>(a * D + b) * rows + r) * tile; };
+    const auto T = [&](int a, int b, std::size_t r) {
+      return s.T.data() + (static_cast<std::size_t>(a * D + b) * rows + r) * tile;
+    };
     for (int v = 0; v < packs; ++v) {
       const std::size_t at = column + static_cast<std::size_t>(v * pack_width);
       const int lane_in_tile = v * pack_width;
@@ -89,7 +95,8 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
                 const double* owner = batch.bar(first_lane + q);
                 for (int f = 0; f < D; ++f) {
                   sum += Pack(mixed[(a * D + e) * n + b * D + f]) * g_bar[f];
-                  bar[a][e][b] += Pack(mixed[(b * D + f) * n + a * D + e]) * g[f] + Pack(owner[(a * D + e) * n + b * D + f]) * g_bar[f];
+                  bar[a][e][b] +=
+                      Pack(mixed[(b * D + f) * n + a * D + e]) * g[f] + Pack(owner[(a * D + e) * n + b * D + f]) * g_bar[f];
                 }
               }
               sum.store(T(a, b, static_cast<std::size_t>(point * D + e)) + lane_in_tile);
@@ -111,7 +118,9 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
           }
         }
         for (std::size_t i = 0; i < 4; ++i)
-          for (int v = 0; v < packs; ++v) sums[i][v].store(s.K.data() + (static_cast<std::size_t>(ab) * width + k + i) * width + column + static_cast<std::size_t>(v * pack_width));
+          for (int v = 0; v < packs; ++v)
+            sums[i][v].store(s.K.data() + (static_cast<std::size_t>(ab) * width + k + i) * width + column +
+                             static_cast<std::size_t>(v * pack_width));
       }
     }
   }

@@ -7,7 +7,8 @@
 
 namespace perikit {
 
-PointFamilies::PointFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight) : body_(body), weight_(weight) {
+PointFamilies::PointFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight)
+    : body_(body), weight_(weight) {
   for (std::size_t p = 0; p < body.stride(); ++p)
     if (body.alive(p)) point_.push_back(static_cast<std::int32_t>(p));
   if (body.lattice()) {
@@ -15,7 +16,7 @@ PointFamilies::PointFamilies(const Body& body, const InfluenceFunction& influenc
     read_lattice();
     return;
   }
-  const CloudFamilies& f = cloud_.emplace(body, influence, weight);   // clouds have no padding in between: rows are field indices
+  const CloudFamilies& f = cloud_.emplace(body, influence, weight);  // clouds have no padding in between: rows are field indices
   normaliser_ = f.normaliser;
   damage_.assign(f.damage.data(), f.damage.data() + rows());
 }
@@ -37,7 +38,8 @@ void PointFamilies::read_lattice() {
     const LatticePattern& pattern = index < 0 ? f.whole : f.patterns[static_cast<std::size_t>(index)];
     std::vector<std::uint16_t> slots = f.intact_slots(pattern, lane);
     std::sort(slots.begin(), slots.end(), [&](std::uint16_t a, std::uint16_t b) { return f.shifts[a] < f.shifts[b]; });
-    for (const std::uint16_t s : slots) lattice_lists_.neighbour.push_back(row_of[static_cast<std::size_t>(static_cast<std::int64_t>(p) + f.shifts[s])]);
+    for (const std::uint16_t s : slots)
+      lattice_lists_.neighbour.push_back(row_of[static_cast<std::size_t>(static_cast<std::int64_t>(p) + f.shifts[s])]);
     slot_.insert(slot_.end(), slots.begin(), slots.end());
     lattice_lists_.first.push_back(static_cast<std::int64_t>(slot_.size()));
     f.inverse_shape(pattern, lane, &inverse_[6 * r]);
@@ -60,8 +62,8 @@ void PointFamilies::bond_shares(std::size_t row, const FamilyArrays& family, Ali
 }
 
 std::size_t PointFamilies::bytes() const noexcept {
-  return (lattice_ ? lattice_->bytes() : cloud_->bytes()) + rows() * 4 + lattice_lists_.neighbour.size() * 6 + lattice_lists_.first.size() * 8 +
-         (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size();
+  return (lattice_ ? lattice_->bytes() : cloud_->bytes()) + rows() * 4 + lattice_lists_.neighbour.size() * 6 +
+         lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size();
 }
 
 void point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
@@ -75,7 +77,8 @@ void point_gradient(const FamilyArrays& family, double horizon, int order, std::
     for (int e = 0; e < d; ++e)
       for (int a = 0; a < d; ++a) {
         const auto bond = static_cast<std::size_t>(k);
-        g[static_cast<std::size_t>(k * d + e)] += family.omega[bond] * family.volume[bond] * family.inverse_shape[symmetric_index(d, a, e)] * family.xi[a][bond];
+        g[static_cast<std::size_t>(k * d + e)] +=
+            family.omega[bond] * family.volume[bond] * family.inverse_shape[symmetric_index(d, a, e)] * family.xi[a][bond];
       }
 }
 

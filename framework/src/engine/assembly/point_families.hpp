@@ -31,7 +31,7 @@ class PointFamilies {
   }
   /// Rows with the whole family of a lattice: all of them have the same stencils.
   bool whole(std::size_t row) const noexcept { return !whole_.empty() && whole_[row]; }
-  double damage(std::size_t row) const noexcept { return damage_[row]; }   ///< D_i
+  double damage(std::size_t row) const noexcept { return damage_[row]; }  ///< D_i
   /// Bonds in the order of neighbours(row), with the inverse shape tensor.
   void load(std::size_t row, FamilyArrays& out) const;
   /// w_ij of each bond of a loaded family, 1/N_i over the whole one; padded.
@@ -46,12 +46,12 @@ class PointFamilies {
   std::optional<LatticeFamilies> lattice_;
   std::optional<CloudFamilies> cloud_;
   std::vector<std::int32_t> point_;
-  AlignedVector<double> normaliser_, damage_;     ///< by row
+  AlignedVector<double> normaliser_, damage_;  ///< by row
   // Lattices.
   FamilyLists lattice_lists_;
-  std::vector<std::uint16_t> slot_;               ///< by bond
-  std::vector<std::uint8_t> whole_;               ///< by row
-  AlignedVector<double> inverse_;                 ///< K^-1 by row, 6 components
+  std::vector<std::uint16_t> slot_;  ///< by bond
+  std::vector<std::uint8_t> whole_;  ///< by row
+  AlignedVector<double> inverse_;    ///< K^-1 by row, 6 components
 };
 
 /// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:

@@ -19,7 +19,8 @@ Tensor<double, S> inverse_transpose(const double* H) noexcept {
 
 }  // namespace
 
-// With B = A : Fh, p = P : Fh, s = Fh : B, t = Ft^-T, b = Fbar^-T, C = B + P and (t * t)_(ij)(kl) = t_il t_kj, the derivative of t:
+// With B = A : Fh, p = P : Fh, s = Fh : B, t = Ft^-T, b = Fbar^-T, C = B + P and (t * t)_(ij)(kl) = t_il t_kj, the derivative of
+// t:
 //   dFt  dFt     a^2 A - a/3 (C (x) t + t (x) C) + (s + p)/9 t (x) t + p/3 t * t
 //   dFt  dFbar   a/3 C (x) b - (s + p)/9 t (x) b
 //   dFbar dFbar  (s + p)/9 b (x) b - p/3 b * b
@@ -39,7 +40,8 @@ void selective_tangent(const SelectiveLane& x, double* own, double* mixed, doubl
   for (int r = 0; r < n; ++r) {
     for (int c = 0; c < n; ++c) {
       const int i = r / D, j = r % D, k = c / D, l = c % D, at = r * n + c;
-      own[at] = x.weight * (x.a * x.a * x.A[(r * S::components + c) * batch_points] - (C[r] * t[c] + t[r] * C[c]) + trace * t[r] * t[c] + p / 3 * t(i, l) * t(k, j));
+      own[at] = x.weight * (x.a * x.a * x.A[(r * S::components + c) * batch_points] - (C[r] * t[c] + t[r] * C[c]) +
+                            trace * t[r] * t[c] + p / 3 * t(i, l) * t(k, j));
       mixed[at] = x.weight * (C[r] * b[c] - trace * t[r] * b[c]);
       bar[at] = x.weight * (trace * b[r] * b[c] - p / 3 * b(i, l) * b(k, j));
     }

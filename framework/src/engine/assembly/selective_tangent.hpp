@@ -5,12 +5,12 @@ namespace perikit {
 
 /// One lane of batches; components have stride batch_points.
 struct SelectiveLane {
-  const double* Ht;      ///< in-space
-  const double* Hbar;    ///< in-space
-  const double* P;       ///< at Fh = a Ft, all components of the space
-  const double* A;       ///< likewise
+  const double* Ht;    ///< in-space
+  const double* Hbar;  ///< in-space
+  const double* P;     ///< at Fh = a Ft, all components of the space
+  const double* A;     ///< likewise
   double a;
-  double weight;         ///< W: factor of the results
+  double weight;  ///< W: factor of the results
 };
 
 /// own, mixed, bar <- W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar over in-space components, D^2 x D^2 row-major.

@@ -41,7 +41,7 @@ template <int D>
 int TangentBatch<D>::evaluate() {
   for (int first = 0; first < lanes_; first += batch_points) {
     const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
-    for (int lane = first + n; lane < last; ++lane) {   // padding at rest
+    for (int lane = first + n; lane < last; ++lane) {  // padding at rest
       owner_[static_cast<std::size_t>(lane)] = owner_[static_cast<std::size_t>(first)];
       for (int c = 0; c < components; ++c) {
         H(lane, c) = 0;
@@ -68,7 +68,8 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
     double* out = own_.data() + static_cast<std::size_t>(first + l) * entries;
     const double weight = weight_[static_cast<std::size_t>(first + l)];
     for (int r = 0; r < components; ++r)
-      for (int c = 0; c < components; ++c) out[r * components + c] = weight * A_[static_cast<std::size_t>((r * all + c) * batch_points + l)];
+      for (int c = 0; c < components; ++c)
+        out[r * components + c] = weight * A_[static_cast<std::size_t>((r * all + c) * batch_points + l)];
   }
   return -1;
 }
@@ -87,7 +88,8 @@ int TangentBatch<D>::evaluate_selective(int first, int n) {
   if (!status.ok()) return status.inadmissible;
   for (int l = 0; l < n; ++l) {
     const std::size_t lane = static_cast<std::size_t>(first + l) * entries;
-    selective_tangent<D>({map.Ht + l, map.Hbar + l, P_.data() + l, A_.data() + l, scale_[static_cast<std::size_t>(l)] + 1, weight_[static_cast<std::size_t>(first + l)]},
+    selective_tangent<D>({map.Ht + l, map.Hbar + l, P_.data() + l, A_.data() + l, scale_[static_cast<std::size_t>(l)] + 1,
+                          weight_[static_cast<std::size_t>(first + l)]},
                          own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
   }
   return -1;

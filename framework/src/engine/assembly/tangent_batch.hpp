@@ -32,7 +32,7 @@ class TangentBatch {
   const double* bar(int lane) const noexcept { return bar_.data() + static_cast<std::size_t>(lane) * entries; }
 
  private:
-  static constexpr int stored = 9;   ///< components of a gradient with the lateral ones
+  static constexpr int stored = 9;  ///< components of a gradient with the lateral ones
   double& at(AlignedVector<double>& x, int lane, int component) noexcept {
     return x[static_cast<std::size_t>((lane / batch_points * stored + component) * batch_points + lane % batch_points)];
   }
@@ -42,8 +42,8 @@ class TangentBatch {
   const Laws& laws_;
   bool selective_;
   int lanes_ = 0;
-  AlignedVector<double> H_, Hbar_;             ///< batches of [component][batch_points]
-  std::vector<std::int32_t> owner_;            ///< padded to batches
+  AlignedVector<double> H_, Hbar_;   ///< batches of [component][batch_points]
+  std::vector<std::int32_t> owner_;  ///< padded to batches
   std::vector<double> weight_;
   AlignedVector<double> own_, mixed_, bar_;
   AlignedVector<double> A_, P_, mapped_, scale_;
