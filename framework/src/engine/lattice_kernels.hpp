@@ -22,7 +22,7 @@ class LatticeOperator {
  public:
   explicit LatticeOperator(const LatticeFamilies& families) : f_(families) {}
 
-  /// H of `count` chunks that follow each other from chunk c on: H[(a * D + b) * stride + lane], lanes from 0.
+  /// H of `count` chunks of one block, in their order: H[(a * D + b) * stride + lane], lanes from 0.
   void gradient(const LatticeChunk* chunks, int count, ConstFieldView u, double* H, std::size_t stride) const noexcept {
     runs<false>(chunks, count, u, H, stride, nullptr);
   }
@@ -85,10 +85,11 @@ class LatticeOperator {
     for (int c = 0; c < count;) {
       const int lane = c * chunk_points;
       double* near = with_sums ? sums + lane : nullptr;
-      if (count - c >= 4) {
+      const auto adjacent = [&](int n) { return count - c >= n && chunks[c + n - 1].first == chunks[c].first + (n - 1) * chunk_points; };
+      if (adjacent(4)) {
         run<4, with_sums>(chunks + c, u, H + lane, stride, near);
         c += 4;
-      } else if (count - c >= 2) {
+      } else if (adjacent(2)) {
         run<2, with_sums>(chunks + c, u, H + lane, stride, near);
         c += 2;
       } else {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/assembly/pair_assembly.hpp"
+#include "family_point.hpp"
 #include "samples.hpp"
 
 namespace perikit {
