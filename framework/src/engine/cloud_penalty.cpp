@@ -20,8 +20,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 
  public:
   CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
-      : model_(model), families_(model.families()), position_(reinterpret_cast<const Row*>(parts.body->rows().data())), points_(parts.body->points()),
-        M_(columns * points_, Column{}), flux_(D * points_) {
+      : model_(model), families_(model.families()), position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
+        points_(parts.body->points()), M_(columns * points_, Column{}), flux_(D * points_) {
     over_points([&](std::size_t p) { set_matrix(parts, p); });
   }
 
@@ -63,9 +63,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     if (!std::isfinite(families_.condition.data()[p])) return;   // singular: M = 0
     double intact = 0, M[6];
     for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
-    // The normaliser is sum V_j over the whole family, D = 1 - intact share of sum omega V_j.
-    const double mean = intact / (1 - families_.damage.data()[p]) / families_.normaliser[p];
-    parts.stabilization->penalty({family_point(*parts.body, *parts.laws, p), mean, inverse}, M);
+    const double damage = families_.damage.data()[p];
+    parts.stabilization->penalty(penalty_point(*parts.body, *parts.laws, p, intact, damage, families_.normaliser[p], inverse), M);
     if constexpr (isotropic) {
       M_[p] = M[0];
     } else {

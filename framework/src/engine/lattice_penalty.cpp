@@ -23,8 +23,9 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
       : model_(model), families_(model.families()), operator_(families_), M_(parts.body->make_field(Matrix::components)),
         B_(parts.body->make_field(Matrix::components)), flux_(parts.body->make_field(D * D)), source_(parts.body->make_field(D)) {
-    parallel_for(families_.blocks.size(), [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(parts, chunk); }); });
-    parallel_for(families_.blocks.size(), [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
+    const std::size_t blocks = families_.blocks.size();
+    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(parts, chunk); }); });
+    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
   void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
@@ -39,7 +40,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       });
     });
     families_.colouring.for_each([&](std::size_t b) {
-      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, source_, force);
+      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
+        operator_.divergence(families_.rows[r], flux_, source_, force);
     });
     if (families_.broken > 0) {
       parallel_for(families_.blocks.size(), [&](std::size_t b) {
@@ -76,12 +78,12 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       if (!(pattern.live >> l & 1) || pattern.singular >> l & 1) continue;   // M = 0
       const auto p = static_cast<std::size_t>(chunk.first + l);
       double intact = 0, inverse[6], M[6];
-      for (std::size_t s = 0; s < families_.offsets.size(); ++s) intact += LatticeFamilies::intact(pattern, s, l) ? families_.omega[s] : 0.0;
+      for (std::size_t s = 0; s < families_.offsets.size(); ++s)
+        if (LatticeFamilies::intact(pattern, s, l)) intact += families_.omega[s];
       families_.inverse_shape(pattern, l, inverse);
-      // scale = V / sum V_j over the whole family, D = 1 - intact share of sum omega.
-      const double mean = intact / (1 - pattern.damage[l]) * pattern.scale[l];
-      parts.stabilization->penalty({family_point(*parts.body, *parts.laws, p), mean, inverse}, M);
-      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = families_.volume * families_.volume * M[c];
+      const double V = families_.volume;
+      parts.stabilization->penalty(penalty_point(*parts.body, *parts.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
+      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
     }
   }
 
@@ -98,7 +100,11 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       }
   }
 
-  static std::uint8_t lanes(const LatticePattern& pattern, std::size_t slot, int l) noexcept { return static_cast<std::uint8_t>(pattern.mask[slot] >> l); }
+  static std::uint8_t lanes(const LatticePattern& pattern, std::size_t slot, int l) noexcept {
+    return static_cast<std::uint8_t>(pattern.mask[slot] >> l);
+  }
+  /// Component of H beside internal axis e.
+  std::size_t component(int c, int e) const noexcept { return static_cast<std::size_t>(c * D + families_.lattice.axis[static_cast<std::size_t>(e)]); }
 
   /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b.
   template <class Use>
@@ -113,7 +119,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   }
 
   /// Flux, source, and what they and the point's own displacement give its own force.
-  void own_forces(const LatticeChunk& chunk, ConstFieldView u, double factor, const double* H, const double* sums, FieldView force) noexcept {
+  void own_forces(const LatticeChunk& chunk, ConstFieldView u, double factor, const double* H, const double* sums,
+                  FieldView force) noexcept {
     const LatticePattern& pattern = families_.pattern(chunk);
     const Pack scale(factor), flux_scale(-factor * families_.spacing);
     for (int l = 0; l < chunk_points; l += pack_width) {
@@ -134,7 +141,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       for (int c = 0; c < D; ++c) (scale * y[c]).store(source_.component(c) + p);
       for (int e = 0; e < D; ++e) {
         const Pack moment = Pack::load(pattern.moment[e] + l);
-        for (int c = 0; c < D; ++c) x[c] = Pack::load(H + (c * D + families_.lattice.axis[static_cast<std::size_t>(e)]) * batch_points + l);
+        for (int c = 0; c < D; ++c) x[c] = Pack::load(H + component(c, e) * batch_points + l);
         Matrix::apply(M, x, y);
         for (int c = 0; c < D; ++c) {
           const Pack q = flux_scale * y[c];
@@ -155,7 +162,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       for (int c = 0; c < Matrix::components; ++c) M[c] = Pack::load(M_.component(c) + p);
       for (int c = 0; c < D; ++c) {
         own[c] = Pack::load(u.component(c) + p);
-        for (int e = 0; e < D; ++e) G[c][e] = Pack(families_.spacing) * Pack::load(H + (c * D + families_.lattice.axis[static_cast<std::size_t>(e)]) * batch_points + l);
+        for (int e = 0; e < D; ++e) G[c][e] = Pack(families_.spacing) * Pack::load(H + component(c, e) * batch_points + l);
       }
       for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
         Pack z[D], t[D], product(0.0);

@@ -12,6 +12,9 @@ class StabilizedModel final : public Model {
 
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) override;
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  /// The base assembles the penalty with its own elements.
+  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K) override { return base_->assemble(u, K); }
+  AssembledSize assembled_size() override { return base_->assembled_size(); }
   EvaluationStatus sample(ConstFieldView u, PointSamples& samples) override;
   Field shape_tensor_condition() override { return base_->shape_tensor_condition(); }
   Field damage() override { return base_->damage(); }
