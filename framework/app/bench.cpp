@@ -69,6 +69,13 @@ std::pair<double, double> time_step_of(Registry& registry, const std::string& ki
   return {std::min(probe, timed(steps, bytes)), bytes};
 }
 
+/// Every kinematics, and `conventional` with every stabilization.
+std::vector<std::string> every_row(const Registry& registry) {
+  std::vector<std::string> rows = registry.names(Kind::kinematics);
+  for (const std::string& stabilization : registry.names(Kind::stabilization)) rows.push_back("conventional+" + stabilization);
+  return rows;
+}
+
 }  // namespace
 
 void bench(Registry& registry, const std::vector<std::string>& kinematics, int dimension, int cells) {
@@ -77,10 +84,12 @@ void bench(Registry& registry, const std::vector<std::string>& kinematics, int d
              limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
   fmt::print("{}D, {} points a side, horizon 3.015 spacings, saint_venant_kirchhoff, verlet, {} thread(s); fastest step\n\n", dimension, cells, thread_count());
   fmt::print("| kinematics | lattice: ns a point and step | bytes a point | cloud: ns a point and step | bytes a point |\n|---|---|---|---|---|\n");
-  for (const std::string& name : kinematics.empty() ? registry.names(Kind::kinematics) : kinematics) {
-    const std::string table = registry.describe(Kind::kinematics, name).examples.front();
-    const auto [lattice, lattice_bytes] = time_step_of(registry, name, table, dimension, cells, false);
-    const auto [cloud, cloud_bytes] = time_step_of(registry, name, table, dimension, cells, true);
+  for (const std::string& name : kinematics.empty() ? every_row(registry) : kinematics) {
+    const std::size_t plus = name.find('+');
+    const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
+    const std::string table = plus == name.npos ? example : fmt::format("{}\nstabilization = \"{}\"", example, name.substr(plus + 1));
+    const auto [lattice, lattice_bytes] = time_step_of(registry, part, table, dimension, cells, false);
+    const auto [cloud, cloud_bytes] = time_step_of(registry, part, table, dimension, cells, true);
     fmt::print("| {} | {:.1f} | {:.0f} | {:.1f} | {:.0f} |\n", name, lattice * 1e9, lattice_bytes, cloud * 1e9, cloud_bytes);
     std::fflush(stdout);
   }

@@ -204,7 +204,7 @@ void add_commands(CLI::App& app, Options& options) {
   plot_command->add_option("--unit", options.unit, "Unit to show, where the scene is not in SI");
   plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf");
   CLI::App* bench_command = add("bench", "Speed of the kernels beside the limits of this machine", measure);
-  bench_command->add_option("--kinematics", options.kinematics, "Which; default: all known ones");
+  bench_command->add_option("--kinematics", options.kinematics, "Which; with a penalty: conventional+silling; default: all known ones");
   bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
   bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));

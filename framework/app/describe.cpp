@@ -22,6 +22,15 @@ Kind parse_kind(const std::string& text) {
   throw InputError(fmt::format("unknown kind '{}'{}; known: {}", text, did_you_mean(text, names), fmt::join(names, ", ")));
 }
 
+/// Where a scene holds a part of this kind.
+std::string_view scene_table(Kind kind) {
+  switch (kind) {
+    case Kind::influence: return "family.influence";
+    case Kind::stabilization: return "kinematics.stabilization";
+    default: return name(kind);
+  }
+}
+
 void indent(std::string& out, const std::string& text) {
   std::size_t begin = 0;
   while (begin < text.size()) {
@@ -94,7 +103,7 @@ std::string describe_part(Registry& registry, const std::string& part) {
   out += parameter_lines(d.parameters);
   out += "\nExample\n";
   for (const std::string& example : d.examples) {
-    std::string table = fmt::format("[{}]\ntype = \"{}\"\n{}", name(kind), d.name, example);
+    std::string table = fmt::format("[{}]\ntype = \"{}\"\n{}", scene_table(kind), d.name, example);
     indent(out, table);
   }
   return out;

@@ -21,7 +21,21 @@ std::vector<Example> examples(Kind kind) {
   return all;
 }
 
-std::string kinematics_table(const Example& example) { return fmt::format("type = \"{}\"\n{}", example.part, example.table); }
+std::vector<Example> kinematics_examples() {
+  std::vector<Example> all = examples(Kind::kinematics);
+  for (const Example& example : examples(Kind::stabilization)) {
+    std::string table = fmt::format("type = \"{}\"{}{}", example.part, example.table.empty() ? "" : "\n", example.table);
+    std::replace(table.begin(), table.end(), '\n', ',');
+    const auto part = parse_part(Kind::stabilization, example.part, example.table, subject().registry);
+    all.push_back({"conventional", "", fmt::format("{{ {} }}", table), subject().registry.stabilization(*part)->traits().isotropic});
+  }
+  return all;
+}
+
+std::string kinematics_table(const Example& example) {
+  const std::string stabilization = example.stabilization.empty() ? "" : fmt::format("stabilization = {}\n", example.stabilization);
+  return fmt::format("type = \"{}\"\n{}{}", example.part, stabilization, example.table);
+}
 
 std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   const int d = o.dimension;
@@ -60,13 +74,13 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
 }
 
 std::string Case::label() const {
-  return fmt::format("{} ({}) {}D {}{}{}{}", example.part, example.table, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
+  return fmt::format("{} ({}{}) {}D {}{}{}{}", example.part, example.table, example.stabilization, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
                      body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
 }
 
 std::vector<Case> cases() {
   std::vector<Case> all;
-  for (const Example& example : examples(Kind::kinematics)) {
+  for (const Example& example : kinematics_examples()) {
     const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
     const bool selective = subject().registry.kinematics(*part)->traits().selective;
     for (int d = 1; d <= 3; ++d) {

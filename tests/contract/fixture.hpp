@@ -25,8 +25,12 @@ Subject& subject();
 struct Example {
   std::string part;
   std::string table;   ///< TOML keys without `type`
+  std::string stabilization = {};   ///< of a kinematics: its inline table, or empty
+  bool keeps_angular_momentum = true;
 };
 std::vector<Example> examples(Kind kind);
+/// Examples of kinematics, and `conventional` with every example of the stabilizations to test.
+std::vector<Example> kinematics_examples();
 
 /// What a test body looks like. Spacing is 1 unless scaled.
 struct BodyOptions {

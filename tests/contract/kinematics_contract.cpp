@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "perikit/core/parallel.hpp"
 #include "tests/contract/fixture.hpp"
@@ -14,6 +15,28 @@ using namespace perikit;
 using namespace perikit::contract;
 
 namespace {
+
+/// Where a part says that it does not keep an identity, the suite measures by how much, and holds it to its word: a part that
+/// keeps the identity after all must claim it.
+class Exceptions {
+ public:
+  /// Whether c makes no claim; then its relative error is noted.
+  bool noted(const Case& c, double error) {
+    if (c.example.keeps_angular_momentum) return false;
+    double& worst = worst_.try_emplace(c.example.stabilization, 0.0).first->second;
+    worst = std::max(worst, error);
+    return true;
+  }
+  void check() const {
+    for (const auto& [part, worst] : worst_) {
+      MESSAGE(part << " is not objective: relative error up to " << worst);
+      CHECK(worst > 1e-8);
+    }
+  }
+
+ private:
+  std::map<std::string, double> worst_;
+};
 
 /// Poisoned output: whatever a kernel forgets to write shows.
 Field poisoned(const BodyProblem& problem) {
@@ -78,6 +101,7 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
 }
 
 TEST_CASE("kinematics: linear and angular momentum") {
+  Exceptions exceptions;
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
@@ -102,9 +126,11 @@ TEST_CASE("kinematics: linear and angular momentum") {
     }
     for (std::size_t a = 0; a < 3; ++a) {
       CHECK_MESSAGE(std::abs(total[a]) <= 1e-11 * scale, "forces do not sum to zero: ", total[a], " of ", scale);
+      if (exceptions.noted(c, std::abs(moment[a]) / (scale * extent))) continue;
       CHECK_MESSAGE(std::abs(moment[a]) <= 1e-11 * scale * extent, "moments do not sum to zero: ", moment[a], " of ", scale * extent);
     }
   }
+  exceptions.check();
 }
 
 TEST_CASE("kinematics: affine motion is exact") {
@@ -147,6 +173,7 @@ TEST_CASE("kinematics: affine motion is exact") {
 }
 
 TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores the same and its forces rotate") {
+  Exceptions exceptions;
   for (const Case& c : cases()) {
     if (c.body.dimension == 1) continue;
     INFO(c.label());
@@ -178,7 +205,6 @@ TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores t
         turned.component(a)[p] = rigid - x[static_cast<std::size_t>(a)];
       }
     }
-    CHECK_MESSAGE(std::abs(energy_of(problem, rotated) - energy) <= 1e-11 * energy, "energy changes under rotation");
     const Field g = force_of(problem, rotated);
     double worst = 0;
     for (const std::int32_t p : body.internal())
@@ -187,10 +213,15 @@ TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores t
         for (int b = 0; b < u.components; ++b) expected += R[a][b] * f.component(b)[p];
         worst = std::max(worst, std::abs(g.component(a)[p] - expected));
       }
-    CHECK_MESSAGE(worst <= 1e-11 * largest(body, f), "forces do not rotate: ", worst, " of ", largest(body, f));
+    const double change = std::abs(energy_of(problem, rotated) - energy);
+    if (!exceptions.noted(c, change / energy)) {
+      CHECK_MESSAGE(change <= 1e-11 * energy, "energy changes under rotation");
+      CHECK_MESSAGE(worst <= 1e-11 * largest(body, f), "forces do not rotate: ", worst, " of ", largest(body, f));
+    }
     CHECK_MESSAGE(energy_of(problem, turned) <= 1e-20 * energy + 1e-24, "a rigid rotation stores energy");
     CHECK_MESSAGE(largest(body, force_of(problem, turned)) <= 1e-11 * largest(body, f), "a rigid rotation has forces");
   }
+  exceptions.check();
 }
 
 TEST_CASE("kinematics: a body at rest is bitwise at rest") {

@@ -6,9 +6,8 @@
 
 #include <cmath>
 
-#include "perikit/body/influence.hpp"
-#include "tests/contract/dense_reference.hpp"
 #include "tests/contract/fixture.hpp"
+#include "tests/contract/reference_body.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -60,30 +59,6 @@ reference::Law saint_venant_kirchhoff() {
           }};
 }
 
-/// The body as the reference sees it, points in input order.
-reference::Cloud cloud_of(const Body& body, const InfluenceFunction& influence) {
-  reference::Cloud cloud;
-  cloud.dimension = body.dimension();
-  cloud.horizon = body.horizon();
-  cloud.influence = [&influence](double r) {
-    double omega = 0;
-    influence.evaluate({&r, 1}, {&omega, 1});
-    return omega;
-  };
-  std::vector<Point> position;
-  for (const std::int32_t p : body.internal()) {
-    position.push_back(body.position(static_cast<std::size_t>(p)));
-    cloud.position.push_back(Eigen::Map<const reference::Vector>(position.back().data(), cloud.dimension));
-    cloud.volume.push_back(body.volume(static_cast<std::size_t>(p)));
-  }
-  if (!body.cracks().empty()) {
-    cloud.integrity = [&body, position](int i, int j) {
-      return body.cut(position[static_cast<std::size_t>(i)], position[static_cast<std::size_t>(j)]) ? 0.0 : 1.0;
-    };
-  }
-  return cloud;
-}
-
 std::vector<BodyOptions> bodies() {
   std::vector<BodyOptions> all;
   for (int d = 1; d <= 3; ++d)
@@ -118,9 +93,7 @@ TEST_CASE("kinematics: agrees with the dense reference") {
       const Body& body = problem.body();
       deform(body, problem.displacement(), 61, 0.02);
       const auto d = static_cast<Eigen::Index>(body.dimension()), n = static_cast<Eigen::Index>(body.points());
-      reference::Vector u(d * n);
-      for (Eigen::Index i = 0; i < n; ++i)
-        for (Eigen::Index c = 0; c < d; ++c) u[d * i + c] = problem.displacement().component(static_cast<int>(c))[body.internal()[static_cast<std::size_t>(i)]];
+      const reference::Vector u = dense(body, problem.displacement());
       const auto influence = subject().registry.influence(*simulation->scene().influence);
       const reference::Operator op = reference::build(cloud_of(body, *influence), *description);
       const reference::Vector expected = reference::force(op, saint_venant_kirchhoff(), u);

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "tests/contract/dense_reference.hpp"
 #include "tests/contract/fixture.hpp"
+#include "tests/contract/reference_body.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -27,14 +27,6 @@ std::vector<Example> pair_laws() {
 }
 
 bool has_reference(const Example& law) { return (law.part == "bond_based" || law.part == "ordinary") && law.table.empty(); }
-
-reference::Elasticity elasticity(const Body& body) {
-  switch (body.space()) {
-    case Space::plane_stress: return {2 * lambda * mu / (lambda + 2 * mu), mu, body.section()};
-    case Space::line_stress: return {youngs - 2 * mu, mu, body.section()};
-    default: return {lambda, mu, body.section()};
-  }
-}
 
 double distance_to_surface(const Body& body, const Point& x) {
   double least = INFINITY;
@@ -75,34 +67,19 @@ TEST_CASE("kinematics: pair laws agree with the dense reference") {
             const auto simulation = build(scene_text(options, kinematics_table(law)));
             BodyProblem& problem = simulation->problem();
             const Body& body = problem.body();
-            reference::Cloud dense;
-            dense.dimension = d;
-            dense.horizon = body.horizon();
-            dense.influence = [](double r) { return std::exp(-r * r); };
-            dense.integrity = [&](int i, int j) {
-              const auto at = [&](int p) { return body.position(static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(p)])); };
-              return body.cut(at(i), at(j)) ? 0.0 : 1.0;
-            };
             Noise random(61);
-            reference::Vector u(d * static_cast<int>(body.points()));
-            for (int i = 0; i < static_cast<int>(body.points()); ++i) {
-              const auto p = static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(i)]);
-              const Point x = body.position(p);
-              reference::Vector position(d);
-              for (int c = 0; c < d; ++c) position[c] = x[static_cast<std::size_t>(c)];
-              dense.position.push_back(position);
-              dense.volume.push_back(body.volume(p));
-              for (int c = 0; c < d; ++c) problem.displacement().component(c)[p] = u[d * i + c] = 0.05 * x[static_cast<std::size_t>(c)] + 0.03 * random();
-            }
+            set_field(body, problem.displacement(), [&](const Point& x) {
+              return Point{0.05 * x[0] + 0.03 * random(), 0.05 * x[1] + 0.03 * random(), 0.05 * x[2] + 0.03 * random()};
+            });
+            const reference::Vector u = dense(body, problem.displacement());
+            const auto influence = subject().registry.influence(*simulation->scene().influence);
+            const reference::Cloud cloud_of_body = cloud_of(body, *influence);
             Field f = problem.make_field(d);
             double energy = 0;
             REQUIRE(problem.evaluate_forces(problem.displacement(), f, &energy).ok());
-            const reference::Vector expected = reference::pair_force(dense, law.part, elasticity(body), u);
-            const double expected_energy = reference::pair_energy(dense, law.part, elasticity(body), u);
-            double worst = 0;
-            for (int i = 0; i < static_cast<int>(body.points()); ++i)
-              for (int c = 0; c < d; ++c)
-                worst = std::max(worst, std::abs(f.component(c)[body.internal()[static_cast<std::size_t>(i)]] - expected[d * i + c]));
+            const reference::Vector expected = reference::pair_force(cloud_of_body, law.part, elasticity(body), u);
+            const double expected_energy = reference::pair_energy(cloud_of_body, law.part, elasticity(body), u);
+            const double worst = (dense(body, f) - expected).cwiseAbs().maxCoeff();
             CHECK_MESSAGE(worst <= 1e-11 * expected.cwiseAbs().maxCoeff(), "forces are off by ", worst / expected.cwiseAbs().maxCoeff());
             CHECK_MESSAGE(std::abs(energy - expected_energy) <= 1e-11 * expected_energy, "energy ", energy, " against ", expected_energy);
           }

@@ -99,6 +99,18 @@ TEST_CASE("zig-zag: F = 1 in the conventional model, energy in every other one")
   CHECK(sample("partmann/zigzag.toml", "inside", {"kinematics.parts=4"}).density == doctest::Approx(0.5 * 1000 * 0.2 * 0.2 / 2).epsilon(1e-12));
 }
 
+TEST_CASE("zig-zag and checkerboard: the penalties store energy over the conventional model, whose F stays blind") {
+  const auto bar = [](const char* table) { return sample("partmann/zigzag.toml", "inside", {fmt::format("kinematics={{ type = \"conventional\", stabilization = {} }}", table)}); };
+  // By hand: z = 2 alpha in the two odd bonds. silling: C = 2 E/(A delta^3), 1/2 C 2 (2 alpha)^2; wan: M = E/K, K = 10.
+  const double springs = 0.04 * 2 * 1000 / std::pow(2.015, 3);
+  for (const auto& [table, expected] : {std::pair{"\"silling\"", springs}, std::pair{"{ type = \"silling\", coefficient = 0.25 }", 0.25 * springs}, std::pair{"\"wan\"", 4.0}}) {
+    INFO(table);
+    CHECK(bar(table).density == doctest::Approx(expected).epsilon(1e-12));
+    CHECK(std::abs(bar(table).H) <= 1e-16);
+    CHECK(sample("partmann/checkerboard.toml", "inside", {fmt::format("kinematics={{ type = \"conventional\", stabilization = {} }}", table)}).density > 1e-3);
+  }
+}
+
 TEST_CASE("sub_horizon: parts without a gradient are dropped, their number must suit the dimension") {
   // The last point of either end has no outer half, and nothing else is missing.
   const Sample bar = sample("partmann/zigzag.toml", "inside", {});

@@ -24,6 +24,10 @@ class CloudModel final : public AssemblingModel {
   Field damage() override { return families_.damage; }
   ModelReport report() const override;
 
+  const CloudFamilies& families() const noexcept { return families_; }
+  /// H of point p as rows: H[D p + e][c] = H_ce.
+  void gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept;
+
  private:
   static constexpr std::size_t block_points = cloud_block_points;
 
@@ -31,7 +35,6 @@ class CloudModel final : public AssemblingModel {
   /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
   void gradient_lane(std::size_t p, const AlignedVector<Row>& u, double* H, int lane) const noexcept;
-  void gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept;
   void points_block(std::size_t b, Pass& pass);
   void bonds_block(std::size_t b, Pass& pass);
   int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy);

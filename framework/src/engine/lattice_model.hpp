@@ -26,6 +26,10 @@ class LatticeModel final : public AssemblingModel {
   Field damage() override;
   ModelReport report() const override;
 
+  const LatticeFamilies& families() const noexcept { return families_; }
+  /// Zero in the dead lanes of chunks.
+  void clean(FieldView out) const noexcept;
+
  private:
   EvaluationStatus run(Pass& pass);
   void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;
@@ -35,7 +39,6 @@ class LatticeModel final : public AssemblingModel {
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
   void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
-  void clean(FieldView out) const noexcept;
 
   const Body& body_;
   const Laws& laws_;

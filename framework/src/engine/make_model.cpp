@@ -1,11 +1,21 @@
 #include "cloud_model.hpp"
 #include "lattice_model.hpp"
 #include "pair_model.hpp"
+#include "stabilized_model.hpp"
 #include "weighted_model.hpp"
 
 namespace perikit {
 
 namespace {
+
+/// A point or bond model, and its zero-energy penalty where there is one.
+template <int D, class Base>
+std::unique_ptr<Model> make_local(const ModelParts& parts) {
+  auto model = std::make_unique<Base>(parts);
+  if (!parts.stabilization) return model;
+  auto penalty = make_penalty<D>(parts, *model);
+  return std::make_unique<StabilizedModel>(std::move(model), std::move(penalty));
+}
 
 template <int D>
 std::unique_ptr<Model> make(const ModelParts& parts) {
@@ -13,8 +23,8 @@ std::unique_ptr<Model> make(const ModelParts& parts) {
   if (traits.at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
   // Point gradients of higher order are stencils like any other.
   if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) return std::make_unique<WeightedModel<D>>(parts);
-  if (parts.body->lattice()) return std::make_unique<LatticeModel<D>>(parts);
-  return std::make_unique<CloudModel<D>>(parts);
+  if (parts.body->lattice()) return make_local<D, LatticeModel<D>>(parts);
+  return make_local<D, CloudModel<D>>(parts);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/assembly/pair_assembly.hpp"
+#include "family_point.hpp"
 #include "samples.hpp"
 
 namespace perikit {
@@ -82,7 +83,7 @@ PairModel<D>::PairModel(const ModelParts& parts)
 
 template <int D>
 PairPoint PairModel<D>::point(const Laws& laws, std::size_t p) const {
-  return {body_.space(), body_.section(), body_.horizon(), laws.moduli(p), 0, 1};
+  return {family_point(body_, laws, p), 0, 1};
 }
 
 template <int D>

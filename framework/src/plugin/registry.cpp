@@ -265,7 +265,7 @@ std::unique_ptr<Kinematics> Registry::kinematics(const PartValues& values) const
   return implementation_->create<Kinematics>(Kind::kinematics, values, *this);
 }
 std::unique_ptr<Stabilization> Registry::stabilization(const PartValues& values) const {
-  throw implementation_->not_made(Kind::stabilization, values, "the interface of its kind is not part of this version");
+  return implementation_->create<Stabilization>(Kind::stabilization, values, *this);
 }
 std::unique_ptr<Material> Registry::material(const PartValues& values) const {
   return implementation_->create<Material>(Kind::material, values, *this);

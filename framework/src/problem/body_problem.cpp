@@ -22,10 +22,21 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   read_materials(factory);
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());
-  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), scene_.skip});
+  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip});
   read_initial();
   read_constraints(quasi_static);
   read_loads(quasi_static);
+}
+
+std::shared_ptr<const Stabilization> BodyProblem::make_stabilization(const PartFactory& factory) const {
+  if (!scene_.stabilization) return nullptr;
+  const KinematicsTraits traits = kinematics_->traits();
+  if (traits.at != EvaluationPoints::points || traits.order != 1) {
+    const std::string found = fmt::format("over {}{}", scene_.kinematics->type, traits.at == EvaluationPoints::points ? fmt::format(" of order {}", traits.order) : "");
+    throw InputError(scene_.kinematics->values.position("stabilization"), "kinematics.stabilization",
+                     fmt::format("found '{}' {}; allowed: over kinematics with one gradient per point, of order 1", scene_.stabilization->type, found));
+  }
+  return factory.stabilization(*scene_.stabilization);
 }
 
 FieldView BodyProblem::declare(const std::string& name, int components) {

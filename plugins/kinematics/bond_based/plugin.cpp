@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <memory>
-#include <numbers>
 
 #include "perikit/core/simd.hpp"
 #include "perikit/sdk/plugin.hpp"
@@ -20,14 +19,7 @@ class BondBased final : public Kinematics {
     return {.at = EvaluationPoints::pairs, .influence = false, .constant_moduli = true, .surface_correction = surface_correction_};
   }
 
-  PairModuli pair_moduli(const PairPoint& x) const noexcept override {
-    constexpr double pi = std::numbers::pi;
-    switch (dimension(x.space)) {
-      case 3: return {18 * x.bulk() / (pi * std::pow(x.horizon, 4)), 0};
-      case 2: return {12 * x.bulk() / (pi * x.section * std::pow(x.horizon, 3)), 0};
-      default: return {2 * x.bulk() / (x.section * std::pow(x.horizon, 2)), 0};
-    }
-  }
+  PairModuli pair_moduli(const PairPoint& x) const noexcept override { return {x.micromodulus(), 0}; }
 
   /// One modulus fixes Poisson's ratio.
   std::string pair_warning(const PairPoint& x) const override {

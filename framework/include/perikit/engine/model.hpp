@@ -11,6 +11,7 @@
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/engine/laws.hpp"
 #include "perikit/model/kinematics.hpp"
+#include "perikit/model/stabilization.hpp"
 #include "perikit/problem/integrator.hpp"
 
 namespace perikit {
@@ -70,6 +71,7 @@ struct ModelParts {
   std::shared_ptr<const Kinematics> kinematics;
   std::shared_ptr<const InfluenceFunction> influence;
   const Laws* laws = nullptr;
+  std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients of order 1
   bool skip = true;                           ///< false: no savings by symmetry or uniformity
 };
 

@@ -22,8 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "perikit/core/space.hpp"
-#include "perikit/model/material.hpp"
+#include "perikit/model/family_point.hpp"
 
 namespace perikit {
 
@@ -43,15 +42,9 @@ struct FamilyView {
 };
 
 /// What the moduli of a pair law at one point may depend on.
-struct PairPoint {
-  Space space = Space::solid;
-  double section = 1;                 ///< thickness (2D) [m] or area (1D) [m^2], contained in the volumes
-  double horizon = 0;                 ///< delta [m]
-  Moduli moduli;                      ///< small strain of the point's material [Pa]
+struct PairPoint : FamilyPoint {
   double weighted_volume = 0;         ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
   double intact = 1;                  ///< share of the family's influence that is not broken
-  /// Bulk modulus as the space sees it: K; plane strain K + mu/3, plane stress E/(2(1 - nu)); uniaxial strain lambda + 2 mu, stress E.
-  double bulk() const noexcept;
 };
 
 struct PairModuli {
@@ -130,16 +123,5 @@ class Kinematics {
   /// pairs: phi and its derivatives.
   virtual void dilatation_law(const DilatationBatch&) const noexcept {}
 };
-
-inline double PairPoint::bulk() const noexcept {
-  switch (space) {
-    case Space::solid: return moduli.bulk();
-    case Space::plane_strain: return moduli.lambda + moduli.mu;
-    case Space::plane_stress: return moduli.youngs() / (2 * (1 - moduli.poisson()));
-    case Space::line_strain: return moduli.lambda + 2 * moduli.mu;
-    case Space::line_stress: return moduli.youngs();
-  }
-  return 0;
-}
 
 }  // namespace perikit

@@ -90,6 +90,8 @@ class BodyProblem final : public Problem {
     std::vector<double> share;            ///< force on the point per unit of the value [N / unit]
   };
 
+  /// The scene's penalty, null without one; refused over kinematics that it does not suit.
+  std::shared_ptr<const Stabilization> make_stabilization(const PartFactory& factory) const;
   void read_materials(const PartFactory& factory);
   void read_initial();
   void read_constraints(bool quasi_static);

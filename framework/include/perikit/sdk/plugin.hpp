@@ -3,5 +3,6 @@
 #include "perikit/body/influence.hpp"
 #include "perikit/model/kinematics.hpp"
 #include "perikit/model/material.hpp"
+#include "perikit/model/stabilization.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/problem/integrator.hpp"

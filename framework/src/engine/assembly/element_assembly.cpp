@@ -9,7 +9,7 @@ namespace perikit {
 
 template <int D>
 ElementAssembly<D>::ElementAssembly(const ModelParts& parts)
-    : Assembly(parts, 2), laws_(*parts.laws), colouring_(colour_cloud(families().lists(), families().rows())) {
+    : Assembly(parts, 2), parts_(parts), laws_(*parts.laws), colouring_(colour_cloud(families().lists(), families().rows())) {
   shape_ = {parts.kinematics, parts.kinematics->traits(), 1};
   if (shape_.traits.at == EvaluationPoints::weighted) shape_.parts = parts.kinematics->parts(D);
   for (std::size_t r = 0; r < families().rows() && !whole_; ++r) {
@@ -93,7 +93,10 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
   for (std::size_t r = first; r < last; ++r) {
     const PointElement<D>& element = *m.of_row[r - first];
     collect_nodes(r, m.nodes);
+    const bool penalised = parts_.stabilization && m.penalty.load(parts_, families(), r);
+    if (penalised) m.penalty.subtract_seen(m.batch.own(lane));
     stiffness<D>(element, m.batch, lane, shape_.traits.selective, m.scratch);
+    if (penalised) m.penalty.add_springs(static_cast<std::size_t>(element.own), element.width, m.scratch.K.data());
     scatter(element, K, m);
     lane += element.points;
   }

@@ -1,13 +1,14 @@
 #pragma once
 #include "engine/assembly/assembly.hpp"
+#include "engine/assembly/penalty_element.hpp"
 #include "engine/assembly/point_element.hpp"
 #include "engine/assembly/tangent_batch.hpp"
 #include "engine/blocks.hpp"
 
 namespace perikit {
 
-/// Point and weighted shapes: everything that a point owns depends on its family, so that K is a sum of one dense matrix per
-/// point.
+/// Point and weighted shapes: everything that a point owns depends on its family, its zero-energy penalty too, so that K is a sum of one
+/// dense matrix per point.
 template <int D>
 class ElementAssembly final : public Assembly {
  public:
@@ -19,7 +20,8 @@ class ElementAssembly final : public Assembly {
     explicit Memory(const Laws& laws, bool selective) : batch(laws, selective) {}
     TangentBatch<D> batch;
     ElementScratch<D> scratch;
-    std::vector<PointElement<D>> elements;  ///< of points that are not whole
+    PenaltyElement<D> penalty;
+    std::vector<PointElement<D>> elements;          ///< of points that are not whole
     std::vector<const PointElement<D>*> of_row;
     std::vector<std::int32_t> nodes;
     AlignedVector<double> u;
@@ -32,6 +34,7 @@ class ElementAssembly final : public Assembly {
   void add_lanes(std::size_t row, const PointElement<D>& element, ConstFieldView u, Memory& m) const;
   void scatter(const PointElement<D>& element, BlockMatrix& K, Memory& m) const;
 
+  ModelParts parts_;
   const Laws& laws_;
   ElementShape shape_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family

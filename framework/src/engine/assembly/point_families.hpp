@@ -31,7 +31,8 @@ class PointFamilies {
   }
   /// Rows with the whole family of a lattice: all of them have the same stencils.
   bool whole(std::size_t row) const noexcept { return !whole_.empty() && whole_[row]; }
-  double damage(std::size_t row) const noexcept { return damage_[row]; }  ///< D_i
+  double damage(std::size_t row) const noexcept { return damage_[row]; }   ///< D_i
+  double normaliser(std::size_t row) const noexcept { return normaliser_[row]; }   ///< N_i of bond weights over the whole family
   /// Bonds in the order of neighbours(row), with the inverse shape tensor.
   void load(std::size_t row, FamilyArrays& out) const;
   /// w_ij of each bond of a loaded family, 1/N_i over the whole one; padded.

@@ -27,6 +27,7 @@ class TangentBatch {
   int evaluate();
   int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
   /// W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar.
+  double* own(int lane) noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* own(int lane) const noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* mixed(int lane) const noexcept { return mixed_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* bar(int lane) const noexcept { return bar_.data() + static_cast<std::size_t>(lane) * entries; }

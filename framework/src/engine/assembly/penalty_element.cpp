@@ -1,0 +1,57 @@
+#include "engine/assembly/penalty_element.hpp"
+
+#include "engine/family_point.hpp"
+
+namespace perikit {
+
+template <int D>
+bool PenaltyElement<D>::load(const ModelParts& parts, const PointFamilies& families, std::size_t row) {
+  families.load(row, family_);
+  if (family_.inverse_shape[0] == 0) return false;
+  const auto bonds = static_cast<std::size_t>(family_.bonds);
+  double intact = 0, M[6];
+  spring_.resize(bonds);
+  S_.setZero();
+  for (std::size_t k = 0; k < bonds; ++k) {
+    const double w = family_.omega[k] * family_.volume[k];
+    intact += w;
+    spring_[k] = families.volume(row) * w;
+    for (int e = 0; e < D; ++e)
+      for (int f = 0; f < D; ++f) S_(e, f) += spring_[k] * family_.xi[e][k] * family_.xi[f][k];
+  }
+  const PenaltyPoint point = penalty_point(*parts.body, *parts.laws, families.point(row), intact, families.damage(row),
+                                           families.normaliser(row), family_.inverse_shape);
+  parts.stabilization->penalty(point, M);
+  M_ = parts.stabilization->traits().isotropic ? Square<D>(M[0] * Square<D>::Identity()) : symmetric_matrix<D>(M);
+  return true;
+}
+
+template <int D>
+void PenaltyElement<D>::subtract_seen(double* A) const noexcept {
+  for (int a = 0; a < D; ++a)
+    for (int e = 0; e < D; ++e)
+      for (int b = 0; b < D; ++b)
+        for (int f = 0; f < D; ++f) A[(a * D + e) * D * D + b * D + f] -= M_(a, b) * S_(e, f);
+}
+
+template <int D>
+void PenaltyElement<D>::add_springs(std::size_t own, std::size_t width, double* K) const noexcept {
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b) {
+      double* block = K + static_cast<std::size_t>(a * D + b) * width * width;
+      for (std::size_t k = 0; k < spring_.size(); ++k) {
+        const std::size_t node = k < own ? k : k + 1;
+        const double s = M_(a, b) * spring_[k];
+        block[node * width + node] += s;
+        block[own * width + own] += s;
+        block[node * width + own] -= s;
+        block[own * width + node] -= s;
+      }
+    }
+}
+
+template class PenaltyElement<1>;
+template class PenaltyElement<2>;
+template class PenaltyElement<3>;
+
+}  // namespace perikit

@@ -1,0 +1,38 @@
+#pragma once
+/// Force and energy of a stabilization (see perikit/model/stabilization.hpp) on one body. With V_i contained in M_i from here on:
+///
+///   E = 1/2 sum_i sum_j V_j omega_ij z_ij . M_i z_ij,   z_ij = u_ij - H_i xi_ij
+///   f_k = sum_j omega_kj [(V_j M_k + V_k M_j) u_kj - (V_j M_k H_k + V_k M_j H_j) xi_kj]
+///
+/// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w).
+
+#include <memory>
+
+#include "perikit/core/field.hpp"
+#include "perikit/model/stabilization.hpp"
+
+namespace perikit {
+
+struct ModelParts;
+template <int D>
+class CloudModel;
+template <int D>
+class LatticeModel;
+
+class ZeroEnergyPenalty {
+ public:
+  virtual ~ZeroEnergyPenalty() = default;
+  /// force += -factor dE/du [N]; *energy += E [J] where wanted.
+  virtual void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) = 0;
+  /// density[p] += energy of point p per volume [J/m^3].
+  virtual void add_density(ConstFieldView u, double* density) = 0;
+  virtual std::size_t bytes() const noexcept = 0;
+};
+
+/// The penalty of parts.stabilization over a point gradient of order 1, whose families it shares: `model` must outlive it.
+template <int D>
+std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model);
+template <int D>
+std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model);
+
+}  // namespace perikit

@@ -1,0 +1,16 @@
+#pragma once
+/// A body of the engine as the dense reference sees it, points in input order.
+
+#include "perikit/body/body.hpp"
+#include "perikit/body/influence.hpp"
+#include "tests/contract/dense_reference.hpp"
+
+namespace perikit::contract {
+
+/// `body` and `influence` must outlive the result.
+reference::Cloud cloud_of(const Body& body, const InfluenceFunction& influence);
+/// Of the fixture's material at modulus 1, as the space of the body sees it.
+reference::Elasticity elasticity(const Body& body);
+reference::Vector dense(const Body& body, ConstFieldView field);
+
+}  // namespace perikit::contract
