@@ -76,11 +76,15 @@ bool same_pattern(const BlockMatrix& a, const BlockMatrix& b) {
 }  // namespace
 
 TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric, with every material") {
+  const std::vector<std::string> laws = materials();
+  std::size_t next = 0;
   for (Case c : cases()) {
-    for (const std::string& material : materials()) {
+    // In 3D, where a matrix takes the longest, they take turns.
+    const bool turns = c.body.dimension == 3;
+    const std::size_t begin = turns ? next++ % laws.size() : 0, end = turns ? begin + 1 : laws.size();
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::string& material = laws[k];
       c.body.material = material;
-      // Whole families once are enough in 3D, where a matrix takes the longest.
-      if (c.body.dimension == 3 && material != materials().front()) c.body.horizon_ratio = 1.515;
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
       BodyProblem& problem = simulation->problem();

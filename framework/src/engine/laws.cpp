@@ -69,17 +69,22 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
   const auto mixed = std::any_of(batch.points, batch.points + batch.n,
                                  [&](std::int32_t p) { return ids_[static_cast<std::size_t>(p)] != first; });
   if (!mixed) return evaluate_one(records_[first], batch, scratch);
-  // Several laws in one batch: each sees the whole batch and keeps its own lanes.
+  // Several laws in one batch: each sees its own lanes and the others at rest, for what one law accepts another may not.
   Status status;
   for (std::size_t m = 0; m < records_.size(); ++m) {
     const auto mine = [&](int l) { return ids_[static_cast<std::size_t>(batch.points[l])] == m; };
     bool present = false;
     for (int l = 0; l < batch.n && !present; ++l) present = mine(l);
     if (!present) continue;
+    for (int c = 0; c < components(); ++c)
+      for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(batch.n))); ++l)
+        scratch.H[c * batch_points + l] = l < batch.n && mine(l) ? batch.H[c * batch_points + l] : 0.0;
     LawBatch part = batch;
+    part.H = scratch.H;
     part.psi = batch.psi ? scratch.psi : nullptr;
     part.P = batch.P ? scratch.P : nullptr;
     part.dP = batch.dP ? scratch.dP : nullptr;
+    part.lateral = batch.lateral ? scratch.lateral : nullptr;
     part.A = batch.A ? scratch.A.data() : nullptr;
     const Status one = evaluate_one(records_[m], part, scratch);
     if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
@@ -90,6 +95,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
           if (mine(l)) to[c * batch_points + l] = from[c * batch_points + l];
     };
     keep(batch.psi, scratch.psi, 1);
+    keep(batch.lateral, scratch.lateral, 1);
     keep(batch.P, scratch.P, components());
     keep(batch.dP, scratch.dP, components());
     keep(batch.A, scratch.A.data(), components() * components());

@@ -49,15 +49,16 @@ void BodyProblem::read_materials(const PartFactory& factory) {
       record.constants.assign(count * stride(), 0.0);
       if (density != values.end()) record.densities.assign(stride(), 0.0);
       std::vector<double> one(std::max<std::size_t>(count, 1));
+      auto any = static_cast<std::size_t>(body_.internal().front());
       for (const std::int32_t index : body_.internal()) {
         const auto p = static_cast<std::size_t>(index);
         if (!body_.material_ids().empty() && body_.material_ids()[p] != id) continue;
         at(body_.position(p), one.data());
+        any = p;
         for (std::size_t k = 0; k < count; ++k) record.constants[k * stride() + p] = one[k];
         if (density != values.end()) record.densities[p] = density->second(body_.position(p));
       }
-      // Padding sees an admissible material too.
-      const auto any = static_cast<std::size_t>(body_.internal().front());
+      // Padding and points of other materials see admissible constants too.
       for (std::size_t p = 0; p < stride(); ++p) {
         if (body_.alive(p) && (body_.material_ids().empty() || body_.material_ids()[p] == id)) continue;
         for (std::size_t k = 0; k < count; ++k) record.constants[k * stride() + p] = record.constants[k * stride() + any];

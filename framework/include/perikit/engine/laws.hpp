@@ -27,7 +27,9 @@ struct MaterialRecord {
 
 /// Memory for the pieces of mixed batches; one per thread.
 struct LawScratch {
+  alignas(64) double H[9 * batch_points];
   alignas(64) double psi[batch_points];
+  alignas(64) double lateral[batch_points];
   alignas(64) double P[9 * batch_points];
   alignas(64) double dP[9 * batch_points];
   AlignedVector<double> constants;
