@@ -99,7 +99,7 @@ inline Values random_direction(Random& random, Space space) {
 struct Evaluation {
   int n, components;
   std::size_t stride;
-  Field H, dH, psi, P, dP, A, constant_field;
+  Field H, dH, psi, P, dP, A, lateral, constant_field;
   Status status;
   bool guards_intact = true;
 
@@ -114,6 +114,7 @@ struct Evaluation {
         P(components, stride),
         dP(components, stride),
         A(components * components, stride),
+        lateral(1, stride),
         constant_field(static_cast<int>(constants.size()), stride) {
     for (int p = 0; p < n; ++p)
       for (int c = 0; c < components; ++c) {
@@ -122,7 +123,7 @@ struct Evaluation {
       }
     for (std::size_t k = 0; k < constants.size(); ++k)
       for (std::size_t p = 0; p < stride; ++p) constant_field.component(static_cast<int>(k))[p] = constants[k];
-    for (Field* f : {&psi, &P, &dP, &A}) f->fill(std::numeric_limits<double>::quiet_NaN());
+    for (Field* f : {&psi, &P, &dP, &A, &lateral}) f->fill(std::numeric_limits<double>::quiet_NaN());
     status = material.evaluate(space, {.n = n,
                                        .stride = stride,
                                        .H = H.data(),
@@ -132,8 +133,9 @@ struct Evaluation {
                                        .psi = psi.data(),
                                        .P = P.data(),
                                        .dP = dP.data(),
+                                       .lateral = free_stretch(space) ? lateral.data() : nullptr,
                                        .A = A.data()});
-    for (Field* f : {&psi, &P, &dP, &A})
+    for (Field* f : {&psi, &P, &dP, &A, &lateral})
       for (int c = 0; c < f->components(); ++c)
         for (std::size_t p = padded(points.size()); p < stride; ++p) guards_intact &= std::isnan(f->component(c)[p]);
   }

@@ -202,6 +202,26 @@ class MaterialContract {
     }
   }
 
+  /// Plane and uniaxial stress are plane and uniaxial strain at the stretch that they report, where the free stress vanishes.
+  void free_stretches() {
+    if (!free_stretch(space_)) return;
+    constexpr int n = 16;
+    const Evaluation e = evaluate(random_points(n));
+    std::vector<Values> given;
+    for (int p = 0; p < n; ++p) {
+      CHECK_MESSAGE(std::isfinite(e.lateral.data()[p]), label(), "free stretch of point ", p, " not reported");
+      given.push_back(e.at(e.H, p));
+      for (int c = 0; c < components_; ++c)
+        if (is_free(space_, c)) given.back()[c] = e.lateral.data()[p];
+    }
+    const Evaluation full(material_, space_ == Space::plane_stress ? Space::plane_strain : Space::line_strain, constants_, given);
+    for (int p = 0; p < n; ++p) {
+      const double scale = stiffness_scale(full.at(full.A, p)) * (1 + largest(given[p]));
+      near("P at the free stretch", full.at(full.P, p), e.at(e.P, p), 1e-12, scale);
+      near("psi at the free stretch", full.at(full.psi, p), e.at(e.psi, p), 1e-12, scale);
+    }
+  }
+
   /// A batch equals its points one at a time, to the bit; outputs are overwritten; nothing behind the padding is touched.
   void batches() {
     constexpr int n = 37;
@@ -308,7 +328,7 @@ inline void check_material(const Material& material, const std::vector<double>& 
 inline void check_material(const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
   using Contract = MaterialContract;
   for (const auto identity : {&Contract::reference_state, &Contract::small_strains, &Contract::derivatives, &Contract::tangent_action,
-                              &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
+                              &Contract::free_stretches, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
     check_material(material, constants, options, identity);
   }
 }

@@ -71,6 +71,8 @@ TEST_CASE("material: stress is the derivative of the energy, the tangent that of
 
 TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") { in_every_space(&MaterialContract::tangent_action); }
 
+TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") { in_every_space(&MaterialContract::free_stretches); }
+
 TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
 
 TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") { in_every_space(&MaterialContract::rotations); }
