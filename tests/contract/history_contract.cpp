@@ -19,22 +19,22 @@ namespace {
 constexpr double step = 1e-3;   ///< length of a step [s]; the law's rates do not see it
 
 std::string rate_scene(const Example& kinematics, int dimension, bool cloud, bool mixed) {
-  BodyOptions body{.dimension = dimension, .cloud = cloud, .crack = mixed && dimension > 1, .two_materials = mixed,
+  BodyOptions body{.dimension = dimension, .cloud = cloud, .crack = mixed && dimension == 2, .two_materials = mixed,
                    .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
   body.cells = dimension == 3 ? 6 : dimension == 2 ? 9 : 20;
   return scene_text(body, kinematics_table(kinematics));
 }
 
-/// check(problem, label, mixed) for every kinematics with gradients in every dimension, on lattices and clouds; `mixed`: cracked, with a second
-/// material without history.
-void for_every_model(const std::function<void(BodyProblem&, bool)>& check) {
+/// check(problem) for every kinematics with gradients in every dimension, on lattices and clouds; half of them with a second
+/// material without history, cracked in 2D (small bodies in 3D would fall apart).
+void for_every_model(const std::function<void(BodyProblem&)>& check) {
   for (const Example& example : examples(Kind::kinematics))
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
         for (const bool mixed : {false, true}) {
           INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice", mixed ? " two materials" : ""));
           const auto simulation = build(rate_scene(example, d, cloud, mixed));
-          if (simulation->problem().model().has_gradients()) check(simulation->problem(), mixed);
+          if (simulation->problem().model().has_gradients()) check(simulation->problem());
         }
 }
 
@@ -46,10 +46,15 @@ std::vector<double> kept(const BodyProblem& problem) {
 struct Response {
   double energy = 0;
   Field force;
-  bool operator==(const Response& other) const {
-    return energy == other.energy && std::equal(force.data(), force.data() + force.size(), other.force.data());
-  }
 };
+
+/// Energies and forces on all points agree to the bit.
+bool same(const BodyProblem& problem, const Response& a, const Response& b) {
+  bool equal = a.energy == b.energy;
+  for (const std::int32_t p : problem.body().internal())
+    for (int c = 0; c < problem.dimension(); ++c) equal = equal && a.force.component(c)[p] == b.force.component(c)[p];
+  return equal;
+}
 
 Response respond(BodyProblem& problem, ConstFieldView u, double time_step) {
   Response r{0, problem.make_field(problem.dimension())};
@@ -93,7 +98,7 @@ Field turned(const BodyProblem& problem, ConstFieldView u, double angle) {
 }  // namespace
 
 TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
-  for_every_model([](BodyProblem& problem, bool) {
+  for_every_model([](BodyProblem& problem) {
     walk(problem);
     const std::vector<double> before = kept(problem);
     CHECK_MESSAGE(std::any_of(before.begin(), before.end(), [](double x) { return x != 0; }), "no history is kept");
@@ -101,14 +106,14 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     Field Kw = problem.make_field(problem.dimension());
     PointSamples samples;
     const Response one = respond(problem, u, step), two = respond(problem, u, 0.0), three = respond(problem, u, step);
-    CHECK_MESSAGE((one == two && one == three), "an evaluation depends on the one before");
+    CHECK_MESSAGE((same(problem, one, two) && same(problem, one, three)), "an evaluation depends on the one before");
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
     REQUIRE(problem.model().sample(u, samples).ok());
     CHECK_MESSAGE(kept(problem) == before, "an evaluation advanced the history");
     problem.advance_history(step);
     CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
     // At the end of the step the increment is zero: the same stress, from the history alone.
-    CHECK_MESSAGE(respond(problem, u, 0.0) == one, "the state at the end of the step is not the one that was put aside");
+    CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one), "the state at the end of the step is not the one that was put aside");
     PointSamples after;
     REQUIRE(problem.model().sample(u, after).ok());
     double total = 0, scale = 0;
@@ -121,7 +126,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
 }
 
 TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does no work") {
-  for_every_model([](BodyProblem& problem, bool) {
+  for_every_model([](BodyProblem& problem) {
     if (problem.dimension() == 1) return;
     const Response r = walk(problem);
     constexpr double angle = 1.1;
@@ -139,14 +144,14 @@ TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does n
 }
 
 TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's forces") {
-  for_every_model([](BodyProblem& problem, bool) {
+  for_every_model([](BodyProblem& problem) {
     walk(problem);
     const Field u = deformed(problem, 34, 0.01);
     Field w = problem.make_field(problem.dimension()), Kw = w;
     Noise random(36);
     set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
-    const double h = 2e-3 * problem.body().spacing();
+    const double h = 5e-4 * problem.body().spacing();
     const auto force = [&](double by) {
       Field v = problem.make_field(problem.dimension());
       for (std::size_t k = 0; k < v.size(); ++k) v.data()[k] = u.data()[k] + by * w.data()[k];
@@ -157,7 +162,7 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
     for (const std::int32_t p : problem.body().internal())
       for (int k = 0; k < problem.dimension(); ++k) {
         const double slope = (8 * (c.component(k)[p] - b.component(k)[p]) - (d.component(k)[p] - a.component(k)[p])) / (12 * h);
-        worst = std::max(worst, std::abs(slope - Kw.component(k)[p]));
+        worst = std::max(worst, std::abs(slope + Kw.component(k)[p]));
       }
     CHECK_MESSAGE(worst <= 1e-7 * largest(problem.body(), Kw), "tangent off by ", worst, " of ", largest(problem.body(), Kw));
   });
@@ -165,7 +170,7 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
 
 TEST_CASE("kinematics: rate laws are the same for any number of threads, and restored runs go on bitwise") {
   const int threads = thread_count();
-  for_every_model([&](BodyProblem& problem, bool) {
+  for_every_model([&](BodyProblem& problem) {
     const std::vector<std::byte> fresh = problem.snapshot();
     set_thread_count(1);
     const Response one = walk(problem);
@@ -175,10 +180,10 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
     const Response next = respond(problem, u, step);
     problem.restore(fresh);
     set_thread_count(2);
-    CHECK_MESSAGE((walk(problem) == one && kept(problem) == history), "depends on the number of threads");
+    CHECK_MESSAGE((same(problem, walk(problem), one) && kept(problem) == history), "depends on the number of threads");
     problem.advance_history(step);   // something else
     problem.restore(after);
-    CHECK_MESSAGE(respond(problem, u, step) == next, "a restored run differs");
+    CHECK_MESSAGE(same(problem, respond(problem, u, step), next), "a restored run differs");
   });
   set_thread_count(threads);
 }
