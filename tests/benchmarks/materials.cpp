@@ -1,5 +1,6 @@
 // Cost of one stress P and of one tangent A per evaluation point, for every law and space, in batches of 128 through the virtual call, on
-// one thread: time, evaluations per second, counted operations and the share of this machine's measured multiply-add peak. Markdown.
+// one thread: time, evaluations per second, counted operations (what components and columns share once) and the share of this machine's
+// measured multiply-add peak. Markdown.
 // Plane and uniaxial stress are solved by iteration: their operations depend on the point and are not counted.
 
 #include <fmt/format.h>
@@ -47,27 +48,31 @@ struct Operations {
   std::int64_t stress = 0, tangent = 0;   ///< 0: not counted
 };
 
-/// Operations that the law's formulas ask for at a point of no particular symmetry.
+/// Different operations that the law's formulas ask for at a point of no particular symmetry.
 template <class S, class Law>
 Operations count(const Law& law) {
   using H = Tensor<Counted, S>;
-  const H h = H::map([](int c) { return Counted(0.02 * (c + 1) - 0.05 * (c % 2)); });
+  const auto variables = [] { return H::map([](int c) { return Counted::variable(0.02 * (c + 1) - 0.05 * (c % 2)); }); };
   std::array<Counted, Law::traits.constants> k;
-  for (std::size_t i = 0; i < k.size(); ++i) k[i] = 0.7 + 0.4 * static_cast<double>(i);
+  for (std::size_t i = 0; i < k.size(); ++i) k[i] = Counted::variable(0.7 + 0.4 * static_cast<double>(i));
   const auto measure = [&](const auto& step) {
     Operations n;
-    Counted::operations = 0;
-    stress(step, h, k);
-    n.stress = std::exchange(Counted::operations, 0);
-    const auto action = tangent(step, h, k);
-    for (int c = 0; c < S::components; ++c) action(H::unit(c));
-    n.tangent = Counted::operations;
+    Counted::forget();
+    stress(step, variables(), k);
+    n.stress = Counted::operations();
+    Counted::forget();
+    const auto action = tangent(step, variables(), k);
+    for (int c = 0; c < S::components; ++c) action(variables());
+    n.tangent = Counted::operations();
     return n;
   };
-  if constexpr (HasHistory<Law>)
-    return measure(law.template after<S>(std::array<Counted, state_size<Law, S>()>{}));
-  else
+  if constexpr (HasHistory<Law>) {
+    std::array<Counted, state_size<Law, S>()> state;
+    for (Counted& x : state) x = Counted::variable(0.01);
+    return measure(law.template after<S>(state));
+  } else {
     return measure(law);
+  }
 }
 
 template <class Law>
