@@ -6,11 +6,12 @@
 
 namespace perikit {
 
-/// Rate law of Flanagan and Taylor [Partmann et al., eqs. 4.45-4.57]: the Cauchy stress sigma = R s R^T, turned back by the rotation of
-/// F = R U, grows with the unrotated rate of deformation,
+/// Rate law of Flanagan and Taylor [Partmann et al., eqs. 4.45-4.57]: the Cauchy stress sigma = R s R^T, turned back by the
+/// rotation of F = R U, grows with the unrotated rate of deformation,
 ///   ds/dt = lambda tr(d) I + 2 mu d,   d = R^T sym(dF/dt F^-1) R = sym(dU/dt U^-1),   P = J sigma F^-T = J F U^-1 s U^-1.
-/// Codes that know only the velocity gradient integrate R and the left stretch (4.46-4.52); F at both ends of the step is known here, so
-/// that U is the exact stretch and R is not needed. The increment is the midpoint rule in U: of second order, and blind to rotations.
+/// Codes that know only the velocity gradient integrate R and the left stretch (4.46-4.52); F at both ends of the step is known
+/// here, so that U is the exact stretch and R is not needed. The increment is the midpoint rule in U: of second order, and blind
+/// to rotations.
 ///   strain = sym((U1 - U0) ((U0 + U1)/2)^-1),   s1 = s0 + lambda tr(strain) I + 2 mu strain
 ///   psi1 = psi0 + (J0 s0 + J1 s1)/2 : strain, the work of the stress
 /// History: U - I, s (components i <= j), psi.
@@ -32,14 +33,16 @@ struct Hypoelastic {
     using State = std::array<T, state_components<S>>;
 
     explicit Step(const State& state) noexcept
-        : stretch(unpack_symmetric<S>(state.data())), stress(unpack_symmetric<S>(state.data() + symmetric_size<S>)), energy(state.back()) {}
+        : stretch(unpack_symmetric<S>(state.data())),
+          stress(unpack_symmetric<S>(state.data() + symmetric_size<S>)),
+          energy(state.back()) {}
 
     template <class K>
     HistoryUpdate<T, S, state_components<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
       const Stretch end(H);
       const Tensor<T, S> strain = symmetric_part(increment(end) * middle_inverse(end)), s = stress + hooke(strain, k);
       const T J = 1.0 + jacobian_minus_one(H), J0 = 1.0 + jacobian_minus_one(stretch);
-      const Tensor<T, S> second = J * rotate(end.inverse, s);   // second Piola-Kirchhoff stress J U^-1 s U^-1
+      const Tensor<T, S> second = J * rotate(end.inverse, s);  // second Piola-Kirchhoff stress J U^-1 s U^-1
       HistoryUpdate<T, S, state_components<S>> r;
       r.psi = energy + 0.5 * inner(J0 * stress + J * s, strain);
       r.P = second + H * second;
@@ -64,10 +67,13 @@ struct Hypoelastic {
         const Tensor<T, S> dC = T(2.0) * symmetric_part(dH + transpose_times(H, dH));
         // dC = dU U + U dU in the principal axes of U
         const Tensor<T, S> turned = rotate(transpose(end.axes), dC);
-        const Tensor<T, S> dU = rotate(end.axes, Tensor<T, S>::build_symmetric([&](int i, int j) { return turned(i, j) / (end.values[i] + end.values[j]); }));
+        const Tensor<T, S> principal =
+            Tensor<T, S>::build_symmetric([&](int i, int j) { return turned(i, j) / (end.values[i] + end.values[j]); });
+        const Tensor<T, S> dU = rotate(end.axes, principal);
         const Tensor<T, S> dstrain = symmetric_part(dU * M - T(0.5) * (change * rotate(M, dU)));
         const Tensor<T, S> turning = end.inverse * dU * (end.inverse * s * end.inverse);
-        const Tensor<T, S> dsecond = (inner(cofactors, dH) / J) * second + J * (rotate(end.inverse, hooke(dstrain, lame)) - T(2.0) * symmetric_part(turning));
+        const Tensor<T, S> pulled = rotate(end.inverse, hooke(dstrain, lame)) - T(2.0) * symmetric_part(turning);
+        const Tensor<T, S> dsecond = (inner(cofactors, dH) / J) * second + J * pulled;
         return dH * second + (dsecond + H * dsecond);
       };
     }
@@ -75,8 +81,8 @@ struct Hypoelastic {
    private:
     /// U of F = R U from the principal axes of F^T F - I, with all digits of small strains.
     struct Stretch {
-      T values[3];                  ///< principal stretches
-      Tensor<T, S> axes, U, inverse;   ///< U: U - I
+      T values[3];                    ///< principal stretches
+      Tensor<T, S> axes, U, inverse;  ///< U: U - I
 
       explicit Stretch(const Tensor<T, S>& H) noexcept {
         const Spectral<T, S> e = spectral(right_cauchy_green_minus_identity(H));

@@ -27,7 +27,9 @@ class Counted {
 
   friend Counted operator+(Counted a, Counted b) noexcept { return commutative(a.value_ + b.value_, '+', a, b); }
   friend Counted operator-(Counted a, Counted b) noexcept { return operation(a.value_ - b.value_, 1, '-', a, b); }
-  friend Counted operator-(Counted a) noexcept { return operation(-a.value_, 0, 'n', a, a); }   // taken into the operation that follows
+  friend Counted operator-(Counted a) noexcept {
+    return operation(-a.value_, 0, 'n', a, a);
+  }  // taken into the operation that follows
   friend Counted operator*(Counted a, Counted b) noexcept { return commutative(a.value_ * b.value_, '*', a, b); }
   friend Counted operator/(Counted a, Counted b) noexcept { return operation(a.value_ / b.value_, 1, '/', a, b); }
   Counted& operator+=(Counted b) noexcept { return *this = *this + b; }

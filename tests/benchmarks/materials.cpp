@@ -1,7 +1,7 @@
-// Cost of one stress P and of one tangent A per evaluation point, for every law and space, in batches of 128 through the virtual call, on
-// one thread: time, evaluations per second, counted operations (what components and columns share once) and the share of this machine's
-// measured multiply-add peak. Markdown.
-// Plane and uniaxial stress are solved by iteration: their operations depend on the point and are not counted.
+// Cost of one stress P and of one tangent A per evaluation point, for every law and space, in batches of 128 through the virtual
+// call, on one thread: time, evaluations per second, counted operations (what components and columns share once) and the share of
+// this machine's measured multiply-add peak. Markdown. Plane and uniaxial stress are solved by iteration: their operations depend
+// on the point and are not counted.
 
 #include <fmt/format.h>
 
@@ -45,7 +45,7 @@ double time_per_point(const Material& material, Space space, const MaterialBatch
 }
 
 struct Operations {
-  std::int64_t stress = 0, tangent = 0;   ///< 0: not counted
+  std::int64_t stress = 0, tangent = 0;  ///< 0: not counted
 };
 
 /// Different operations that the law's formulas ask for at a point of no particular symmetry.
@@ -78,21 +78,25 @@ Operations count(const Law& law) {
 template <class Law>
 Operations count(const Law& law, Space space) {
   switch (space) {
-    case Space::solid: return count<Solid>(law);
-    case Space::plane_strain: return count<Plane>(law);
-    case Space::line_strain: return count<Line>(law);
-    default: return {};
+    case Space::solid:
+      return count<Solid>(law);
+    case Space::plane_strain:
+      return count<Plane>(law);
+    case Space::line_strain:
+      return count<Line>(law);
+    default:
+      return {};
   }
 }
 
 struct Cost {
-  double stress, tangent;   ///< [s] per point
+  double stress, tangent;  ///< [s] per point
 };
 
 Cost measure(const Material& material, Space space, const double* constants) {
   const int components = tensor_components(space);
-  Field H(components, points), P(components, points), A(components * components, points), old(material.state_components(space), points),
-      end(material.state_components(space), points);
+  Field H(components, points), P(components, points), A(components * components, points),
+      old(material.state_components(space), points), end(material.state_components(space), points);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform(-0.1, 0.1);
   for (int c = 0; c < components; ++c)
@@ -120,8 +124,8 @@ void report(const char* name, const Law& law, const std::vector<double>& constan
     const Cost cost = measure(material, space, constants.data());
     const Operations operations = count(law, space);
     if (space == Space::solid) solid = cost.stress;
-    fmt::print("| {} | {} | {} | {:.2f} | {} |\n", name, perikit::name(space), columns(cost.stress, operations.stress, peak), cost.stress / solid,
-               columns(cost.tangent, operations.tangent, peak));
+    fmt::print("| {} | {} | {} | {:.2f} | {} |\n", name, perikit::name(space), columns(cost.stress, operations.stress, peak),
+               cost.stress / solid, columns(cost.tangent, operations.tangent, peak));
   }
 }
 
@@ -130,8 +134,9 @@ void report(const char* name, const Law& law, const std::vector<double>& constan
 int main() {
   const double peak = measure_machine_limits().multiply_add_one;
   fmt::print("Peak of one thread: {:.1f} GFLOP/s; packs of {}.\n\n", peak, pack_width);
-  fmt::print("| law | space | P [ns] | P [10^6/s] | P ops | of peak | of solid | A [ns] | A [10^6/s] | A ops | of peak |\n"
-             "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| law | space | P [ns] | P [10^6/s] | P ops | of peak | of solid | A [ns] | A [10^6/s] | A ops | of peak |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
   report("linear_elastic", LinearElastic(), {1.2, 0.8}, peak);
   report("saint_venant_kirchhoff", SaintVenantKirchhoff(), {1.2, 0.8}, peak);
   report("neo_hookean", NeoHookean(), {0.8, 80.0}, peak);

@@ -1,5 +1,5 @@
-/// Laws with history under every kinematics that has gradients, on lattices and clouds: each evaluation point keeps its own history,
-/// steps advance it, nothing else does.
+/// Laws with history under every kinematics that has gradients, on lattices and clouds: each evaluation point keeps its own
+/// history, steps advance it, nothing else does.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -16,10 +16,13 @@ using namespace perikit::contract;
 
 namespace {
 
-constexpr double step = 1e-3;   ///< length of a step [s]; the law's rates do not see it
+constexpr double step = 1e-3;  ///< length of a step [s]; the law's rates do not see it
 
 std::string rate_scene(const Example& kinematics, int dimension, bool cloud, bool mixed) {
-  BodyOptions body{.dimension = dimension, .cloud = cloud, .crack = mixed && dimension == 2, .two_materials = mixed,
+  BodyOptions body{.dimension = dimension,
+                   .cloud = cloud,
+                   .crack = mixed && dimension == 2,
+                   .two_materials = mixed,
                    .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
   body.cells = dimension == 3 ? 6 : dimension == 2 ? 9 : 20;
   return scene_text(body, kinematics_table(kinematics));
@@ -32,7 +35,8 @@ void for_every_model(const std::function<void(BodyProblem&)>& check) {
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
         for (const bool mixed : {false, true}) {
-          INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice", mixed ? " two materials" : ""));
+          INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice",
+                           mixed ? " two materials" : ""));
           const auto simulation = build(rate_scene(example, d, cloud, mixed));
           if (simulation->problem().model().has_gradients()) check(simulation->problem());
         }
@@ -113,7 +117,8 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     problem.advance_history(step);
     CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
     // At the end of the step the increment is zero: the same stress, from the history alone.
-    CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one), "the state at the end of the step is not the one that was put aside");
+    CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one),
+                  "the state at the end of the step is not the one that was put aside");
     PointSamples after;
     REQUIRE(problem.model().sample(u, after).ok());
     double total = 0, scale = 0;
@@ -136,7 +141,8 @@ TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does n
     double worst = 0;
     for (const std::int32_t p : problem.body().internal()) {
       const double x = r.force.component(0)[p], y = r.force.component(1)[p];
-      worst = std::max({worst, std::abs(q.force.component(0)[p] - (c * x - s * y)), std::abs(q.force.component(1)[p] - (s * x + c * y))});
+      worst = std::max(
+          {worst, std::abs(q.force.component(0)[p] - (c * x - s * y)), std::abs(q.force.component(1)[p] - (s * x + c * y))});
     }
     CHECK_MESSAGE(worst <= 1e-10 * scale, "forces off by ", worst, " of ", scale);
     CHECK_MESSAGE(std::abs(q.energy - r.energy) <= 1e-11 * std::abs(r.energy), q.energy, " against ", r.energy);
@@ -181,7 +187,7 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
     problem.restore(fresh);
     set_thread_count(2);
     CHECK_MESSAGE((same(problem, walk(problem), one) && kept(problem) == history), "depends on the number of threads");
-    problem.advance_history(step);   // something else
+    problem.advance_history(step);  // something else
     problem.restore(after);
     CHECK_MESSAGE(same(problem, respond(problem, u, step), next), "a restored run differs");
   });
@@ -191,6 +197,8 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
 TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a path") {
   const Example first = examples(Kind::kinematics).front();
   const Scene scene = parse_scene(rate_scene(first, 2, false, false), "contract.toml", subject().registry);
-  CHECK_THROWS_WITH_AS(BodyProblem(scene, subject().registry, true), doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"), InputError);
+  CHECK_THROWS_WITH_AS(BodyProblem(scene, subject().registry, true),
+                       doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
+                       InputError);
   CHECK_NOTHROW(BodyProblem(scene, subject().registry, false));
 }

@@ -75,7 +75,8 @@ class HistoryContract : MaterialCheck {
     for (const Path& path : paths) H.push_back(gradient(turned ? product(turn(path, t), at(path, t)) : at(path, t)));
     return H;
   }
-  Evaluation step(const std::vector<Values>& H, const std::vector<Values>& from, const std::vector<Values>& directions = {}) const {
+  Evaluation step(const std::vector<Values>& H, const std::vector<Values>& from,
+                  const std::vector<Values>& directions = {}) const {
     Evaluation e(material_, space_, constants_, H, directions, false, from);
     CHECK_MESSAGE(e.status.ok(), label(), "admissible step refused, point ", e.status.inadmissible);
     return e;
@@ -134,7 +135,8 @@ class HistoryContract : MaterialCheck {
     const Evaluation turned = step(H, histories(e));
     for (int p = 0; p < points_; ++p) {
       const Matrix P = extend(space_, e.at(e.P, p));
-      near("a rotation turns the stress", turned.at(turned.P, p), restrict_to(space_, product(Q[p], P)), 1e-12, stress_scale(e, p));
+      near("a rotation turns the stress", turned.at(turned.P, p), restrict_to(space_, product(Q[p], P)), 1e-12,
+           stress_scale(e, p));
       near("a rotation does no work", turned.at(turned.psi, p), e.at(e.psi, p), 1e-12, stress_scale(e, p));
     }
   }
@@ -145,13 +147,14 @@ class HistoryContract : MaterialCheck {
     const Evaluation plain = follow(paths, 7, false), turned = follow(paths, 7, true);
     for (int p = 0; p < points_; ++p) {
       const Matrix P = extend(space_, plain.at(plain.P, p));
-      near("objectivity along a path", turned.at(turned.P, p), restrict_to(space_, product(turn(paths[p], 1.0), P)), 1e-11, stress_scale(plain, p));
+      near("objectivity along a path", turned.at(turned.P, p), restrict_to(space_, product(turn(paths[p], 1.0), P)), 1e-11,
+           stress_scale(plain, p));
       near("work along a path", turned.at(turned.psi, p), plain.at(plain.psi, p), 1e-11, stress_scale(plain, p));
     }
   }
 
   void units() {
-    constexpr double s = 1e-6;   // from Pa to MPa
+    constexpr double s = 1e-6;  // from Pa to MPa
     const std::vector<Path> paths = random_paths();
     std::vector<double> scaled = constants_;
     for (std::size_t k = 0; k < scaled.size(); ++k)
@@ -165,7 +168,8 @@ class HistoryContract : MaterialCheck {
     }
   }
 
-  /// A batch equals its points one at a time, history included; history is overwritten, and nothing behind the padding is touched.
+  /// A batch equals its points one at a time, history included; history is overwritten, and nothing behind the padding is
+  /// touched.
   void batches() {
     const std::vector<Path> paths = random_paths();
     const std::vector<Values> from = histories(follow(paths, 3, true)), H = gradients(paths, 1.1, true);
@@ -173,7 +177,8 @@ class HistoryContract : MaterialCheck {
     CHECK_MESSAGE(batch.guards_intact, label(), "writes behind padded(n)");
     for (int p = 0; p < points_; ++p) {
       const Values history = batch.at(batch.state, p);
-      CHECK_MESSAGE(std::none_of(history.begin(), history.end(), [](double x) { return std::isnan(x); }), label(), "history overwritten, point ", p);
+      CHECK_MESSAGE(std::none_of(history.begin(), history.end(), [](double x) { return std::isnan(x); }), label(),
+                    "history overwritten, point ", p);
       const Evaluation single = step({H[p]}, {from[p]});
       same_bits("batch = single from a history", batch.all(p), single.all(0));
       same_bits("history of batch = single", history, single.at(single.state, 0));

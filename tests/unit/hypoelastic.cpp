@@ -23,7 +23,9 @@ Matrix matrix_of(const Matrix3d& a) {
   for (int i = 0; i < 9; ++i) m[i] = a(i / 3, i % 3);
   return m;
 }
-Matrix3d eigen_of(const Matrix& m) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data()); }
+Matrix3d eigen_of(const Matrix& m) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
+}
 
 struct End {
   Matrix3d P, sigma;
@@ -37,7 +39,8 @@ End follow(Space space, const Path& path, int steps) {
   std::vector<contract::Values> history;
   for (int n = 1;; ++n) {
     const Matrix3d F = path(double(n) / steps);
-    const Evaluation e(material, space, constants, {contract::restrict_to(space, matrix_of(F - Matrix3d::Identity()))}, {}, false, history);
+    const Evaluation e(material, space, constants, {contract::restrict_to(space, matrix_of(F - Matrix3d::Identity()))}, {}, false,
+                       history);
     REQUIRE(e.status.ok());
     history = {e.at(e.state, 0)};
     if (n < steps) continue;
@@ -49,7 +52,8 @@ End follow(Space space, const Path& path, int steps) {
 /// Errors at n and 2 n steps fall by four.
 template <class Path>
 void check_second_order(const Path& path, const Matrix3d& sigma, const std::string& what) {
-  const double coarse = (follow(Space::solid, path, 20).sigma - sigma).norm(), fine = (follow(Space::solid, path, 40).sigma - sigma).norm();
+  const double coarse = (follow(Space::solid, path, 20).sigma - sigma).norm(),
+               fine = (follow(Space::solid, path, 40).sigma - sigma).norm();
   CHECK_MESSAGE(coarse > 1e-9, what);
   CHECK_MESSAGE(coarse / fine == doctest::Approx(4).epsilon(0.05), what, ": ", coarse, " ", fine);
 }
@@ -62,9 +66,11 @@ Matrix3d incremental_algorithm(const std::function<Matrix3d(double)>& path, int 
     const Matrix3d F0 = path(n * dt), F1 = path((n + 1) * dt), l = (F1 - F0) / dt * (0.5 * (F0 + F1)).inverse();
     const Matrix3d d = 0.5 * (l + l.transpose()), w = 0.5 * (l - l.transpose());
     const Matrix3d dv = d * v;
-    const auto axial = [](const Matrix3d& a) { return Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0)); };   // e_ijk a_jk
+    const auto axial = [](const Matrix3d& a) {
+      return Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));
+    };  // e_ijk a_jk
     const Eigen::Vector3d p = -0.5 * axial(w), z = -axial(dv), q = p + (v.trace() * Matrix3d::Identity() - v).inverse() * z;
-    Matrix3d Omega;   // e_ikj q_k
+    Matrix3d Omega;  // e_ikj q_k
     Omega << 0, -q(2), q(1), q(2), 0, -q(0), -q(1), q(0), 0;
     const double rate = q.norm();
     Matrix3d Q = Matrix3d::Identity();
@@ -126,7 +132,8 @@ TEST_CASE("hypoelastic: psi is the work of the stress, and a turning path conver
     Matrix3d A, B;
     A << 0.3, 0.5, -0.2, 0.1, -0.3, 0.2, -0.4, 0.1, 0.2;
     B << -0.2, 0.1, 0.2, 0.3, 0.1, -0.1, 0.1, -0.2, 0.1;
-    return Eigen::AngleAxisd(2 * t, Eigen::Vector3d(2, -1, 2).normalized()).toRotationMatrix() * (Matrix3d::Identity() + t * A + std::sin(3 * t) * B);
+    return Eigen::AngleAxisd(2 * t, Eigen::Vector3d(2, -1, 2).normalized()).toRotationMatrix() *
+           (Matrix3d::Identity() + t * A + std::sin(3 * t) * B);
   };
   const auto work = [&](int steps) {
     double sum = 0;
@@ -140,7 +147,8 @@ TEST_CASE("hypoelastic: psi is the work of the stress, and a turning path conver
     }
     return sum;
   };
-  const double coarse = std::abs(work(20) - follow(Space::solid, path, 20).psi), fine = std::abs(work(40) - follow(Space::solid, path, 40).psi);
+  const double coarse = std::abs(work(20) - follow(Space::solid, path, 20).psi),
+               fine = std::abs(work(40) - follow(Space::solid, path, 40).psi);
   CHECK(coarse < 1e-2);
   CHECK(coarse / fine == doctest::Approx(4).epsilon(0.1));
 

@@ -174,10 +174,11 @@ TEST_CASE("hencky: hydrostatic and principal stretches") {
 
 namespace {
 
-/// P and A : dH at H against differences of order six of the same law in long double, to `tolerance` of the largest |A| (1 + |H|).
+/// P and A : dH at H against differences of order six of the same law in long double, to `tolerance` of the largest |A| (1 +
+/// |H|).
 template <class S, class Law>
-void check_extended(const Law& law, Space space, const std::vector<double>& constants, const contract::Matrix& F, contract::Random& random,
-                    double tolerance, const std::string& what) {
+void check_extended(const Law& law, Space space, const std::vector<double>& constants, const contract::Matrix& F,
+                    contract::Random& random, double tolerance, const std::string& what) {
   using Long = long double;
   using LongTensor = Tensor<Long, S>;
   constexpr Long weights[] = {3.0L / 4, -3.0L / 20, 1.0L / 60};
@@ -194,10 +195,12 @@ void check_extended(const Law& law, Space space, const std::vector<double>& cons
   };
   LongTensor stress_slope = LongTensor::map([](int) { return 0.0L; });
   for (int step = 1; step <= 3; ++step)
-    stress_slope = stress_slope + (weights[step - 1] / h) * (stress(law, moved(-1, step * h), k) - stress(law, moved(-1, -step * h), k));
+    stress_slope =
+        stress_slope + (weights[step - 1] / h) * (stress(law, moved(-1, step * h), k) - stress(law, moved(-1, -step * h), k));
   for (int c = 0; c < S::components; ++c) {
     Long slope = 0;
-    for (int step = 1; step <= 3; ++step) slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
+    for (int step = 1; step <= 3; ++step)
+      slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
     CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= allowed, "P: ", what, ", component ", c);
     CHECK_MESSAGE(std::abs(double(stress_slope[c] - e.dP.component(c)[0])) <= allowed, "dP: ", what, ", component ", c);
   }

@@ -28,9 +28,10 @@ TEST_CASE("simple shear of a rate law: stress and work of the closed form, under
   const Dienes expected = shear_stress(4.0);
   CHECK(expected.xy == doctest::Approx(2.317944).epsilon(1e-6));
   CHECK(expected.xx == doctest::Approx(2.274201).epsilon(1e-6));
-  double work = 0;   // integral of sigma_xy over the shear, by Simpson's rule
+  double work = 0;  // integral of sigma_xy over the shear, by Simpson's rule
   constexpr int parts = 1000;
-  for (int k = 0; k <= parts; ++k) work += (k == 0 || k == parts ? 1 : k % 2 == 1 ? 4 : 2) * shear_stress(4.0 * k / parts).xy * 4.0 / parts / 3;
+  for (int k = 0; k <= parts; ++k)
+    work += (k == 0 || k == parts ? 1 : k % 2 == 1 ? 4 : 2) * shear_stress(4.0 * k / parts).xy * 4.0 / parts / 3;
   const auto run = [&](std::vector<std::string> overrides) {
     const auto simulation = load("partmann/rate_shear.toml", std::move(overrides));
     contract::run(*simulation);
@@ -39,16 +40,19 @@ TEST_CASE("simple shear of a rate law: stress and work of the closed form, under
     REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
     double worst = 0;
     for (const std::int32_t p : problem.body().internal()) {
-      worst = std::max({worst, std::abs(samples.cauchy.component(0)[p] - expected.xx), std::abs(samples.cauchy.component(4)[p] + expected.xx),
+      worst = std::max({worst, std::abs(samples.cauchy.component(0)[p] - expected.xx),
+                        std::abs(samples.cauchy.component(4)[p] + expected.xx),
                         std::abs(samples.cauchy.component(1)[p] - expected.xy), std::abs(samples.cauchy.component(8)[p]),
                         std::abs(samples.strain_energy_density.data()[p] - work)});
     }
     return worst;
   };
-  for (const char* kinematics : {"{ type = \"conventional\" }", "{ type = \"baqp\" }", "{ type = \"bond_associated\" }", "{ type = \"sub_horizon\" }",
-                                 "{ type = \"selective\", base = { type = \"bond_associated\" } }", "{ type = \"selective\", base = \"baqp\" }"})
+  for (const char* kinematics :
+       {"{ type = \"conventional\" }", "{ type = \"baqp\" }", "{ type = \"bond_associated\" }", "{ type = \"sub_horizon\" }",
+        "{ type = \"selective\", base = { type = \"bond_associated\" } }", "{ type = \"selective\", base = \"baqp\" }"})
     for (const char* jitter : {"0", "0.2"}) {
-      const double error = run({fmt::format("kinematics={}", kinematics), fmt::format("body.lattice.jitter={}", jitter), "integrator.time_step=0.01"});
+      const double error = run(
+          {fmt::format("kinematics={}", kinematics), fmt::format("body.lattice.jitter={}", jitter), "integrator.time_step=0.01"});
       CHECK_MESSAGE(error <= 1e-3, kinematics, ", jitter ", jitter, ": off by ", error);
     }
   const double coarse = run({"integrator.time_step=0.005"}), fine = run({});
@@ -57,7 +61,8 @@ TEST_CASE("simple shear of a rate law: stress and work of the closed form, under
 }
 
 TEST_CASE("twisting bar of a rate law: large rotations keep the energy") {
-  const auto simulation = load("partmann/twisting_bar.toml", {"material.type=hypoelastic", "constants.dx=0.02", "body.lattice.spacing=0.02", "integrator.end_time=0.01"});
+  const auto simulation = load("partmann/twisting_bar.toml", {"material.type=hypoelastic", "constants.dx=0.02",
+                                                              "body.lattice.spacing=0.02", "integrator.end_time=0.01"});
   const contract::Watch watch = contract::run(*simulation);
   const double total = watch.energies.front().kinetic;
   double strain = 0;

@@ -97,8 +97,8 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     const auto keep = [&](double* to, const double* from, int components, std::size_t stride) {
       if (!to) return;
       for (int c = 0; c < components; ++c)
-        for (int l = 0; l < batch.n; ++l)
-          if (mine(l)) to[static_cast<std::size_t>(c) * stride + static_cast<std::size_t>(l)] = from[static_cast<std::size_t>(c) * stride + static_cast<std::size_t>(l)];
+        for (std::size_t l = 0; l < static_cast<std::size_t>(batch.n); ++l)
+          if (mine(static_cast<int>(l))) to[static_cast<std::size_t>(c) * stride + l] = from[static_cast<std::size_t>(c) * stride + l];
     };
     keep(batch.psi, scratch.psi, 1, batch_points);
     keep(batch.P, scratch.P, components(), batch_points);

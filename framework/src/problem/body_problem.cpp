@@ -107,7 +107,10 @@ void BodyProblem::prepare_history(bool quasi_static) {
       throw InputError(part.values.position("type"), part.values.path() + ".type",
                        fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
-    if (quasi_static) refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene_.integrator->type), "an explicit integrator, or another material");
+    if (quasi_static) {
+      refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene_.integrator->type),
+             "an explicit integrator, or another material");
+    }
     if (scene_.damage) refuse("[damage]", "a material without history, or no [damage]");
   }
   // The first evaluation only counts.

@@ -9,17 +9,17 @@
 
 namespace perikit {
 
-/// Each batch has a place of its own, found by the block that evaluates it and the number of lanes that came before it in that block:
-/// every evaluation must go through the same batches in the same order within each block. Within a place component c of lane l is
-/// [c * stride + l], with the lanes of the batch as stride.
+/// Each batch has a place of its own, found by the block that evaluates it and the number of lanes that came before it in that
+/// block: every evaluation must go through the same batches in the same order within each block. Within a place component c of
+/// lane l is [c * stride + l], with the lanes of the batch as stride.
 class LawHistory {
  public:
   /// components: doubles per evaluation point, the most that any law of the body needs.
   explicit LawHistory(int components) : components_(static_cast<std::size_t>(components)) {}
 
   struct Place {
-    const double* begin = nullptr;   ///< history at the beginning of the step; null: fresh
-    double* end = nullptr;           ///< where to put it if the step ends here; null: not wanted
+    const double* begin = nullptr;  ///< history at the beginning of the step; null: fresh
+    double* end = nullptr;          ///< where to put it if the step ends here; null: not wanted
     std::size_t stride = 0;
   };
 
@@ -40,12 +40,12 @@ class LawHistory {
   /// All that a run continues from.
   std::span<double> values() noexcept { return begin_; }
   std::span<const double> values() const noexcept { return begin_; }
-  std::size_t bytes() const noexcept { return (begin_.size() + end_.size()) * sizeof(double) + (lanes_.size() + first_.size()) * sizeof(std::size_t); }
+  std::size_t bytes() const noexcept { return 2 * begin_.size() * sizeof(double) + first_.size() * sizeof(std::size_t); }
 
  private:
   std::size_t components_;
-  std::vector<std::size_t> lanes_;   ///< by block, while counting
-  std::vector<std::size_t> first_;   ///< first lane of each block
+  std::vector<std::size_t> lanes_;  ///< by block, while counting
+  std::vector<std::size_t> first_;  ///< first lane of each block
   AlignedVector<double> begin_, end_;
   double time_step_ = 0;
   bool allocated_ = false;

@@ -26,7 +26,9 @@ struct HistoryUpdate {
 };
 
 template <class Law>
-concept HasHistory = requires { Law::template state_components<Solid>; };
+concept HasHistory = requires {
+  Law::template state_components<Solid>;
+};
 
 template <class Law, class S>
 constexpr int state_size() noexcept {
@@ -38,7 +40,9 @@ constexpr int state_size() noexcept {
 
 /// Components of a symmetric tensor: 6, 4 (xx xy yy zz) or 3.
 template <class S>
-inline constexpr int symmetric_size = S::dimension == 3 ? 6 : S::dimension == 2 ? 4 : 3;
+inline constexpr int symmetric_size = S::dimension == 3   ? 6
+                                      : S::dimension == 2 ? 4
+                                                          : 3;
 
 /// The components i <= j of a, in the order of the space.
 template <class T, class S>
