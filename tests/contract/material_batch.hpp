@@ -94,17 +94,18 @@ inline Values random_direction(Random& random, Space space) {
   return d;
 }
 
-/// All outputs of one call of evaluate for points H_p with directions dH_p. Outputs hold NaN before; entries behind padded(n) are
+/// All outputs of one call of evaluate for points H_p with directions dH_p, from histories (empty: fresh). Outputs hold NaN before; entries behind padded(n) are
 /// guarded and must not change.
 struct Evaluation {
   int n, components;
   std::size_t stride;
-  Field H, dH, psi, P, dP, A, constant_field;
+  Field H, dH, psi, P, dP, A, lateral, constant_field, state_old, state;
   Status status;
   bool guards_intact = true;
 
   Evaluation(const Material& material, Space space, std::span<const double> constants, const std::vector<Values>& points,
-             const std::vector<Values>& directions = {}, bool constants_per_point = false)
+             const std::vector<Values>& directions = {}, bool constants_per_point = false,
+             const std::vector<Values>& histories = {})
       : n(static_cast<int>(points.size())),
         components(tensor_components(space)),
         stride(padded(points.size()) + padding),
@@ -114,28 +115,37 @@ struct Evaluation {
         P(components, stride),
         dP(components, stride),
         A(components * components, stride),
-        constant_field(static_cast<int>(constants.size()), stride) {
+        lateral(1, stride),
+        constant_field(static_cast<int>(constants.size()), stride),
+        state_old(material.state_components(space), stride + padding),
+        state(material.state_components(space), stride + padding) {
     for (int p = 0; p < n; ++p)
       for (int c = 0; c < components; ++c) {
         H.component(c)[p] = points[p][c];
         if (!directions.empty()) dH.component(c)[p] = directions[p][c];
       }
+    for (std::size_t p = 0; p < histories.size(); ++p)
+      for (int c = 0; c < state_old.components(); ++c) state_old.component(c)[p] = histories[p][c];
     for (std::size_t k = 0; k < constants.size(); ++k)
       for (std::size_t p = 0; p < stride; ++p) constant_field.component(static_cast<int>(k))[p] = constants[k];
-    for (Field* f : {&psi, &P, &dP, &A}) f->fill(std::numeric_limits<double>::quiet_NaN());
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
     status = material.evaluate(space, {.n = n,
                                        .stride = stride,
                                        .H = H.data(),
                                        .dH = dH.data(),
                                        .constants = constants_per_point ? constant_field.data() : constants.data(),
                                        .constant_stride = constants_per_point ? stride : 0,
+                                       .state_old = histories.empty() ? nullptr : state_old.data(),
+                                       .state_new = state.components() > 0 ? state.data() : nullptr,
+                                       .state_stride = state.stride(),
                                        .psi = psi.data(),
                                        .P = P.data(),
                                        .dP = dP.data(),
+                                       .lateral = free_stretch(space) ? lateral.data() : nullptr,
                                        .A = A.data()});
-    for (Field* f : {&psi, &P, &dP, &A})
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &state})
       for (int c = 0; c < f->components(); ++c)
-        for (std::size_t p = padded(points.size()); p < stride; ++p) guards_intact &= std::isnan(f->component(c)[p]);
+        for (std::size_t p = padded(points.size()); p < f->stride(); ++p) guards_intact &= std::isnan(f->component(c)[p]);
   }
 
   Values at(const Field& f, int p) const {

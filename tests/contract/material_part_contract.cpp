@@ -40,7 +40,9 @@ std::vector<double> constants_of(const Material& material, const Example& exampl
 
 std::string label(const Example& example) { return fmt::format("{} ({})", example.part, example.table); }
 
-void in_every_space(void (MaterialContract::*identity)()) {
+/// check(material, constants, options) for every example.
+template <class Check>
+void for_every_example(const Check& check) {
   for (const Example& example : examples(Kind::material)) {
     INFO(label(example));
     const auto material = subject().registry.material(*values_of(example));
@@ -56,8 +58,14 @@ void in_every_space(void (MaterialContract::*identity)()) {
                     " becomes ", scaled[k], " where all moduli are multiplied by ", factor);
       options.moduli.push_back(modulus);
     }
-    check_material(*material, constants, options, identity);
+    check(*material, constants, options);
   }
+}
+
+void in_every_space(void (MaterialContract::*identity)()) {
+  for_every_example([&](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
+    check_material(material, constants, options, identity);
+  });
 }
 
 }  // namespace
@@ -71,6 +79,8 @@ TEST_CASE("material: stress is the derivative of the energy, the tangent that of
 
 TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") { in_every_space(&MaterialContract::tangent_action); }
 
+TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") { in_every_space(&MaterialContract::free_stretches); }
+
 TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
 
 TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") { in_every_space(&MaterialContract::rotations); }
@@ -78,6 +88,10 @@ TEST_CASE("material: stress turns with the body, and an isotropic law has no dir
 TEST_CASE("material: stress, energy and tangent have the unit of the moduli") { in_every_space(&MaterialContract::units); }
 
 TEST_CASE("material: an inadmissible deformation is named, and its neighbours do not notice") { in_every_space(&MaterialContract::inadmissible); }
+
+TEST_CASE("material: a law with history follows paths: objective, exact tangent, its history in its own place") {
+  for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) { check_history(material, constants, options); });
+}
 
 TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {
   for (const Example& example : examples(Kind::material)) {

@@ -172,43 +172,80 @@ TEST_CASE("hencky: hydrostatic and principal stretches") {
     CHECK(P[4 * i] == doctest::Approx((lambda * volume + 2 * mu * std::log(l[i])) / l[i]).epsilon(1e-13));
 }
 
-// The reference is the same law in long double with its own tolerance: derivatives there by central differences of order six.
-TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
+namespace {
+
+/// P and A : dH at H against differences of order six of the same law in long double, to `tolerance` of the largest |A| (1 +
+/// |H|).
+template <class S, class Law>
+void check_extended(const Law& law, Space space, const std::vector<double>& constants, const contract::Matrix& F,
+                    contract::Random& random, double tolerance, const std::string& what) {
   using Long = long double;
-  using LongTensor = Tensor<Long, Solid>;
-  const Hencky law;
-  const std::array<Long, 2> k{1.2L, 0.8L};
-  const std::vector<double> constants{1.2, 0.8};
+  using LongTensor = Tensor<Long, S>;
   constexpr Long weights[] = {3.0L / 4, -3.0L / 20, 1.0L / 60};
+  std::array<Long, Law::traits.constants> k;
+  std::copy(constants.begin(), constants.end(), k.begin());
+  contract::Values H = contract::restrict_to(space, F);
+  for (int c = 0; c < S::components; ++c) H[c] -= row<S>(c) == column<S>(c) ? 1.0 : 0.0;
+  const contract::Values direction = contract::random_direction(random, space);
+  const Evaluation e(LawMaterial<Law>(law), space, constants, {H}, {direction});
+  const double allowed = tolerance * contract::largest(e.at(e.A, 0)) * (1 + contract::largest(H));
+  const Long h = 1e-3L;
+  const auto moved = [&](int c, Long by) {
+    return LongTensor::map([&](int i) { return Long(H[i]) + (c < 0 ? by * Long(direction[i]) : i == c ? by : 0.0L); });
+  };
+  LongTensor stress_slope = LongTensor::map([](int) { return 0.0L; });
+  for (int step = 1; step <= 3; ++step)
+    stress_slope =
+        stress_slope + (weights[step - 1] / h) * (stress(law, moved(-1, step * h), k) - stress(law, moved(-1, -step * h), k));
+  for (int c = 0; c < S::components; ++c) {
+    Long slope = 0;
+    for (int step = 1; step <= 3; ++step)
+      slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
+    CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= allowed, "P: ", what, ", component ", c);
+    CHECK_MESSAGE(std::abs(double(stress_slope[c] - e.dP.component(c)[0])) <= allowed, "dP: ", what, ", component ", c);
+  }
+}
+
+template <class Law>
+void check_extended(const Law& law, const std::vector<double>& constants, const std::string& what) {
+  contract::Random random(5);
+  for (int trial = 0; trial < 12; ++trial) {
+    const auto check = [&]<class S>(S, Space space) {
+      check_extended<S>(law, space, constants, contract::random_deformation(random, space, 0.2, 5.0), random, 1e-10, what);
+    };
+    check(Solid(), Space::solid);
+    check(Plane(), Space::plane_strain);
+    check(Line(), Space::line_strain);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("P = dpsi/dF and A = dP/dF to ten digits, against the same law in extended precision") {
+  check_extended(LinearElastic(), {1.2, 0.8}, "linear_elastic");
+  check_extended(SaintVenantKirchhoff(), {1.2, 0.8}, "saint_venant_kirchhoff");
+  for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic}) {
+    check_extended(NeoHookean{form}, {0.8, 8.0}, "neo_hookean");
+    check_extended(MooneyRivlin{form}, {0.3, 0.1, 8.0}, "mooney_rivlin");
+  }
+  check_extended(Hencky(), {1.2, 0.8}, "hencky");
+}
+
+TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
   contract::Random random(3);
   for (int shape = 0; shape < 3; ++shape)
     for (int exponent = 0; exponent <= 17; ++exponent) {
       const double gap = exponent == 17 ? 0.0 : std::pow(10.0, -exponent);
       // 0: two equal and a third above, 1: below, 2: all three near
       const double third = shape == 0 ? 2.0 : shape == 1 ? 0.5 : 1.3 + 2 * gap;
-      const contract::Matrix F = contract::product(
-          contract::random_rotation(random, Space::solid),
-          contract::product({1.3, 0, 0, 0, 1.3 + gap, 0, 0, 0, third}, contract::random_rotation(random, Space::solid)));
-      contract::Values H = contract::restrict_to(Space::solid, F);
-      for (int i = 0; i < 3; ++i) H[4 * i] -= 1;
-      const contract::Values direction = contract::random_direction(random, Space::solid);
-      const Evaluation e(LawMaterial<Hencky>(), Space::solid, constants, {H}, {direction});
-      const Long h = 2e-3L;
-      const auto moved = [&](int c, Long by) {
-        return LongTensor::map([&](int i) { return Long(H[i]) + (c < 0 ? by * Long(direction[i]) : i == c ? by : 0.0L); });
+      const std::string what = "shape " + std::to_string(shape) + ", gap 1e-" + std::to_string(exponent);
+      const auto check = [&]<class S>(S, Space space) {
+        const contract::Matrix F = contract::product(
+            contract::random_rotation(random, space),
+            contract::product({1.3, 0, 0, 0, 1.3 + gap, 0, 0, 0, third}, contract::random_rotation(random, space)));
+        check_extended<S>(Hencky(), space, {1.2, 0.8}, F, random, 5e-12, what);
       };
-      for (int c = 0; c < 9; ++c) {
-        Long slope = 0;
-        for (int step = 1; step <= 3; ++step)
-          slope += weights[step - 1] / h * (law.psi(moved(c, step * h), k) - law.psi(moved(c, -step * h), k));
-        CHECK_MESSAGE(std::abs(double(slope - e.P.component(c)[0])) <= 1e-11, "P: shape ", shape, ", gap ", gap, ", component ",
-                      c);
-      }
-      LongTensor slope = LongTensor::map([](int) { return 0.0L; });
-      for (int step = 1; step <= 3; ++step)
-        slope = slope + (weights[step - 1] / h) * (law.P(moved(-1, step * h), k) - law.P(moved(-1, -step * h), k));
-      for (int c = 0; c < 9; ++c)
-        CHECK_MESSAGE(std::abs(double(slope[c] - e.dP.component(c)[0])) <= 1e-11, "dP: shape ", shape, ", gap ", gap,
-                      ", component ", c, " ", double(slope[c]), " ", e.dP.component(c)[0]);
+      check(Solid(), Space::solid);
+      check(Plane(), Space::plane_strain);
     }
 }

@@ -41,6 +41,10 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const do
     batch.P = P;
   }
   if (work_ == Work::sample) batch.lateral = s.lateral;
+  if (LawHistory* history = laws_.history()) {
+    batch.history = history->next(s.block, s.cursor, n);
+    if (work_ != Work::force) batch.history.end = nullptr;
+  }
   const Status status = laws_.evaluate(batch, s.law);
   if (!status.ok()) return status.inadmissible;
   if (energy_) {

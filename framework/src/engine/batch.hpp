@@ -40,6 +40,7 @@ struct BatchScratch {
   std::int32_t owner[batch_points];
   std::int32_t far[batch_points];
   LawScratch law;
+  std::size_t block = 0, cursor = 0;             ///< where history is kept: the block, and its lanes so far
 };
 
 /// Sums over lanes of sampled quantities go here, one row per owner.
@@ -58,7 +59,13 @@ class ScratchPool {
  public:
   /// Before a parallel loop: memory for every thread, with room for the constants of the laws.
   void prepare(const Laws& laws);
-  BatchScratch& mine() noexcept { return *scratch_[static_cast<std::size_t>(thread_index())]; }
+  /// The memory of this thread, at the beginning of a block of batches.
+  BatchScratch& begin_block(std::size_t block) noexcept {
+    BatchScratch& s = *scratch_[static_cast<std::size_t>(thread_index())];
+    s.block = block;
+    s.cursor = 0;
+    return s;
+  }
   std::size_t bytes() const noexcept { return scratch_.size() * sizeof(BatchScratch); }
 
  private:

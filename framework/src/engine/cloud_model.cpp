@@ -14,7 +14,7 @@ namespace perikit {
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip && !laws_.history()),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
@@ -75,7 +75,7 @@ void CloudModel<D>::gradient_rows(std::size_t p, const AlignedVector<Row>& u, Al
 
 template <int D>
 void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
-  BatchScratch& s = scratch_.mine();
+  BatchScratch& s = scratch_.begin_block(b);
   const std::size_t end = std::min(body_.points(), (b + 1) * block_points);
   double energy = 0;
   for (std::size_t first = b * block_points; first < end; first += batch_points) {
@@ -205,7 +205,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
 
 template <int D>
 void CloudModel<D>::bonds_block(std::size_t b, Pass& pass) {
-  BatchScratch& s = scratch_.mine();
+  BatchScratch& s = scratch_.begin_block(b);
   double energy = 0;
   for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
     if (bonds_of_point(p, s, pass, &energy) >= 0) {

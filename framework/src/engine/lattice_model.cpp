@@ -34,8 +34,8 @@ const LaneFactors& lane_factors() {
 
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip && !laws_.history()),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_ && !laws_.history()),
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
@@ -118,7 +118,7 @@ static int run_length(const std::vector<LatticeChunk>& chunks, std::size_t c, st
 template <int D>
 void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
-  BatchScratch& s = scratch_.mine();
+  BatchScratch& s = scratch_.begin_block(b);
   const bool sample = pass.work.work() == Work::sample;
   if (!sample) zero_rows(block, pass.out);
   double energy = 0;
@@ -305,7 +305,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
 template <int D>
 void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
-  BatchScratch& s = scratch_.mine();
+  BatchScratch& s = scratch_.begin_block(b);
   const std::size_t slots = pairs_ && pass.work.work() != Work::sample ? families_.half : families_.offsets.size();
   double energy = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {

@@ -6,7 +6,10 @@ namespace perikit {
 
 Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std::uint16_t> ids, std::size_t stride)
     : space_(space), records_(std::move(records)), ids_(ids), stride_(stride),
-      single_(ids.empty() && records_.front().uniform) {}
+      single_(ids.empty() && records_.front().uniform) {
+  for (const MaterialRecord& record : records_) state_ = std::max(state_, record.material->state_components(space));
+  if (state_ > 0) history_ = std::make_unique<LawHistory>(state_);
+}
 
 bool Laws::constant_tangent() const noexcept {
   return std::all_of(records_.begin(), records_.end(), [](const auto& r) { return r.traits.constant_tangent; });
@@ -33,6 +36,7 @@ void Laws::prepare(LawScratch& scratch, bool tangents) const {
   std::size_t constants = 1;
   for (const MaterialRecord& record : records_) constants = std::max(constants, static_cast<std::size_t>(record.traits.constants));
   scratch.constants.assign(constants * batch_points, 0.0);
+  scratch.history.assign(static_cast<std::size_t>(state_) * batch_points, 0.0);
   if (tangents) scratch.A.assign(static_cast<std::size_t>(components() * components()) * batch_points, 0.0);
 }
 
@@ -47,6 +51,12 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.dP = batch.dP;
   call.A = batch.A;
   call.lateral = batch.lateral;
+  if (history_) {
+    call.time_step = history_->time_step();
+    call.state_old = batch.history.begin;
+    call.state_new = batch.history.end;
+    call.state_stride = batch.history.stride;
+  }
   call.constants = record.constants.data();
   if (!record.uniform) {
     const auto count = static_cast<std::size_t>(record.traits.constants);
@@ -86,19 +96,21 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     part.dP = batch.dP ? scratch.dP : nullptr;
     part.lateral = batch.lateral ? scratch.lateral : nullptr;
     part.A = batch.A ? scratch.A.data() : nullptr;
+    part.history.end = batch.history.end ? scratch.history.data() : nullptr;
     const Status one = evaluate_one(records_[m], part, scratch);
     if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
-    const auto keep = [&](double* to, const double* from, int components) {
+    const auto keep = [&](double* to, const double* from, int components, std::size_t stride) {
       if (!to) return;
       for (int c = 0; c < components; ++c)
-        for (int l = 0; l < batch.n; ++l)
-          if (mine(l)) to[c * batch_points + l] = from[c * batch_points + l];
+        for (std::size_t l = 0; l < static_cast<std::size_t>(batch.n); ++l)
+          if (mine(static_cast<int>(l))) to[static_cast<std::size_t>(c) * stride + l] = from[static_cast<std::size_t>(c) * stride + l];
     };
-    keep(batch.psi, scratch.psi, 1);
-    keep(batch.lateral, scratch.lateral, 1);
-    keep(batch.P, scratch.P, components());
-    keep(batch.dP, scratch.dP, components());
-    keep(batch.A, scratch.A.data(), components() * components());
+    keep(batch.psi, scratch.psi, 1, batch_points);
+    keep(batch.lateral, scratch.lateral, 1, batch_points);
+    keep(batch.P, scratch.P, components(), batch_points);
+    keep(batch.dP, scratch.dP, components(), batch_points);
+    keep(batch.A, scratch.A.data(), components() * components(), batch_points);
+    keep(batch.history.end, scratch.history.data(), records_[m].material->state_components(space_), batch.history.stride);
   }
   return status;
 }

@@ -15,6 +15,7 @@ EvaluationStatus status_at(const Body& body, std::int64_t bad) {
 
 EvaluationStatus run_forces(const Laws& laws, bool selective, std::size_t blocks, ConstFieldView u, FieldView force, double* energy,
                             const std::function<EvaluationStatus(Pass&)>& run) {
+  if (laws.history()) laws.history()->prepare(blocks);
   const BatchWork work(laws, Work::force, energy != nullptr, selective);
   std::vector<double> energies(energy ? blocks : 0, 0.0);
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};

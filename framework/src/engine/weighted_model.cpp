@@ -270,7 +270,7 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
 
 template <int D>
 void WeightedModel<D>::block(std::size_t b, Pass& pass) {
-  BatchScratch& s = scratch_.mine();
+  BatchScratch& s = scratch_.begin_block(b);
   Memory& m = *memory_[static_cast<std::size_t>(thread_index())];
   double energy = 0;
   for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {

@@ -23,6 +23,7 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());
   model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip});
+  prepare_history(quasi_static);
   read_initial();
   read_constraints(quasi_static);
   read_loads(quasi_static);
@@ -75,8 +76,11 @@ double BodyProblem::uniform_mass() {
   return uniform_mass_;
 }
 
-EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double) {
+EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
+  LawHistory* const history = laws_->history();
+  if (history) history->set_time_step(time_step);
   EvaluationStatus status = model_->forces(u, force, energy);
+  if (history) history->set_time_step(0);
   if (!status.ok()) {
     const auto p = static_cast<std::size_t>(body_.internal()[static_cast<std::size_t>(status.point)]);
     const std::uint16_t id = body_.material_ids().empty() ? std::uint16_t{0} : body_.material_ids()[p];
@@ -85,6 +89,33 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
                                      model_->has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length", status.description, scene_.kinematics->type, material);
   }
   return status;
+}
+
+bool BodyProblem::advance_history(double) {
+  if (laws_->history()) laws_->history()->advance();
+  return false;
+}
+
+void BodyProblem::prepare_history(bool quasi_static) {
+  LawHistory* const history = laws_->history();
+  if (!history) return;
+  const auto& records = laws_->records();
+  for (std::size_t id = 0; id < records.size(); ++id) {
+    if (records[id].material->state_components(body_.space()) == 0) continue;
+    const PartValues& part = id == 0 ? *scene_.material : *scene_.regions[id - 1].material;
+    const auto refuse = [&](const std::string& with, const std::string& allowed) {
+      throw InputError(part.values.position("type"), part.values.path() + ".type",
+                       fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
+    };
+    if (quasi_static) {
+      refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene_.integrator->type),
+             "an explicit integrator, or another material");
+    }
+    if (scene_.damage) refuse("[damage]", "a material without history, or no [damage]");
+  }
+  // The first evaluation only counts.
+  model_->forces(displacement_, internal_force_, nullptr);
+  history->allocate();
 }
 
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) { return model_->tangent(u, w, Kw); }
@@ -131,6 +162,7 @@ Field BodyProblem::reaction(bool dynamic, double t) {
 std::size_t BodyProblem::bytes() const noexcept {
   std::size_t total = body_.bytes() + model_->report().bytes + displacement_.bytes() + internal_force_.bytes() + mass_.size() * 8;
   for (const auto& [name, field] : declared_) total += field.bytes();
+  if (laws_->history()) total += laws_->history()->bytes();
   return total;
 }
 
@@ -178,6 +210,9 @@ std::vector<std::byte> BodyProblem::snapshot() const {
     scalar(static_cast<std::uint64_t>(values.size()));
     append(bytes, values.data(), values.size() * sizeof(double));
   }
+  const std::span<const double> history = laws_->history() ? laws_->history()->values() : std::span<double>();
+  scalar(static_cast<std::uint64_t>(history.size()));
+  append(bytes, history.data(), history.size_bytes());
   const auto field = [&](const std::string& name, const Field& f) {
     scalar(static_cast<std::uint64_t>(name.size()));
     append(bytes, name.data(), name.size());
@@ -212,6 +247,9 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
     const std::span<double> values = declare_numbers(name, count);
     in.take(values.data(), count * sizeof(double));
   }
+  const std::span<double> history = laws_->history() ? laws_->history()->values() : std::span<double>();
+  if (in.value<std::uint64_t>() != history.size()) throw InputError("the saved state belongs to other materials");
+  in.take(history.data(), history.size_bytes());
   eigenvector_ = Field();
   while (!in.done()) {
     const std::string name = text();

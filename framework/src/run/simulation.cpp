@@ -44,6 +44,9 @@ std::string Simulation::summary() {
                         problem_->model().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
+  if (problem_->laws().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
+    text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
+  }
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
   if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);

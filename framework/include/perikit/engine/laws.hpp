@@ -8,6 +8,7 @@
 
 #include "perikit/core/field.hpp"
 #include "perikit/core/space.hpp"
+#include "perikit/engine/law_history.hpp"
 #include "perikit/model/material.hpp"
 
 namespace perikit {
@@ -34,6 +35,7 @@ struct LawScratch {
   alignas(64) double dP[9 * batch_points];
   AlignedVector<double> constants;
   AlignedVector<double> A;               ///< only where tangents are asked for
+  AlignedVector<double> history;         ///< of laws that have one
 };
 
 struct LawBatch {
@@ -45,6 +47,7 @@ struct LawBatch {
   double* P = nullptr;
   double* dP = nullptr;
   double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
+  LawHistory::Place history;             ///< nothing: fresh, and not kept
   double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
 };
 
@@ -58,6 +61,10 @@ class Laws {
   bool single() const noexcept { return single_; }
   bool constant_tangent() const noexcept;
   bool objective() const noexcept;
+  /// Null where every law depends on F alone.
+  LawHistory* history() const noexcept { return history_.get(); }
+  /// Doubles of history per evaluation point, the most of any law.
+  int state_components() const noexcept { return state_; }
   /// Both points have the same law and the same constants, so that a symmetric bond needs one evaluation.
   bool same(std::size_t p, std::size_t q) const noexcept {
     return ids_.empty() ? records_[0].uniform : ids_[p] == ids_[q] && records_[ids_[p]].uniform;
@@ -79,6 +86,8 @@ class Laws {
   std::span<const std::uint16_t> ids_;
   std::size_t stride_;
   bool single_;
+  int state_ = 0;                        ///< components of history, the most of any law
+  std::unique_ptr<LawHistory> history_;
 };
 
 }  // namespace perikit

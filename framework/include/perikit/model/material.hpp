@@ -11,11 +11,10 @@ namespace perikit {
 
 struct MaterialTraits {
   int constants = 0;          ///< doubles per point that `evaluate` reads
-  int state = 0;              ///< doubles of history per evaluation point
   bool constant_tangent = false;
   bool objective = true;      ///< false for small-strain laws
   bool isotropic = true;
-  bool hyperelastic = true;   ///< psi exists; false for rate laws, which run explicitly only
+  bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
 };
 
 /// Lame constants of the law at F = I [Pa].
@@ -32,13 +31,14 @@ struct Moduli {
 struct MaterialBatch {
   int n = 0;
   std::size_t stride = 0;
-  double time_step = 0;             ///< of rate laws [s]
+  double time_step = 0;             ///< of laws with history [s]; 0 where no step is taken
   const double* H = nullptr;        ///< displacement gradient [-]
-  const double* dH = nullptr;       ///< direction of dP (or increment of H over the step, for rate laws) [-]
+  const double* dH = nullptr;       ///< direction of dP [-]
   const double* constants = nullptr;        ///< constant k of point p: constants[k * constant_stride + p * (constant_stride != 0)]
   std::size_t constant_stride = 0;          ///< 0: the same constants at all points, constants[k]
-  const double* state_old = nullptr;
-  double* state_new = nullptr;
+  const double* state_old = nullptr;        ///< history at the beginning of the step; null: fresh (all zeros)
+  double* state_new = nullptr;              ///< history if the step ends at H
+  std::size_t state_stride = 0;             ///< component c of the history at point p: state[c * state_stride + p]; a multiple of `padding`
   double* psi = nullptr;            ///< [J/m^3]
   double* P = nullptr;              ///< [Pa]
   double* dP = nullptr;             ///< A : dH [Pa]
@@ -66,8 +66,8 @@ class Material {
   /// (nu >= 1/2, negative modulus).
   virtual void constants(const MaterialInput& input, double* out) const = 0;
   virtual Moduli small_strain(const double* constants) const noexcept = 0;
-  /// Fresh history at one point [traits().state].
-  virtual void initial_state(const double* /*constants*/, double* /*state*/) const noexcept {}
+  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history is zero.
+  virtual int state_components(Space) const noexcept { return 0; }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;
 };

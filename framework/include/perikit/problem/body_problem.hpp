@@ -44,7 +44,7 @@ class BodyProblem final : public Problem {
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
-  bool advance_history(double) override { return false; }
+  bool advance_history(double time_step) override;
 
   bool any_constraint() const noexcept override { return !constrained_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
@@ -93,6 +93,8 @@ class BodyProblem final : public Problem {
   /// The scene's penalty, null without one; refused over kinematics that it does not suit.
   std::shared_ptr<const Stabilization> make_stabilization(const PartFactory& factory) const;
   void read_materials(const PartFactory& factory);
+  /// Laws with history: refuses runs that have no steps of a path, and makes room.
+  void prepare_history(bool quasi_static);
   void read_initial();
   void read_constraints(bool quasi_static);
   void read_loads(bool quasi_static);

@@ -87,7 +87,8 @@ class Problem {
   virtual double uniform_mass() = 0;
 
   // Forces. `u` must come from make_field.
-  /// internal_force <- f(u) [N]; strain energy -> *energy where wanted. time_step: of rate laws.
+  /// internal_force <- f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and laws
+  /// with history put theirs aside for advance_history; 0: nothing is kept.
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
   /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
   virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
@@ -100,7 +101,7 @@ class Problem {
   virtual void evaluate_loads(double t, FieldView force) = 0;
   virtual bool any_load() const noexcept = 0;
   virtual bool loads_depend_on_time() const noexcept = 0;
-  /// After a converged step: history of rate laws, damage. Returns true when bonds changed.
+  /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
   virtual bool advance_history(double time_step) = 0;
 
   // Constraints.

@@ -14,7 +14,7 @@
 ///
 /// T is a Pack, or Duals of it; k is a std::array<Pack, traits.constants>. P(0) must be exactly zero: write it in H, not in F.
 /// Stress, tangent actions, tangents and all five spaces follow; whatever the law leaves out comes from forward differentiation.
-/// A law with P alone stores no energy: it declares hyperelastic = false, and its psi reads zero.
+/// A law with P alone stores no energy: it declares hyperelastic = false, and its psi reads zero. Laws with history: perikit/sdk/history.hpp.
 /// Laws with traits.objective = false are small-strain laws and accept every finite H.
 /// Uniaxial stress needs an isotropic law (both free stretches are taken equal).
 
@@ -25,6 +25,7 @@
 #include "perikit/core/field.hpp"
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/free_stretch.hpp"
+#include "perikit/sdk/history.hpp"
 
 // Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
 // checks in the inlined bodies would take minutes to compile.
@@ -44,6 +45,10 @@ class LawMaterial final : public Material {
   MaterialTraits traits() const noexcept override { return Law::traits; }
   void constants(const MaterialInput& input, double* out) const override { law_.constants(input, out); }
   Moduli small_strain(const double* k) const noexcept override { return law_.small_strain(k); }
+  int state_components(Space space) const noexcept override {
+    const int d = dimension(space);
+    return d == 3 ? state_size<Law, Solid>() : d == 2 ? state_size<Law, Plane>() : state_size<Law, Line>();
+  }
 
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
     switch (space) {
@@ -81,6 +86,19 @@ class LawMaterial final : public Material {
     PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) t[c].store(x + c * stride + p);
   }
 
+  /// The law of points p ...: of the step that begins at their history, for laws that have one.
+  template <class S>
+  decltype(auto) law_at(const MaterialBatch& b, int p) const noexcept {
+    if constexpr (HasHistory<Law>) {
+      std::array<Pack, state_size<Law, S>()> state{};
+      if (b.state_old)
+        for (std::size_t i = 0; i < state.size(); ++i) state[i] = Pack::load(b.state_old + i * b.state_stride + p);
+      return law_.template after<S>(state);
+    } else {
+      return (law_);
+    }
+  }
+
   /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
   template <class S>
   static PackMask admissible(const Tensor<Pack, S>& H) noexcept {
@@ -99,49 +117,70 @@ class LawMaterial final : public Material {
     Status status;
     Constants k = load_constants(b, 0);
     Pack ratio = 0.0;
-    if constexpr (free_stretch) ratio = contraction_ratio<S>(law_, k);
+    const auto contraction = [&] {
+      if constexpr (HasHistory<Law>)
+        return contraction_ratio<S>(law_.template after<S>(std::array<Pack, state_size<Law, S>()>{}), k);
+      else
+        return contraction_ratio<S>(law_, k);
+    };
+    if constexpr (free_stretch) ratio = contraction();
     for (int p = 0; p < b.n; p += pack_width) {
       if (b.constant_stride != 0) {
         k = load_constants(b, p);
-        if constexpr (free_stretch) ratio = contraction_ratio<S>(law_, k);
+        if constexpr (free_stretch) ratio = contraction();
       }
+      decltype(auto) law = law_at<S>(b, p);
       Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
       PackMask good = Pack(0.0) == Pack(0.0);
-      if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law_, H, k, ratio, good);
+      if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law, H, k, ratio, good);
       good &= admissible(H);
       if (b.lateral) H[S::components - 1].store(b.lateral + p);
 
       Pack probe = 0.0;  // turns to NaN where an output is not finite
-      if (b.psi) {
-        Pack psi = 0.0;
-        if constexpr (HasEnergy<Law, Pack, S, Constants>) psi = law_.psi(H, k);
+      const auto put_energy = [&](Pack psi) {
         psi.store(b.psi + p);
         probe += 0.0 * psi;
-      }
-      if (b.P) {
-        Tensor<Pack, S> P = stress(law_, H, k);
+      };
+      const auto put_stress = [&](Tensor<Pack, S> P) {
         if constexpr (free_stretch) P = with_free_part(P, Pack(0.0));
         store(P, b.P, b.stride, p);
         Pack total = P[0];
         PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += P[c];
         probe += 0.0 * total;
+      };
+      if constexpr (HasHistory<Law>) {
+        if (b.psi || b.P || b.state_new) {
+          const auto end = law.update(H, k);
+          if (b.psi) put_energy(end.psi);
+          if (b.P) put_stress(end.P);
+          if (b.state_new)
+            for (std::size_t i = 0; i < end.state.size(); ++i) end.state[i].store(b.state_new + i * b.state_stride + p);
+        }
+      } else {
+        if (b.psi) {
+          if constexpr (HasEnergy<Law, Pack, S, Constants>)
+            put_energy(law.psi(H, k));
+          else
+            put_energy(0.0);
+        }
+        if (b.P) put_stress(stress(law, H, k));
       }
-      if (b.dP || b.A) tangents<S, free_stretch>(b, p, H, k);
+      if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k);
       good &= probe == 0.0;
       if (any(!good)) [[unlikely]]
-        clear(b, S::components, p, good, status);
+        clear(b, S::components, state_size<Law, S>(), p, good, status);
     }
     return status;
   }
 
-  template <class S, bool free_stretch>
-  [[gnu::noinline]] PERIKIT_FLATTEN void tangents(const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
-                                                const Constants& k) const noexcept {
+  template <class S, bool free_stretch, class StepLaw>
+  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
+                                                       const Constants& k) noexcept {
     const auto action = [&] {
       if constexpr (free_stretch)
-        return condensed_tangent(law_, H, k);
+        return condensed_tangent(law, H, k);
       else
-        return tangent(law_, H, k);
+        return tangent(law, H, k);
     }();
     if (b.dP) store(action(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
     if (!b.A) return;
@@ -153,7 +192,7 @@ class LawMaterial final : public Material {
   }
 
   /// Zeroes the outputs of the lanes that are not good and notes the first of them.
-  [[gnu::noinline, gnu::cold]] static void clear(const MaterialBatch& b, int components, int p, PackMask good,
+  [[gnu::noinline, gnu::cold]] static void clear(const MaterialBatch& b, int components, int state, int p, PackMask good,
                                                  Status& status) noexcept {
     for (int lane = 0; lane < pack_width && p + lane < b.n; ++lane) {
       if (good[lane]) continue;
@@ -167,6 +206,8 @@ class LawMaterial final : public Material {
       zero(b.P, components);
       zero(b.dP, components);
       zero(b.A, components * components);
+      if (!b.state_new) continue;
+      for (int c = 0; c < state; ++c) b.state_new[static_cast<std::size_t>(c) * b.state_stride + p + lane] = 0.0;
     }
   }
 

@@ -1,0 +1,69 @@
+#pragma once
+/// Laws with history (rate laws): what they add to a point law of perikit/sdk/law_material.hpp.
+///
+///   struct MyRateLaw {
+///     static constexpr MaterialTraits traits{.constants = 2, .hyperelastic = false};
+///     template <class S> static constexpr int state_components = 7;           // doubles of history per evaluation point
+///     /// The step that begins at `state`: a point law with P(H, k) and tangent(H, k), and with
+///     /// update(H, k) -> HistoryUpdate<T, S, 7>, H at the end of the step.
+///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state) const noexcept;
+///   };
+///
+/// Fresh history is all zeros: store differences from it (U - I, not U).
+
+#include <array>
+
+#include "perikit/core/tensor.hpp"
+
+namespace perikit {
+
+/// What a step ends with: energy, stress, and the history from which the next step begins.
+template <class T, class S, int size>
+struct HistoryUpdate {
+  T psi;
+  Tensor<T, S> P;
+  std::array<T, size> state;
+};
+
+template <class Law>
+concept HasHistory = requires {
+  Law::template state_components<Solid>;
+};
+
+template <class Law, class S>
+constexpr int state_size() noexcept {
+  if constexpr (HasHistory<Law>)
+    return Law::template state_components<S>;
+  else
+    return 0;
+}
+
+/// Components of a symmetric tensor: 6, 4 (xx xy yy zz) or 3.
+template <class S>
+inline constexpr int symmetric_size = S::dimension == 3   ? 6
+                                      : S::dimension == 2 ? 4
+                                                          : 3;
+
+/// The components i <= j of a, in the order of the space.
+template <class T, class S>
+void pack_symmetric(const Tensor<T, S>& a, T* to) noexcept {
+  int n = 0;
+  PERIKIT_UNROLL for (int k = 0; k < S::components; ++k) if (row<S>(k) <= column<S>(k)) to[n++] = a[k];
+}
+
+template <class S, class T>
+Tensor<T, S> unpack_symmetric(const T* from) noexcept {
+  constexpr auto places = [] {
+    std::array<int, S::components> place{};
+    int n = 0;
+    for (int k = 0; k < S::components; ++k)
+      if (row<S>(k) <= column<S>(k)) {
+        place[k] = n;
+        place[component<S>(column<S>(k), row<S>(k))] = n++;
+      }
+    return place;
+  }();
+  return Tensor<T, S>::map([&](int k) { return from[places[k]]; });
+}
+
+}  // namespace perikit

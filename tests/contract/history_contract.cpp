@@ -1,0 +1,204 @@
+/// Laws with history under every kinematics that has gradients, on lattices and clouds: each evaluation point keeps its own
+/// history, steps advance it, nothing else does.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "perikit/core/parallel.hpp"
+#include "tests/contract/fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+constexpr double step = 1e-3;  ///< length of a step [s]; the law's rates do not see it
+
+std::string rate_scene(const Example& kinematics, int dimension, bool cloud, bool mixed) {
+  BodyOptions body{.dimension = dimension,
+                   .cloud = cloud,
+                   .crack = mixed && dimension == 2,
+                   .two_materials = mixed,
+                   .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
+  body.cells = dimension == 3 ? 6 : dimension == 2 ? 9 : 20;
+  return scene_text(body, kinematics_table(kinematics));
+}
+
+/// check(problem) for every kinematics with gradients in every dimension, on lattices and clouds; half of them with a second
+/// material without history, cracked in 2D (small bodies in 3D would fall apart).
+void for_every_model(const std::function<void(BodyProblem&)>& check) {
+  for (const Example& example : examples(Kind::kinematics))
+    for (int d = 1; d <= 3; ++d)
+      for (const bool cloud : {false, true})
+        for (const bool mixed : {false, true}) {
+          INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice",
+                           mixed ? " two materials" : ""));
+          const auto simulation = build(rate_scene(example, d, cloud, mixed));
+          if (simulation->problem().model().has_gradients()) check(simulation->problem());
+        }
+}
+
+std::vector<double> kept(const BodyProblem& problem) {
+  const std::span<const double> values = std::as_const(*problem.laws().history()).values();
+  return {values.begin(), values.end()};
+}
+
+struct Response {
+  double energy = 0;
+  Field force;
+};
+
+/// Energies and forces on all points agree to the bit.
+bool same(const BodyProblem& problem, const Response& a, const Response& b) {
+  bool equal = a.energy == b.energy;
+  for (const std::int32_t p : problem.body().internal())
+    for (int c = 0; c < problem.dimension(); ++c) equal = equal && a.force.component(c)[p] == b.force.component(c)[p];
+  return equal;
+}
+
+Response respond(BodyProblem& problem, ConstFieldView u, double time_step) {
+  Response r{0, problem.make_field(problem.dimension())};
+  r.force.fill(std::numeric_limits<double>::quiet_NaN());
+  const EvaluationStatus status = problem.evaluate_forces(u, r.force, &r.energy, time_step);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return r;
+}
+
+Field deformed(const BodyProblem& problem, std::uint64_t seed, double noise) {
+  Field u = problem.make_field(problem.dimension());
+  deform(problem.body(), u, seed, noise);
+  return u;
+}
+
+/// Three steps of a path; the last response.
+Response walk(BodyProblem& problem) {
+  Response r;
+  for (const std::uint64_t seed : {31, 32, 33}) {
+    r = respond(problem, deformed(problem, seed, 0.01), step);
+    problem.advance_history(step);
+  }
+  return r;
+}
+
+/// x + u turned by an angle about the third axis, as a displacement.
+Field turned(const BodyProblem& problem, ConstFieldView u, double angle) {
+  const Body& body = problem.body();
+  Field v = problem.make_field(problem.dimension());
+  const double c = std::cos(angle), s = std::sin(angle);
+  for (const std::int32_t p : body.internal()) {
+    const Point x = body.position(static_cast<std::size_t>(p));
+    const double a = x[0] + u.component(0)[p], b = x[1] + u.component(1)[p];
+    v.component(0)[p] = c * a - s * b - x[0];
+    v.component(1)[p] = s * a + c * b - x[1];
+    if (problem.dimension() == 3) v.component(2)[p] = u.component(2)[p];
+  }
+  return v;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
+  for_every_model([](BodyProblem& problem) {
+    walk(problem);
+    const std::vector<double> before = kept(problem);
+    CHECK_MESSAGE(std::any_of(before.begin(), before.end(), [](double x) { return x != 0; }), "no history is kept");
+    const Field u = deformed(problem, 34, 0.01), w = deformed(problem, 35, 0.5);
+    Field Kw = problem.make_field(problem.dimension());
+    PointSamples samples;
+    const Response one = respond(problem, u, step), two = respond(problem, u, 0.0), three = respond(problem, u, step);
+    CHECK_MESSAGE((same(problem, one, two) && same(problem, one, three)), "an evaluation depends on the one before");
+    REQUIRE(problem.tangent_action(u, w, Kw).ok());
+    REQUIRE(problem.model().sample(u, samples).ok());
+    CHECK_MESSAGE(kept(problem) == before, "an evaluation advanced the history");
+    problem.advance_history(step);
+    CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
+    // At the end of the step the increment is zero: the same stress, from the history alone.
+    CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one),
+                  "the state at the end of the step is not the one that was put aside");
+    PointSamples after;
+    REQUIRE(problem.model().sample(u, after).ok());
+    double total = 0, scale = 0;
+    for (const std::int32_t p : problem.body().internal()) {
+      total += after.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
+      scale += std::abs(after.strain_energy_density.data()[p]) * problem.body().volume(static_cast<std::size_t>(p));
+    }
+    CHECK_MESSAGE(std::abs(total - one.energy) <= 1e-11 * scale, "sampled energy ", total, " against ", one.energy);
+  });
+}
+
+TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does no work") {
+  for_every_model([](BodyProblem& problem) {
+    if (problem.dimension() == 1) return;
+    const Response r = walk(problem);
+    constexpr double angle = 1.1;
+    const Field u = deformed(problem, 33, 0.01);
+    const Response q = respond(problem, turned(problem, u, angle), step);
+    const double c = std::cos(angle), s = std::sin(angle), scale = largest(problem.body(), r.force);
+    double worst = 0;
+    for (const std::int32_t p : problem.body().internal()) {
+      const double x = r.force.component(0)[p], y = r.force.component(1)[p];
+      worst = std::max(
+          {worst, std::abs(q.force.component(0)[p] - (c * x - s * y)), std::abs(q.force.component(1)[p] - (s * x + c * y))});
+    }
+    CHECK_MESSAGE(worst <= 1e-10 * scale, "forces off by ", worst, " of ", scale);
+    CHECK_MESSAGE(std::abs(q.energy - r.energy) <= 1e-11 * std::abs(r.energy), q.energy, " against ", r.energy);
+  });
+}
+
+TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's forces") {
+  for_every_model([](BodyProblem& problem) {
+    walk(problem);
+    const Field u = deformed(problem, 34, 0.01);
+    Field w = problem.make_field(problem.dimension()), Kw = w;
+    Noise random(36);
+    set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
+    REQUIRE(problem.tangent_action(u, w, Kw).ok());
+    const double h = 5e-4 * problem.body().spacing();
+    const auto force = [&](double by) {
+      Field v = problem.make_field(problem.dimension());
+      for (std::size_t k = 0; k < v.size(); ++k) v.data()[k] = u.data()[k] + by * w.data()[k];
+      return respond(problem, v, 0.0).force;
+    };
+    const Field a = force(-2 * h), b = force(-h), c = force(h), d = force(2 * h);
+    double worst = 0;
+    for (const std::int32_t p : problem.body().internal())
+      for (int k = 0; k < problem.dimension(); ++k) {
+        const double slope = (8 * (c.component(k)[p] - b.component(k)[p]) - (d.component(k)[p] - a.component(k)[p])) / (12 * h);
+        worst = std::max(worst, std::abs(slope + Kw.component(k)[p]));
+      }
+    CHECK_MESSAGE(worst <= 1e-7 * largest(problem.body(), Kw), "tangent off by ", worst, " of ", largest(problem.body(), Kw));
+  });
+}
+
+TEST_CASE("kinematics: rate laws are the same for any number of threads, and restored runs go on bitwise") {
+  const int threads = thread_count();
+  for_every_model([&](BodyProblem& problem) {
+    const std::vector<std::byte> fresh = problem.snapshot();
+    set_thread_count(1);
+    const Response one = walk(problem);
+    const std::vector<double> history = kept(problem);
+    const std::vector<std::byte> after = problem.snapshot();
+    const Field u = deformed(problem, 37, 0.01);
+    const Response next = respond(problem, u, step);
+    problem.restore(fresh);
+    set_thread_count(2);
+    CHECK_MESSAGE((same(problem, walk(problem), one) && kept(problem) == history), "depends on the number of threads");
+    problem.advance_history(step);  // something else
+    problem.restore(after);
+    CHECK_MESSAGE(same(problem, respond(problem, u, step), next), "a restored run differs");
+  });
+  set_thread_count(threads);
+}
+
+TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a path") {
+  const Example first = examples(Kind::kinematics).front();
+  const Scene scene = parse_scene(rate_scene(first, 2, false, false), "contract.toml", subject().registry);
+  CHECK_THROWS_WITH_AS(BodyProblem(scene, subject().registry, true),
+                       doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
+                       InputError);
+  CHECK_NOTHROW(BodyProblem(scene, subject().registry, false));
+}
