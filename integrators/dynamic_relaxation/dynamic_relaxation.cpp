@@ -74,8 +74,9 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       combine(1, v_, 1 / mass, r_, v_);
       const double kinetic = dot(v_, v_);
       if (kinetic < last_kinetic) {
-        // The peak lies behind: rest there, half a step back.
+        // The peak lies behind: rest there, half of the last velocity v - r/m back.
         combine(1, u, -0.5, v_, u);
+        combine(1, u, 0.5 / mass, r_, u);
         fill(0.0, v_);
         at_rest = true;
         last_kinetic = 0;
