@@ -11,17 +11,18 @@ namespace perikit {
 
 namespace {
 
-constexpr int patience = 5;                  // iterations without a new best residual
+constexpr int patience = 5;                  // iterations that neither give a new best residual nor halve the last one
 constexpr double least_fraction = 1.0 / 1024;
+constexpr double least_strict_fraction = 1.0 / 32;   // shorter steps lead nowhere: a shorter load step does
 constexpr double sufficient = 1e-4;          // Armijo's share of the linear decrease
 
 /// Accuracy of the next linear solve [Eisenstat and Walker 1996, choice 2, with their safeguard].
 double forcing(double last, double residual, double last_residual, double target) {
-  constexpr double gamma = 0.9, most = 0.1;
-  if (last_residual <= 0) return 1e-2;
+  constexpr double gamma = 0.9, most = 1e-2;
+  if (last_residual <= 0) return 1e-3;
   double accuracy = gamma * (residual / last_residual) * (residual / last_residual);
   if (gamma * last * last > 0.1) accuracy = std::max(accuracy, gamma * last * last);
-  return std::max(std::min(accuracy, most), std::min(most, 0.3 * target / residual));
+  return std::max(std::min(accuracy, most), std::min(0.3, 0.3 * target / residual));
 }
 
 /// One solve: the state and the iteration on it.
@@ -118,7 +119,7 @@ Solution NewtonIteration::solve(Equilibrium& equilibrium, bool) {
       best = residual;
       since_best = 0;
       if (line_search_) copy(iteration.displacement(), best_u);
-    } else if (imposed && ++since_best >= patience && line_search_ && !strict) {
+    } else if (imposed && residual > 0.5 * last_residual && ++since_best >= patience && line_search_ && !strict) {
       strict = true;
       if (!iteration.go_to(best_u)) break;
       equilibrium.note("  back to the best state; from here every step lowers the residual");
@@ -136,7 +137,7 @@ Solution NewtonIteration::solve(Equilibrium& equilibrium, bool) {
     };
     while (!acceptable()) {
       alpha /= 2;
-      if (!line_search_ || alpha < least_fraction) {
+      if (!line_search_ || alpha < (strict ? least_strict_fraction : least_fraction)) {
         solution.failure = strict ? "no part of a Newton step lowers the residual" : equilibrium.failure();
         return solution;
       }

@@ -24,9 +24,9 @@ class LinearisedProblem {
 /// Newton iteration [Hashim et al. eqs. 21-29, Partmann et al. eqs. 3.69-3.72]:
 ///   K(u) du = r(u) - K(u) w,   u <- u + alpha (du + w),   w = U - u on prescribed components, 0 elsewhere
 /// so that the first increment carries prescribed displacements into the body instead of tearing its rim.
-/// alpha = 1 unless u would be inadmissible. Residuals of slender bodies rise before they fall: full steps are taken for five
-/// iterations without a new best residual; then the iteration goes back to the best state and asks every step to lower the
-/// residual (watchdog), halving alpha until it does.
+/// alpha = 1 unless u would be inadmissible. Residuals of slender bodies rise before they fall: full steps are taken until five of
+/// them have neither given a new best residual nor halved the last one; then the iteration goes back to the best state and
+/// asks every step to lower the residual (watchdog), halving alpha until it does.
 /// Inexact solves take their accuracy from the last reduction [Eisenstat and Walker 1996, choice 2].
 class NewtonIteration final : public EquilibriumSolver {
  public:
