@@ -90,7 +90,10 @@ bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double
 }
 
 void Jfnk::run(Problem& problem, Observer& observer) {
-  KrylovEquations equations(problem, options_, nullptr);
+  std::string chosen;
+  auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
+  observer.log("jfnk: preconditioner " + chosen);
+  KrylovEquations equations(problem, options_, std::move(preconditioner));
   NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);
   run_load_steps("jfnk", options_.load_steps, problem, observer, newton);
 }

@@ -12,6 +12,7 @@ namespace perikit {
 struct JfnkOptions {
   LoadStepOptions load_steps;
   bool differences = false;          ///< tangent by central differences instead of exactly
+  std::string preconditioner = "auto";
   int restart = 60;                  ///< Krylov vectors before GMRES restarts
   int max_restarts = 20;
   bool line_search = true;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <kinsol/kinsol.h>
+#include <sunlinsol/sunlinsol_klu.h>
 #include <sunlinsol/sunlinsol_spbcgs.h>
 #include <sunlinsol/sunlinsol_spfgmr.h>
 #include <sunlinsol/sunlinsol_spgmr.h>
@@ -41,10 +42,10 @@ void check(int flag, const char* what) {
 
 }  // namespace
 
-KinsolSolver::KinsolSolver(Problem& problem, const KinsolOptions& options)
+KinsolSolver::KinsolSolver(Problem& problem, const KinsolOptions& options, std::unique_ptr<Preconditioner> preconditioner)
     : options_(options), strategy_(strategy_number(options.strategy)), start_(problem.make_field(problem.dimension())),
       displacement_scale_(problem.make_field(problem.dimension())), force_scale_(problem.make_field(problem.dimension())),
-      template_(wrap(problem, start_, context_)), displacement_scale_vector_(wrap(problem, displacement_scale_, context_)),
+      preconditioner_(std::move(preconditioner)), template_(wrap(problem, start_, context_)), displacement_scale_vector_(wrap(problem, displacement_scale_, context_)),
       force_scale_vector_(wrap(problem, force_scale_, context_)) {
   memory_ = KINCreate(context_);
   if (!memory_) throw RunError("kinsol: not enough memory");
@@ -54,31 +55,45 @@ KinsolSolver::KinsolSolver(Problem& problem, const KinsolOptions& options)
   if (fixed_point() || picard()) check(KINSetMAA(memory_, std::min(options.anderson, options.load_steps.max_iterations - 1)), "anderson");
   check(KINSetNumMaxIters(memory_, options.load_steps.max_iterations), "max_iterations");
   check(KINInit(memory_, system_function, template_.get()), "the system");
-  if (!fixed_point()) create_linear_solver();
+  if (fixed_point()) return;
+  if (options.linear_solver == "klu") create_direct_solver(problem);
+  else create_krylov_solver();
+  // The tangent, or the question whether the preconditioner still serves, at every iteration.
+  check(KINSetMaxSetupCalls(memory_, 1), "the renewal of the tangent");
 }
 
 KinsolSolver::~KinsolSolver() {
   if (memory_) KINFree(&memory_);
 }
 
-void KinsolSolver::create_linear_solver() {
+void KinsolSolver::create_krylov_solver() {
   const std::string& name = options_.linear_solver;
   const int vectors = options_.restart, all = options_.restart * (options_.max_restarts + 1);
+  const int side = preconditioner_ ? SUN_PREC_RIGHT : SUN_PREC_NONE;
   N_Vector like = template_.get();
   if (name == "spgmr") {
-    linear_.reset(SUNLinSol_SPGMR(like, SUN_PREC_NONE, vectors, context_));
+    linear_.reset(SUNLinSol_SPGMR(like, side, vectors, context_));
     SUNLinSol_SPGMRSetMaxRestarts(linear_.get(), options_.max_restarts);
   } else if (name == "spfgmr") {
-    linear_.reset(SUNLinSol_SPFGMR(like, SUN_PREC_NONE, vectors, context_));
+    linear_.reset(SUNLinSol_SPFGMR(like, side, vectors, context_));
     SUNLinSol_SPFGMRSetMaxRestarts(linear_.get(), options_.max_restarts);
   } else if (name == "spbcgs") {
-    linear_.reset(SUNLinSol_SPBCGS(like, SUN_PREC_NONE, all, context_));
+    linear_.reset(SUNLinSol_SPBCGS(like, side, all, context_));
   } else {
-    linear_.reset(SUNLinSol_SPTFQMR(like, SUN_PREC_NONE, all, context_));
+    linear_.reset(SUNLinSol_SPTFQMR(like, side, all, context_));
   }
   if (!linear_) throw RunError("kinsol: the linear solver cannot be created: not enough memory?");
   check(KINSetLinearSolver(memory_, linear_.get(), nullptr), "the linear solver");
   check(KINSetJacTimesVecFn(memory_, tangent_action), "the tangent action");
+  if (preconditioner_) check(KINSetPreconditioner(memory_, set_up_preconditioner, precondition), "the preconditioner");
+}
+
+void KinsolSolver::create_direct_solver(Problem& problem) {
+  matrix_ = std::make_unique<TangentMatrix>(problem, context_);
+  linear_.reset(SUNLinSol_KLU(template_.get(), matrix_->get(), context_));
+  if (!linear_) throw RunError("kinsol: KLU cannot be set up: not enough memory?");
+  check(KINSetLinearSolver(memory_, linear_.get(), matrix_->get()), "the linear solver");
+  check(KINSetJacFn(memory_, assemble), "the tangent");
 }
 
 int KinsolSolver::system_function(N_Vector u, N_Vector value, void* self) {
@@ -100,9 +115,29 @@ int KinsolSolver::system_function(N_Vector u, N_Vector value, void* self) {
 int KinsolSolver::tangent_action(N_Vector w, N_Vector Kw, N_Vector u, booleantype*, void* self) {
   auto& solver = *static_cast<KinsolSolver*>(self);
   return guarded(solver.thrown_, [&] {
-    // Picard's linear operator is the tangent at the start of the step.
-    const ConstFieldView at = solver.picard() ? ConstFieldView(solver.start_) : ConstFieldView(field_of(u));
-    return solver.equilibrium_->tangent(at, field_of(w), field_of(Kw)) ? 0 : 1;
+    return solver.equilibrium_->tangent(solver.linearisation_point(u), field_of(w), field_of(Kw)) ? 0 : 1;
+  });
+}
+
+int KinsolSolver::set_up_preconditioner(N_Vector u, N_Vector, N_Vector, N_Vector, void* self) {
+  auto& solver = *static_cast<KinsolSolver*>(self);
+  return guarded(solver.thrown_, [&] {
+    return solver.preconditioner_->prepare(*solver.equilibrium_, solver.linearisation_point(u), solver.callback_failure_) ? 0 : 1;
+  });
+}
+
+int KinsolSolver::precondition(N_Vector, N_Vector, N_Vector, N_Vector, N_Vector v, void* self) {
+  auto& solver = *static_cast<KinsolSolver*>(self);
+  return guarded(solver.thrown_, [&] {
+    solver.preconditioner_->apply(field_of(v), field_of(v));
+    return 0;
+  });
+}
+
+int KinsolSolver::assemble(N_Vector u, N_Vector, SUNMatrix, void* self, N_Vector, N_Vector) {
+  auto& solver = *static_cast<KinsolSolver*>(self);
+  return guarded(solver.thrown_, [&] {
+    return solver.matrix_->assemble(solver.equilibrium_->problem(), solver.linearisation_point(u), solver.callback_failure_) ? 0 : 1;
   });
 }
 
@@ -113,9 +148,10 @@ int KinsolSolver::run_once(Equilibrium& equilibrium, double target, Solution& so
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   long iterations = 0, linear = 0;
   KINGetNumNonlinSolvIters(memory_, &iterations);
-  if (linear_) KINGetNumLinIters(memory_, &linear);
+  if (linear_ && !matrix_) KINGetNumLinIters(memory_, &linear);
+  if (preconditioner_ && iterations > 0) preconditioner_->took(static_cast<int>(linear / iterations));
   solution.iterations += static_cast<int>(iterations);
-  equilibrium.note(fmt::format("  {} iterations{}", iterations, linear_ ? fmt::format(", {} linear ones", linear) : ""));
+  equilibrium.note(fmt::format("  {} iterations{}", iterations, linear > 0 ? fmt::format(", {} linear ones", linear) : ""));
   return flag;
 }
 
@@ -123,6 +159,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   Solution solution;
   equilibrium_ = &equilibrium;
   evaluations_ = 0;
+  callback_failure_.clear();
   Problem& problem = equilibrium.problem();
   const FieldView u = equilibrium.displacement();
   if (extrapolated) {
@@ -158,7 +195,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   for (int attempt = 0; attempt < 5 && !equilibrium.converged(); ++attempt, strictness /= 4) {
     const int flag = run_once(equilibrium, strictness * equilibrium.tolerance() * equilibrium.reference() / free_components, solution);
     if (flag < 0) {
-      solution.failure = kinsol_flag_meaning(flag);
+      solution.failure = callback_failure_.empty() ? kinsol_flag_meaning(flag) : callback_failure_;
       // The state is kept where the norm that counts is met after all.
       if (!evaluate()) return solution;
       break;
@@ -177,7 +214,11 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
 }
 
 void Kinsol::run(Problem& problem, Observer& observer) {
-  KinsolSolver solver(problem, options_);
+  std::string chosen;
+  const bool krylov = options_.strategy != "fixed_point" && options_.linear_solver != "klu";
+  auto preconditioner = krylov ? make_preconditioner(options_.preconditioner, problem, chosen) : nullptr;
+  if (krylov) observer.log("kinsol: preconditioner " + chosen);
+  KinsolSolver solver(problem, options_, std::move(preconditioner));
   run_load_steps("kinsol", options_.load_steps, problem, observer, solver);
 }
 

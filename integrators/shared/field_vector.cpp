@@ -68,7 +68,8 @@ void destroy(N_Vector v) {
 
 void set_operations(N_Vector v) {
   N_Vector_Ops ops = v->ops;
-  ops->nvgetvectorid = [](N_Vector) { return SUNDIALS_NVEC_CUSTOM; };
+  // SUNLinSol_KLU takes shared-memory vectors by their names; this is one: an array that one process works on with threads.
+  ops->nvgetvectorid = [](N_Vector) { return SUNDIALS_NVEC_OPENMP; };
   ops->nvclone = [](N_Vector w) { return clone_of(w, true); };
   ops->nvcloneempty = [](N_Vector w) { return clone_of(w, false); };
   ops->nvdestroy = destroy;

@@ -47,7 +47,8 @@ TEST_CASE("a step that is too long is cut back, grows again and still meets the 
   for (const std::string& integrator : integrators) {
     INFO(integrator);
     // The right end jumps through the body: inadmissible, or too far, in one step.
-    const auto simulation = pulled(integrator, "steps = 2\ntolerance = 1e-8\n", "[-2.6, 1.5]");
+    const std::string few = integrator == "dynamic_relaxation" ? "max_iterations = 60\n" : "";   // it would take the jump
+    const auto simulation = pulled(integrator, "steps = 2\ntolerance = 1e-8\n" + few, "[-2.6, 1.5]");
     const Protocol protocol = run(*simulation);
     CHECK(protocol.reports.size() > 3);
     bool half = false;
@@ -61,6 +62,7 @@ TEST_CASE("a step that is too long is cut back, grows again and still meets the 
     CHECK(half);
     CHECK(protocol.reports.back().time == 1.0);
     CHECK(longest >= 2 * shortest);
+    CHECK(protocol.reports.back().time_step <= 0.5);
     CHECK(protocol.text.find("no equilibrium at t = ") != std::string::npos);
   }
 }
@@ -122,13 +124,14 @@ TEST_CASE("options of quasi-static integrators change the way and not the answer
   struct Variant {
     std::string integrator, plain, other;
     bool linear_iterations;   ///< compare the log, not the number of iterations
+    std::string motion = "[1.2, 0.9]";
   };
   const std::vector<Variant> variants{
       {"jfnk", "", "tangent = \"differences\"\n", true},
       {"jfnk", "", "preconditioner = \"none\"\n", true},
       {"jfnk", "preconditioner = \"none\"\n", "preconditioner = \"jacobi\"\n", true},
       {"jfnk", "preconditioner = \"none\"\n", "preconditioner = \"none\"\nrestart = 5\n", true},
-      {"kinsol", "", "strategy = \"none\"\n", true},
+      {"kinsol", "", "strategy = \"none\"\n", true, "[-2.2, 1.5]"},
       {"kinsol", "", "strategy = \"picard\"\n", false},
       {"kinsol", "", "strategy = \"fixed_point\"\nmax_iterations = 5000\n", false},
       {"kinsol", "strategy = \"fixed_point\"\nmax_iterations = 5000\n", "strategy = \"fixed_point\"\nmax_iterations = 5000\nanderson = 3\n", false},
@@ -138,12 +141,12 @@ TEST_CASE("options of quasi-static integrators change the way and not the answer
       {"kinsol", "preconditioner = \"none\"\n", "preconditioner = \"jacobi\"\n", true},
       {"dynamic_relaxation", "", "damping = \"kinetic\"\n", false},
   };
-  const auto reference = pulled("jfnk", "steps = 2\ntolerance = 1e-11\n", "[1.2, 0.9]");
-  run(*reference);
   for (const Variant& variant : variants) {
     INFO(variant.integrator, ": ", variant.plain, " against ", variant.other);
     const std::string common = "steps = 2\ntolerance = 1e-9\n";
-    const auto a = pulled(variant.integrator, common + variant.plain, "[1.2, 0.9]"), b = pulled(variant.integrator, common + variant.other, "[1.2, 0.9]");
+    const auto reference = pulled("newton", "steps = 2\ntolerance = 1e-11\n", variant.motion);
+    run(*reference);
+    const auto a = pulled(variant.integrator, common + variant.plain, variant.motion), b = pulled(variant.integrator, common + variant.other, variant.motion);
     const Protocol of_a = run(*a), of_b = run(*b);
     CHECK(distance(*a, *reference) <= 1e-6);
     CHECK(distance(*b, *reference) <= 1e-6);

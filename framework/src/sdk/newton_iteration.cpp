@@ -12,8 +12,7 @@ namespace perikit {
 namespace {
 
 constexpr int patience = 5;                  // iterations that neither give a new best residual nor halve the last one
-constexpr double least_fraction = 1.0 / 1024;
-constexpr double least_strict_fraction = 1.0 / 32;   // shorter steps lead nowhere: a shorter load step does
+constexpr double least_fraction = 1.0 / 16;  // of a Newton step; where less is needed, a shorter load step leads further
 constexpr double sufficient = 1e-4;          // Armijo's share of the linear decrease
 
 /// Accuracy of the next linear solve [Eisenstat and Walker 1996, choice 2, with their safeguard].
@@ -137,7 +136,7 @@ Solution NewtonIteration::solve(Equilibrium& equilibrium, bool) {
     };
     while (!acceptable()) {
       alpha /= 2;
-      if (!line_search_ || alpha < (strict ? least_strict_fraction : least_fraction)) {
+      if (!line_search_ || alpha < least_fraction) {
         solution.failure = strict ? "no part of a Newton step lowers the residual" : equilibrium.failure();
         return solution;
       }
