@@ -5,19 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "perikit/core/parallel.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
 
 namespace {
-
-constexpr std::size_t block = 4096;   // points; a multiple of `padding`
-
-template <class Body>
-void over_blocks(std::size_t n, Body&& body) {
-  parallel_for((n + block - 1) / block, [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); });
-}
 
 /// The run's loop variables: where the force of the last step is, and what happens to prescribed and loaded points.
 class Stepper {
@@ -76,15 +69,8 @@ class Stepper {
   void add_work(double dt, ConstFieldView old_external) {
     double work = 0;
     if (loaded_) {
-      const std::size_t n = external_.size();
-      work = ordered_sum((n + block - 1) / block, [&](std::size_t b) {
-        double sum = 0;
-        for (std::size_t k = b * block; k < std::min(n, (b + 1) * block); ++k) {
-          const double f = old_external.data ? 0.5 * (external_.data[k] + old_external.data[k]) : external_.data[k];
-          sum += f * dt * v_.data[k];
-        }
-        return sum;
-      });
+      const double now = dot(external_, v_);
+      work = dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
     }
     const auto dofs = problem_.constrained();
     for (std::size_t k = 0; k < dofs.size(); ++k) {

@@ -20,6 +20,7 @@ class BodyProblem final : public Problem {
   int dimension() const noexcept override { return body_.dimension(); }
   std::size_t stride() const noexcept override { return body_.stride(); }
   std::size_t points() const noexcept override { return body_.points(); }
+  double spacing() const noexcept override { return body_.spacing(); }
   Field make_field(int components) const override { return body_.make_field(components); }
 
   FieldView displacement() noexcept override { return displacement_; }

@@ -62,6 +62,8 @@ class Problem {
   virtual std::size_t stride() const noexcept = 0;
   /// Real points.
   virtual std::size_t points() const noexcept = 0;
+  /// Typical distance of neighbouring points [m].
+  virtual double spacing() const noexcept = 0;
   /// A new zero field with the margins that the kernels need.
   virtual Field make_field(int components) const = 0;
 

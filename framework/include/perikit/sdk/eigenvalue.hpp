@@ -1,0 +1,14 @@
+#pragma once
+/// Largest eigenvalues of tangents.
+
+#include "perikit/problem/integrator.hpp"
+
+namespace perikit {
+
+/// Upper bound of the largest eigenvalue of S K S at u by Lanczos iteration on the exact tangent: the largest Ritz value plus its
+/// residual bound, to about 2 %. scale: the diagonal of S, 0 on components that do not move (mask/sqrt(mass) for vibrations,
+/// the mask itself for statics). vector: start on entry where `warm`, rich in the top of the spectrum on return.
+/// 0 where nothing moves or u is inadmissible.
+double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm);
+
+}  // namespace perikit

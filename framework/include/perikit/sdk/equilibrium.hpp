@@ -1,0 +1,66 @@
+#pragma once
+/// Equilibrium of a body at one load parameter: what a solver of quasi-static problems works on.
+
+#include <string>
+#include <string_view>
+
+#include "perikit/problem/integrator.hpp"
+
+namespace perikit {
+
+/// Residual, reference and prescribed displacements at one load parameter t. Fields have `dimension` components.
+///
+/// Convergence is relative [Hashim et al., eq. 26]: |r| <= tolerance * reference with r the out-of-balance force on the free
+/// components and reference = sqrt(|external forces|^2 + |reactions|^2), Euclidean norms: under displacement control external
+/// forces vanish and reactions do not. Where both vanish (a body moved rigidly), what rounding leaves counts as balanced:
+/// the reference is at least 4 eps k |u| / tolerance with k the root-mean-square stiffness, |K w|/|w| of noise w.
+class Equilibrium {
+ public:
+  /// Of `problem` to the relative `tolerance`.
+  Equilibrium(Problem& problem, double tolerance);
+
+  /// Loads and prescribed displacements are those at t from now on; `u` are the start values [m].
+  void begin(double t, ConstFieldView u);
+
+  Problem& problem() noexcept { return problem_; }
+  double parameter() const noexcept { return t_; }
+  double tolerance() const noexcept { return tolerance_; }
+  /// Start values of the solver, then its answer [m]; suited for Problem::evaluate_forces. Prescribed components are those of the
+  /// start until `impose`.
+  FieldView displacement() noexcept { return u_; }
+  ConstFieldView free() const noexcept { return free_; }
+
+  /// Overwrites the prescribed components of u.
+  void impose(FieldView u) { problem_.prescribe_displacement(t_, u); }
+  /// w <- U(t) - u on prescribed components, 0 elsewhere; returns its largest magnitude [m].
+  double missing(ConstFieldView u, FieldView w);
+
+  /// r <- internal + external force on free components, 0 elsewhere [N]; the internal forces are kept in the problem, the strain energy
+  /// goes to `energy` where wanted. False where u is inadmissible or r not finite; failure() then says why.
+  bool residual(ConstFieldView u, FieldView r, double* energy = nullptr);
+  /// |r| and |r|/reference of the last residual.
+  double residual_norm() const noexcept { return norm_; }
+  double relative_residual() const noexcept { return norm_ > 0 ? norm_ / reference_ : 0.0; }
+  /// [N], of the last residual.
+  double reference() const noexcept { return reference_; }
+  bool converged() const noexcept { return norm_ <= tolerance_ * reference_; }
+  const std::string& failure() const noexcept { return failure_; }
+
+  /// Kw <- K(u) w on free components, 0 elsewhere [N]. False where u is inadmissible.
+  bool tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
+
+  /// A line for run.log; lines of one step are written together.
+  void note(std::string_view line);
+  std::string take_notes();
+
+ private:
+  Problem& problem_;
+  double tolerance_;
+  double t_ = 0, norm_ = 0, reference_ = 0, stiffness_ = 0;
+  Field u_, scratch_;
+  ConstFieldView free_;
+  FieldView external_;   ///< no data without loads
+  std::string failure_, notes_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,50 @@
+#pragma once
+/// Load stepping, shared by every quasi-static integrator.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "perikit/plugin/parameters.hpp"
+#include "perikit/sdk/equilibrium.hpp"
+
+namespace perikit {
+
+struct LoadStepOptions {
+  std::int64_t steps = 10;        ///< planned steps from load parameter 0 to 1
+  double tolerance = 1e-8;        ///< of the residual, relative to reactions and loads
+  std::int64_t max_iterations = 25;
+  std::int64_t cut_backs = 10;    ///< halvings of a planned step before the run gives up
+};
+
+/// A table with the keys steps, tolerance, max_iterations, cut_backs. `max_iterations`: its default.
+ParameterTable load_step_parameters(std::int64_t max_iterations);
+LoadStepOptions load_step_options(const ParameterValues& values);
+
+/// How one solve ended.
+struct Solution {
+  bool converged = false;
+  int iterations = 0;
+  std::string failure;            ///< where it did not converge: why, as part of a sentence
+};
+
+/// Solves one equilibrium.
+class EquilibriumSolver {
+ public:
+  virtual ~EquilibriumSolver() = default;
+  /// Starts from equilibrium.displacement() and leaves the answer there, prescribed components included. `extrapolated`: the start
+  /// continues the path of the last steps, else it is the last equilibrium.
+  virtual Solution solve(Equilibrium& equilibrium, bool extrapolated) = 0;
+  /// After a step that converged, `u` its displacement: where state that later steps reuse may be renewed.
+  virtual void accepted(Problem&, ConstFieldView /*u*/) {}
+};
+
+/// Runs `problem` from its load parameter to 1. Planned steps are equal, end exactly at k/steps and start from the linear
+/// continuation of the last one. A step that does not converge or meets an inadmissible deformation is halved, at most
+/// `cut_backs` times; every success doubles the step again, up to the planned one. Work of loads and prescribed
+/// displacements by the trapezoidal rule. Steps, the last increment and the load parameter are kept with the problem, so that a
+/// restored run continues to the bit.
+/// Throws RunError when the smallest step fails, with load parameter, step and reason.
+void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver);
+
+}  // namespace perikit

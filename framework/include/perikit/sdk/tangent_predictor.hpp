@@ -1,0 +1,13 @@
+#pragma once
+/// Start values that carry prescribed displacements into the body.
+
+#include "perikit/sdk/equilibrium.hpp"
+
+namespace perikit {
+
+/// Sets the prescribed components of equilibrium.displacement() and moves the free ones by about K(u)^-1 (r(u) - K(u) w), w the change of
+/// the prescribed ones: conjugate gradients on tangent actions, to 1 % or 300 iterations, ended where the tangent is not positive.
+/// For solvers that would otherwise start from a torn rim. False where u or its tangent is inadmissible.
+bool predict_by_tangent(Equilibrium& equilibrium);
+
+}  // namespace perikit

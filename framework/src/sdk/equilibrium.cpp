@@ -1,0 +1,78 @@
+#include "perikit/sdk/equilibrium.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+Equilibrium::Equilibrium(Problem& problem, double tolerance)
+    : problem_(problem), tolerance_(tolerance), u_(problem.make_field(problem.dimension())), scratch_(problem.make_field(problem.dimension())),
+      free_(problem.free_mask()), external_(problem.any_load() ? problem.external_force() : FieldView{}) {}
+
+void Equilibrium::begin(double t, ConstFieldView u) {
+  t_ = t;
+  copy(u, u_);
+  if (external_.data) problem_.evaluate_loads(t, external_);
+  Field noise = problem_.make_field(problem_.dimension());
+  fill_with_noise(free_, 1, noise);
+  const double size = norm(noise);
+  // Where the start itself is inadmissible there is nothing to estimate; the first residual says so.
+  if (size > 0 && problem_.tangent_action(u, noise, scratch_).ok()) stiffness_ = norm(scratch_) / size;
+}
+
+double Equilibrium::missing(ConstFieldView u, FieldView w) {
+  fill(0.0, w);
+  if (!problem_.any_constraint()) return 0.0;
+  problem_.prescribe_displacement(t_, w);
+  double most = 0;
+  for (const std::int64_t dof : problem_.constrained()) {
+    w.data[dof] -= u.data[dof];
+    most = std::max(most, std::abs(w.data[dof]));
+  }
+  return most;
+}
+
+bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
+  const FieldView internal = problem_.internal_force();
+  const EvaluationStatus status = problem_.evaluate_forces(u, internal, energy);
+  if (!status.ok()) {
+    failure_ = status.description;
+    return false;
+  }
+  copy(internal, r);
+  if (external_.data) combine(1, r, 1, external_, r);
+  double squares = external_.data ? dot(external_, external_) : 0.0;
+  for (const std::int64_t dof : problem_.constrained()) {
+    const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
+    squares += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
+  }
+  mask(free_, r);
+  norm_ = norm(r);
+  reference_ = std::sqrt(std::max(squares, 0.0));
+  reference_ = std::max(reference_, 4 * std::numeric_limits<double>::epsilon() * stiffness_ * norm(u) / tolerance_);
+  if (std::isfinite(norm_) && std::isfinite(reference_)) return true;
+  failure_ = "the forces are not finite";
+  return false;
+}
+
+bool Equilibrium::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  const EvaluationStatus status = problem_.tangent_action(u, w, Kw);
+  if (!status.ok()) {
+    failure_ = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
+    return false;
+  }
+  mask(free_, Kw);
+  return true;
+}
+
+void Equilibrium::note(std::string_view line) {
+  notes_ += line;
+  notes_ += '\n';
+}
+
+std::string Equilibrium::take_notes() { return std::exchange(notes_, {}); }
+
+}  // namespace perikit

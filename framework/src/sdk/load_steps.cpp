@@ -1,0 +1,162 @@
+#include "perikit/sdk/load_steps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+ParameterTable load_step_parameters(std::int64_t max_iterations) {
+  ParameterTable table;
+  table.integer("steps", "Planned steps of the load parameter from 0 to 1; cut back where a step fails.").by_default("10").at_least(1).at_most(1e6);
+  table.number("tolerance", "-", "Out-of-balance force over the norm of reactions and loads.").by_default("1.0e-8").positive().below(1.0);
+  table.integer("max_iterations", "Iterations of a step before it is cut back.").by_default(fmt::to_string(max_iterations)).at_least(1).at_most(1e9);
+  table.integer("cut_backs", "Halvings of a planned step before the run gives up.").by_default("10").at_least(0).at_most(30);
+  return table;
+}
+
+LoadStepOptions load_step_options(const ParameterValues& values) {
+  return {values.integer("steps"), values.number("tolerance"), values.integer("max_iterations"), values.integer("cut_backs")};
+}
+
+namespace {
+
+class LoadSteps {
+ public:
+  LoadSteps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver)
+      : integrator_(integrator), options_(options), problem_(problem), observer_(observer), solver_(solver),
+        equilibrium_(problem, options.tolerance), u_(problem.displacement()), last_increment_(problem.declare("load_step_increment", problem.dimension())),
+        residual_(problem.make_field(problem.dimension())), driving_(problem.make_field(problem.dimension())),
+        old_driving_(problem.make_field(problem.dimension())), start_(problem.make_field(problem.dimension())),
+        numbers_(problem.declare_numbers("load_steps", 4)) {}
+
+  void run() {
+    if (started() == 0) begin();
+    find_driving_force(old_driving_);
+    while (position() < planned() && !observer_.cancelled()) step();
+  }
+
+ private:
+  // The position counts planned steps and is a binary fraction between them: sums of it are exact.
+  double& started() noexcept { return numbers_[0]; }
+  double& position() noexcept { return numbers_[1]; }
+  double& increment() noexcept { return numbers_[2]; }        ///< of the position, for the next step
+  double& last_span() noexcept { return numbers_[3]; }        ///< length of the last step; 0: none to continue
+  double planned() const noexcept { return static_cast<double>(options_.steps); }
+
+  void begin() {
+    observer_.log(fmt::format("{}: {} load steps, relative tolerance {:.3g}", integrator_, options_.steps, options_.tolerance));
+    equilibrium_.begin(0.0, u_);
+    const bool sample = observer_.wants_sample(problem_.step(), problem_.time());
+    if (!equilibrium_.residual(u_, residual_, sample ? &problem_.energies().strain : nullptr)) {
+      throw RunError(fmt::format("{}: the initial displacement is inadmissible: {}", integrator_, equilibrium_.failure()));
+    }
+    started() = 1;
+    increment() = 1;
+    report(0.0, 0);
+  }
+
+  void step() {
+    // A step never passes a planned point.
+    double span = std::min(increment(), std::floor(position()) + 1 - position());
+    const double smallest = std::ldexp(1.0, -static_cast<int>(options_.cut_backs));
+    for (;;) {
+      Solution solution = attempt(span, last_span() > 0);
+      // A continuation that cannot even be evaluated is dropped before the step is.
+      if (!solution.converged && solution.iterations == 0 && last_span() > 0) solution = attempt(span, false);
+      if (solution.converged) {
+        accept(span, solution);
+        return;
+      }
+      const double t = (position() + span) / planned();
+      equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
+      if (span / 2 < smallest) {
+        observer_.log(equilibrium_.take_notes());
+        throw RunError(fmt::format(
+            "{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, failed because {}. More steps or cut_backs may "
+            "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed",
+            integrator_, problem_.time(), problem_.step(), span / planned(), solution.failure));
+      }
+      span /= 2;
+      increment() = span;
+    }
+  }
+
+  Solution attempt(double span, bool extrapolate) {
+    const double t = (position() + span) / planned();
+    copy(u_, start_);
+    if (extrapolate) combine(1, u_, span / last_span(), last_increment_, start_);
+    equilibrium_.note(fmt::format("step {}  t = {:.9g}", problem_.step() + 1, t));
+    equilibrium_.begin(t, start_);
+    Solution solution = solver_.solve(equilibrium_, extrapolate);
+    if (!solution.converged) return solution;
+    // Forces and energy of exactly this state, and the judgement of this class rather than the solver's.
+    equilibrium_.impose(equilibrium_.displacement());
+    solution.converged = equilibrium_.residual(equilibrium_.displacement(), residual_, &problem_.energies().strain);
+    if (!solution.converged) solution.failure = equilibrium_.failure();
+    if (solution.converged && !equilibrium_.converged()) {
+      solution.converged = false;
+      solution.failure = fmt::format("the residual stays at {:.3g} (tolerance {:.3g})", equilibrium_.relative_residual(), options_.tolerance);
+    }
+    return solution;
+  }
+
+  void accept(double span, const Solution& solution) {
+    find_driving_force(driving_);
+    combine(1, equilibrium_.displacement(), -1, u_, last_increment_);
+    problem_.energies().external_work += 0.5 * (dot(old_driving_, last_increment_) + dot(driving_, last_increment_));
+    copy(driving_, old_driving_);
+    copy(equilibrium_.displacement(), u_);
+    position() += span;
+    last_span() = span;
+    increment() = std::min(1.0, 2 * span);
+    problem_.time() = position() / planned();
+    ++problem_.step();
+    problem_.advance_history(span / planned());
+    solver_.accepted(problem_, u_);
+    observer_.log(equilibrium_.take_notes());
+    observer_.wants_sample(problem_.step(), problem_.time());
+    report(span / planned(), solution.iterations);
+  }
+
+  /// What moves the body from outside: the loads, and on prescribed components load and reaction, -internal force [N].
+  void find_driving_force(FieldView force) {
+    if (problem_.any_load()) copy(problem_.external_force(), force);
+    else fill(0.0, force);
+    const FieldView internal = problem_.internal_force();
+    for (const std::int64_t dof : problem_.constrained()) force.data[dof] = -internal.data[dof];
+  }
+
+  void report(double time_step, int iterations) {
+    StepReport r;
+    r.step = problem_.step();
+    r.time = problem_.time();
+    r.time_step = time_step;
+    r.iterations = iterations;
+    r.residual = equilibrium_.relative_residual();
+    r.end_time = 1.0;
+    r.steps_expected = problem_.step() + static_cast<std::int64_t>(std::ceil(planned() - position()));
+    observer_.step_done(r);
+  }
+
+  std::string integrator_;
+  LoadStepOptions options_;
+  Problem& problem_;
+  Observer& observer_;
+  EquilibriumSolver& solver_;
+  Equilibrium equilibrium_;
+  FieldView u_, last_increment_;
+  Field residual_, driving_, old_driving_, start_;
+  std::span<double> numbers_;
+};
+
+}  // namespace
+
+void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver) {
+  LoadSteps(integrator, options, problem, observer, solver).run();
+}
+
+}  // namespace perikit

@@ -1,0 +1,106 @@
+#include "dynamic_relaxation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/field_operations.hpp"
+#include "perikit/sdk/eigenvalue.hpp"
+#include "perikit/sdk/tangent_predictor.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr double safety = 1.1;            // of the largest eigenvalue, against stiffening within a step
+constexpr double diverging = 1e3;         // residual over the smallest so far, at which the mass is found anew
+constexpr int note_every = 1000;
+
+}  // namespace
+
+Relaxation::Relaxation(Problem& problem, const RelaxationOptions& options)
+    : options_(options), eigenvector_(problem.declare("relaxation_eigenvector", problem.dimension())), r_(problem.make_field(problem.dimension())),
+      last_r_(problem.make_field(problem.dimension())), v_(problem.make_field(problem.dimension())) {}
+
+double Relaxation::find_mass(Problem& problem, ConstFieldView u, ConstFieldView free) {
+  // Central differences of step 1 are stable while omega_max^2 = lambda_max/m <= 4.
+  return safety * largest_eigenvalue(problem, u, free, eigenvector_, norm(eigenvector_) > 0) / 4;
+}
+
+Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
+  Solution solution;
+  Problem& problem = equilibrium.problem();
+  const FieldView u = equilibrium.displacement();
+  if (extrapolated) {
+    equilibrium.impose(u);
+  } else if (!predict_by_tangent(equilibrium)) {
+    solution.failure = equilibrium.failure();
+    return solution;
+  }
+  double mass = 0, smallest = 0, frequency = 0, last_kinetic = 0;
+  const auto start = [&] {
+    fill(0.0, v_);
+    last_kinetic = 0;
+    mass = find_mass(problem, u, equilibrium.free());
+  };
+  bool at_rest = true;   // v holds no motion yet
+  for (;; ++solution.iterations) {
+    if (!equilibrium.residual(u, r_)) {
+      solution.failure = equilibrium.failure();
+      return solution;
+    }
+    if (equilibrium.converged()) break;
+    if (solution.iterations % note_every == 0) equilibrium.note(fmt::format("  iteration {:6}  residual {:.3e}", solution.iterations, equilibrium.relative_residual()));
+    if (solution.iterations >= options_.load_steps.max_iterations) {
+      solution.failure = fmt::format("the residual is {:.3g} (tolerance {:.3g}) after {} iterations", equilibrium.relative_residual(), equilibrium.tolerance(), solution.iterations);
+      return solution;
+    }
+    const double residual = equilibrium.residual_norm();
+    smallest = smallest > 0 ? std::min(smallest, residual) : residual;
+    if (mass == 0 || residual > diverging * smallest) {
+      start();
+      at_rest = true;
+      smallest = residual;
+      if (!(mass > 0)) {
+        solution.failure = "the stiffness of the free points is zero or cannot be found";
+        return solution;
+      }
+    }
+    if (at_rest) {
+      combine(0.5 / mass, r_, 0, r_, v_);
+      at_rest = false;
+    } else if (options_.kinetic) {
+      combine(1, v_, 1 / mass, r_, v_);
+      const double kinetic = dot(v_, v_);
+      if (kinetic < last_kinetic) {
+        // The peak lies behind: rest there, half of the last velocity v - r/m back.
+        combine(1, u, -0.5, v_, u);
+        combine(1, u, 0.5 / mass, r_, u);
+        fill(0.0, v_);
+        at_rest = true;
+        last_kinetic = 0;
+        continue;
+      }
+      last_kinetic = kinetic;
+    } else {
+      // Rayleigh quotient of the motion itself: it tends to the lowest frequency as the others die out.
+      const double kinetic = dot(v_, v_), curvature = dot(v_, last_r_) - dot(v_, r_);
+      if (kinetic > 0) frequency = std::sqrt(std::clamp(curvature / (mass * kinetic), 0.0, 3.6));
+      const double c = frequency;   // critical: c dt/2 = omega
+      combine((1 - c) / (1 + c), v_, 1 / (mass * (1 + c)), r_, v_);
+    }
+    combine(1, u, 1, v_, u);
+    std::swap(last_r_, r_);
+  }
+  equilibrium.note(fmt::format("  iteration {:6}  residual {:.3e}", solution.iterations, equilibrium.relative_residual()));
+  solution.converged = true;
+  return solution;
+}
+
+void DynamicRelaxation::run(Problem& problem, Observer& observer) {
+  Relaxation relaxation(problem, options_);
+  run_load_steps("dynamic_relaxation", options_.load_steps, problem, observer, relaxation);
+}
+
+}  // namespace perikit

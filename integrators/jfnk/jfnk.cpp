@@ -1,0 +1,101 @@
+#include "jfnk.hpp"
+
+#include <fmt/format.h>
+#include <sunlinsol/sunlinsol_spgmr.h>
+
+#include <cmath>
+#include <limits>
+
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<Preconditioner> preconditioner)
+    : problem_(problem), options_(options), preconditioner_(std::move(preconditioner)), right_(problem.make_field(problem.dimension())),
+      u_(problem.make_field(problem.dimension())), right_vector_(wrap(problem, right_, context_)) {
+  if (options.differences) {
+    moved_ = problem.make_field(problem.dimension());
+    force_ = problem.make_field(problem.dimension());
+  }
+  // Preconditioned from the right: GMRES then watches the true residual.
+  gmres_.reset(SUNLinSol_SPGMR(right_vector_.get(), preconditioner_ ? SUN_PREC_RIGHT : SUN_PREC_NONE, options.restart, context_));
+  if (!gmres_) throw RunError("SUNDIALS gives no GMRES solver: not enough memory?");
+  SUNLinSol_SPGMRSetMaxRestarts(gmres_.get(), options.max_restarts);
+  SUNLinSolSetATimes(gmres_.get(), this, multiply);
+  if (preconditioner_) SUNLinSolSetPreconditioner(gmres_.get(), this, nullptr, precondition);
+  SUNLinSolInitialize(gmres_.get());
+}
+
+bool KrylovEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  copy(u, u_);
+  return !preconditioner_ || preconditioner_->prepare(equilibrium, u_, failure);
+}
+
+bool KrylovEquations::apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
+  if (options_.differences) return difference(equilibrium, w, Kw, failure);
+  if (equilibrium.tangent(u_, w, Kw)) return true;
+  failure = equilibrium.failure();
+  return false;
+}
+
+bool KrylovEquations::difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
+  // P 3.73-3.74: K w = -(f(u + eps w) - f(u - eps w))/(2 eps); eps w moves points by the cube root of the rounding unit times the spacing.
+  const double largest = largest_magnitude(w);
+  if (largest == 0) {
+    fill(0.0, Kw);
+    return true;
+  }
+  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.spacing() / largest;
+  for (const double sign : {1.0, -1.0}) {
+    combine(1, u_, sign * eps, w, moved_);
+    const EvaluationStatus status = problem_.evaluate_forces(moved_, sign > 0 ? Kw : FieldView(force_), nullptr);
+    if (!status.ok()) {
+      failure = status.description;
+      return false;
+    }
+  }
+  combine(0.5 / eps, force_, -0.5 / eps, Kw, Kw);
+  mask(equilibrium.free(), Kw);
+  return true;
+}
+
+int KrylovEquations::multiply(void* self, N_Vector w, N_Vector Kw) {
+  auto& equations = *static_cast<KrylovEquations*>(self);
+  return equations.apply(*equations.equilibrium_, field_of(w), field_of(Kw), equations.failure_) ? 0 : -1;
+}
+
+int KrylovEquations::precondition(void* self, N_Vector r, N_Vector z, realtype, int) {
+  static_cast<KrylovEquations*>(self)->preconditioner_->apply(field_of(r), field_of(z));
+  return 0;
+}
+
+bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) {
+  equilibrium_ = &equilibrium;
+  failure_.clear();
+  copy(rhs, right_);
+  const double size = norm(rhs);
+  const FieldVector solution = wrap(problem_, du, context_);
+  SUNLinSolSetZeroGuess(gmres_.get(), SUNTRUE);
+  SUNLinSolSetup(gmres_.get(), nullptr);
+  const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution.get(), right_vector_.get(), accuracy * size);
+  const int iterations = SUNLinSolNumIters(gmres_.get());
+  const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
+  if (preconditioner_) preconditioner_->took(iterations);
+  note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
+  // A direction that was not solved to the accuracy asked for is still one that lowers the residual.
+  if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;
+  failure = !failure_.empty() ? failure_
+                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})", reached, iterations, options_.restart);
+  return false;
+}
+
+void Jfnk::run(Problem& problem, Observer& observer) {
+  std::string chosen;
+  auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
+  observer.log("jfnk: preconditioner " + chosen);
+  KrylovEquations equations(problem, options_, std::move(preconditioner));
+  NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);
+  run_load_steps("jfnk", options_.load_steps, problem, observer, newton);
+}
+
+}  // namespace perikit

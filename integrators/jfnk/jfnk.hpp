@@ -1,0 +1,60 @@
+#pragma once
+#include <memory>
+
+#include <sundials/sundials_linearsolver.h>
+
+#include "../shared/field_vector.hpp"
+#include "../shared/preconditioner.hpp"
+#include "perikit/sdk/newton_iteration.hpp"
+
+namespace perikit {
+
+struct JfnkOptions {
+  LoadStepOptions load_steps;
+  bool differences = false;          ///< tangent by central differences instead of exactly
+  std::string preconditioner = "auto";
+  int restart = 60;                  ///< Krylov vectors before GMRES restarts
+  int max_restarts = 20;
+  bool line_search = true;
+};
+
+/// Krylov solution of the linearised equations: SUNDIALS' restarted GMRES on tangent actions.
+class KrylovEquations final : public LinearisedProblem {
+ public:
+  KrylovEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<Preconditioner> preconditioner);
+  bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
+  bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
+  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) override;
+  bool exact() const noexcept override { return false; }
+
+ private:
+  struct SolverDeleter {
+    void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
+  };
+  static int multiply(void* self, N_Vector w, N_Vector Kw);
+  static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
+  bool difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure);
+
+  Problem& problem_;
+  JfnkOptions options_;
+  std::unique_ptr<Preconditioner> preconditioner_;
+  SundialsContext context_;
+  Field right_, u_, moved_, force_;
+  FieldVector right_vector_;
+  std::unique_ptr<_generic_SUNLinearSolver, SolverDeleter> gmres_;
+  Equilibrium* equilibrium_ = nullptr;   ///< of the solve in progress
+  std::string failure_;
+};
+
+/// Jacobian-free Newton-Krylov [Partmann et al., eqs. 3.69-3.81].
+class Jfnk final : public Integrator {
+ public:
+  explicit Jfnk(const JfnkOptions& options) : options_(options) {}
+  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  void run(Problem& problem, Observer& observer) override;
+
+ private:
+  JfnkOptions options_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,37 @@
+#pragma once
+#include "../shared/sparse_solver.hpp"
+#include "perikit/sdk/newton_iteration.hpp"
+
+namespace perikit {
+
+struct NewtonOptions {
+  LoadStepOptions load_steps;
+  bool line_search = true;
+};
+
+/// The linearised equations, assembled and factorised at every state; once where the stiffness is constant.
+class FactorisedEquations final : public LinearisedProblem {
+ public:
+  bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
+  bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
+  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) override;
+  bool exact() const noexcept override { return true; }
+
+ private:
+  BlockMatrix tangent_;
+  SparseSolver solver_;
+  ConstFieldView u_;   ///< where the equations are linearised
+};
+
+/// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.
+class Newton final : public Integrator {
+ public:
+  explicit Newton(const NewtonOptions& options) : options_(options) {}
+  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  void run(Problem& problem, Observer& observer) override;
+
+ private:
+  NewtonOptions options_;
+};
+
+}  // namespace perikit

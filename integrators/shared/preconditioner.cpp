@@ -1,0 +1,130 @@
+#include "preconditioner.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/field_operations.hpp"
+#include "perikit/core/parallel.hpp"
+#include "sparse_solver.hpp"
+
+namespace perikit {
+
+namespace {
+
+class Factorisation final : public Preconditioner {
+ public:
+  explicit Factorisation(Problem& problem) : Preconditioner(problem) {}
+  void apply(ConstFieldView r, FieldView z) override { solver_.solve(r, z); }
+
+ private:
+  bool make(const BlockMatrix& K, ConstFieldView free, std::string& failure) override { return solver_.factorise(K, free, failure); }
+  SparseSolver solver_;
+};
+
+/// Inverses of the diagonal blocks, prescribed components left out.
+class BlockJacobi final : public Preconditioner {
+ public:
+  explicit BlockJacobi(Problem& problem) : Preconditioner(problem) {}
+
+  void apply(ConstFieldView r, FieldView z) override {
+    if (z.data != r.data) fill(0.0, z);
+    parallel_for(point_.size(), [&](std::size_t row) {
+      const double* inverse = &inverse_[row * static_cast<std::size_t>(d_ * d_)];
+      const auto p = static_cast<std::size_t>(point_[row]);
+      double sum[3] = {};
+      for (int a = 0; a < d_; ++a)
+        for (int c = 0; c < d_; ++c) sum[a] += inverse[a * d_ + c] * r.component(c)[p];
+      for (int a = 0; a < d_; ++a) z.component(a)[p] = sum[a];
+    });
+  }
+
+ private:
+  bool make(const BlockMatrix& K, ConstFieldView free, std::string&) override {
+    d_ = K.dimension;
+    point_ = K.point;
+    const auto size = static_cast<std::size_t>(d_ * d_);
+    inverse_.resize(K.rows() * size);
+    parallel_for(K.rows(), [&](std::size_t row) {
+      const auto begin = K.column.begin() + K.row_first[row], end = K.column.begin() + K.row_first[row + 1];
+      const std::int64_t block = std::lower_bound(begin, end, static_cast<std::int32_t>(row)) - K.column.begin();
+      invert(&K.values[static_cast<std::size_t>(block) * size], free, static_cast<std::size_t>(point_[row]), &inverse_[row * size]);
+    });
+    return true;
+  }
+
+  /// Gauss-Jordan elimination over the free components; rows and columns of the others are 0. A vanishing pivot (nothing holds the
+  /// point) counts as free of stiffness: its inverse is 0.
+  void invert(const double* block, ConstFieldView free, std::size_t p, double* inverse) const {
+    double a[3][6] = {};
+    double largest = 0;
+    for (int i = 0; i < d_; ++i) {
+      a[i][d_ + i] = 1;
+      for (int j = 0; j < d_; ++j) {
+        if (free.component(i)[p] != 0 && free.component(j)[p] != 0) a[i][j] = block[i * d_ + j];
+        largest = std::max(largest, std::abs(a[i][j]));
+      }
+    }
+    bool kept[3];
+    for (int k = 0; k < d_; ++k) {
+      kept[k] = free.component(k)[p] != 0 && std::abs(a[k][k]) > 1e-12 * largest;
+      if (!kept[k]) continue;
+      const double pivot = a[k][k];
+      for (int j = 0; j < 2 * d_; ++j) a[k][j] /= pivot;
+      for (int i = 0; i < d_; ++i) {
+        if (i == k) continue;
+        const double factor = a[i][k];
+        for (int j = 0; j < 2 * d_; ++j) a[i][j] -= factor * a[k][j];
+      }
+    }
+    for (int i = 0; i < d_; ++i)
+      for (int j = 0; j < d_; ++j) inverse[i * d_ + j] = kept[i] && kept[j] ? a[i][d_ + j] : 0.0;
+  }
+
+  int d_ = 0;
+  std::vector<std::int32_t> point_;
+  std::vector<double> inverse_;
+};
+
+}  // namespace
+
+Preconditioner::Preconditioner(Problem& problem)
+    : state_(problem.declare("preconditioner_state", problem.dimension())), numbers_(problem.declare_numbers("preconditioner", 3)) {}
+
+bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  Problem& problem = equilibrium.problem();
+  const bool worn = !problem.constant_stiffness() && lately() > 2 * at_first() + 5;
+  if (in_hand_ && !worn) return true;
+  if (made() == 0 || worn) {
+    copy(u, state_);
+    made() = 1;
+    at_first() = lately() = 0;
+  }
+  const EvaluationStatus status = problem.assemble_tangent(state_, tangent_);
+  if (!status.ok()) failure = status.description;
+  in_hand_ = status.ok() && make(tangent_, equilibrium.free(), failure);
+  if (!in_hand_) made() = 0;
+  return in_hand_;
+}
+
+void Preconditioner::took(int iterations) {
+  if (at_first() == 0) at_first() = iterations;
+  lately() = iterations;
+}
+
+void add_preconditioner_key(ParameterTable& table) {
+  table.choice("preconditioner", {"auto", "none", "jacobi", "factorisation"}, "Of Krylov solvers: from the assembled tangent where it is affordable.")
+      .by_default("\"auto\"");
+}
+
+std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
+  chosen = name;
+  if (name == "auto") {
+    const auto bytes = static_cast<double>(problem.assembled_size().bytes);
+    chosen = bytes <= (problem.dimension() == 3 ? 0.5e9 : 2e9) ? "factorisation" : bytes <= 4e9 ? "jacobi" : "none";
+  }
+  if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
+  if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
+  return nullptr;
+}
+
+}  // namespace perikit

@@ -1,0 +1,178 @@
+#include "sparse_solver.hpp"
+
+#include <cholmod.h>
+#include <fmt/format.h>
+#include <umfpack.h>
+
+#include <vector>
+
+#include "free_matrix.hpp"
+
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+
+namespace perikit {
+
+static_assert(sizeof(SuiteSparse_long) == sizeof(FreeMatrix::Index));
+
+namespace {
+
+SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) { return reinterpret_cast<SuiteSparse_long*>(v.data()); }
+
+/// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
+cholmod_sparse view(std::size_t n, std::vector<FreeMatrix::Index>& first, std::vector<FreeMatrix::Index>& row, double* value) {
+  cholmod_sparse A{};
+  A.nrow = A.ncol = n;
+  A.nzmax = row.size();
+  A.p = as_long(first);
+  A.i = as_long(row);
+  A.x = value;
+  A.stype = 1;
+  A.itype = CHOLMOD_LONG;
+  A.xtype = value ? CHOLMOD_REAL : CHOLMOD_PATTERN;
+  A.dtype = CHOLMOD_DOUBLE;
+  A.sorted = A.packed = 1;
+  return A;
+}
+
+}  // namespace
+
+struct SparseSolver::Implementation {
+  cholmod_common common{};
+  FreeMatrix free;
+  std::vector<FreeMatrix::Index> upper_first, upper_row, first, row;
+  std::vector<double> value, right, answer;
+  cholmod_factor* cholesky = nullptr;
+  cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
+  void *symbolic = nullptr, *numeric = nullptr;
+  bool analysed = false, definite = false, ready = false;
+  double entries = 0;
+
+  Implementation() {
+    if (openblas_set_num_threads) openblas_set_num_threads(1);
+    cholmod_l_start(&common);
+    common.print = 0;
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    common.quick_return_if_not_posdef = 1;
+  }
+  ~Implementation() {
+    cholmod_l_free_factor(&cholesky, &common);
+    for (cholmod_dense** dense : {&solution, &work_y, &work_e}) cholmod_l_free_dense(dense, &common);
+    cholmod_l_finish(&common);
+    umfpack_dl_free_symbolic(&symbolic);
+    umfpack_dl_free_numeric(&numeric);
+  }
+
+  /// The ordering of the points that CHOLMOD likes best (AMD, or METIS' nested dissection), component by component.
+  std::vector<FreeMatrix::Index> ordering(const BlockMatrix& K) {
+    std::vector<FreeMatrix::Index> begin(1, 0), rows;
+    for (std::size_t r = 0; r < K.rows(); ++r) {
+      for (std::int64_t b = K.row_first[r]; b < K.row_first[r + 1] && K.column[static_cast<std::size_t>(b)] <= static_cast<std::int32_t>(r); ++b) {
+        rows.push_back(K.column[static_cast<std::size_t>(b)]);
+      }
+      begin.push_back(static_cast<FreeMatrix::Index>(rows.size()));
+    }
+    cholmod_sparse graph = view(K.rows(), begin, rows, nullptr);
+    cholmod_factor* of_points = cholmod_l_analyze(&graph, &common);
+    std::vector<FreeMatrix::Index> order;
+    if (!of_points) return order;
+    const auto* permutation = static_cast<const SuiteSparse_long*>(of_points->Perm);
+    for (std::size_t k = 0; k < K.rows(); ++k)
+      for (int a = 0; a < K.dimension; ++a) {
+        const FreeMatrix::Index unknown = free.unknown(static_cast<std::size_t>(permutation[k]), a);
+        if (unknown >= 0) order.push_back(unknown);
+      }
+    cholmod_l_free_factor(&of_points, &common);
+    return order;
+  }
+
+  bool analyse(const BlockMatrix& K, std::string& failure) {
+    free.pattern(K, true, upper_first, upper_row);
+    std::vector<FreeMatrix::Index> order = ordering(K);
+    cholmod_sparse A = view(free.unknowns(), upper_first, upper_row, nullptr);
+    // Only the given ordering is tried from here on.
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_GIVEN;
+    common.postorder = 1;
+    cholesky = order.empty() ? nullptr : cholmod_l_analyze_p(&A, as_long(order), nullptr, 0, &common);
+    if (!cholesky) failure = fmt::format("CHOLMOD cannot analyse a matrix of {} unknowns: {}", free.unknowns(), common.status == CHOLMOD_OUT_OF_MEMORY ? "not enough memory" : "an internal error");
+    return cholesky != nullptr;
+  }
+
+  bool factorise_symmetric(const BlockMatrix& K, std::string& failure) {
+    if (!cholesky && !analyse(K, failure)) return false;
+    free.values(K, true, upper_first, value);
+    cholmod_sparse A = view(free.unknowns(), upper_first, upper_row, value.data());
+    cholmod_l_factorize(&A, cholesky, &common);
+    definite = common.status == CHOLMOD_OK && cholesky->minor == free.unknowns();
+    if (common.status == CHOLMOD_OUT_OF_MEMORY) failure = fmt::format("not enough memory for the Cholesky factor of {} unknowns ({:.3g} numbers)", free.unknowns(), common.lnz);
+    entries = common.lnz;
+    return definite;
+  }
+
+  bool factorise_general(const BlockMatrix& K, std::string& failure) {
+    if (first.empty()) free.pattern(K, false, first, row);
+    free.values(K, false, first, value);
+    umfpack_dl_free_numeric(&numeric);
+    const auto n = static_cast<SuiteSparse_long>(free.unknowns());
+    double info[UMFPACK_INFO];
+    SuiteSparse_long status = UMFPACK_OK;
+    if (!symbolic) status = umfpack_dl_symbolic(n, n, as_long(first), as_long(row), value.data(), &symbolic, nullptr, info);
+    if (status == UMFPACK_OK) status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
+    if (status == UMFPACK_OK) {
+      entries = info[UMFPACK_LNZ] + info[UMFPACK_UNZ];
+      return true;
+    }
+    failure = status == UMFPACK_WARNING_singular_matrix ? "the tangent is singular: part of the body is free to move"
+              : status == UMFPACK_ERROR_out_of_memory   ? fmt::format("not enough memory for the LU factors of {} unknowns", n)
+                                                        : fmt::format("UMFPACK ends with status {}", status);
+    return false;
+  }
+};
+
+SparseSolver::SparseSolver() : implementation_(std::make_unique<Implementation>()) {}
+SparseSolver::~SparseSolver() = default;
+
+bool SparseSolver::factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
+  Implementation& own = *implementation_;
+  if (!own.analysed) {
+    own.free = FreeMatrix(K, free);
+    own.right.resize(own.free.unknowns());
+    own.answer.resize(own.free.unknowns());
+    own.analysed = true;
+  }
+  own.definite = false;
+  own.ready = own.free.unknowns() == 0;
+  if (own.ready) return true;
+  failure.clear();
+  if (K.symmetric && own.factorise_symmetric(K, failure)) return own.ready = true;
+  if (!failure.empty()) return false;
+  return own.ready = own.factorise_general(K, failure);
+}
+
+void SparseSolver::solve(ConstFieldView b, FieldView x) {
+  Implementation& own = *implementation_;
+  const std::size_t n = own.free.unknowns();
+  for (std::size_t k = 0; k < n; ++k) own.right[k] = b.data[own.free.place(k)];
+  const double* answer = own.answer.data();
+  if (n > 0 && own.definite) {
+    cholmod_dense right{};
+    right.nrow = right.nzmax = right.d = n;
+    right.ncol = 1;
+    right.x = own.right.data();
+    right.xtype = CHOLMOD_REAL;
+    right.dtype = CHOLMOD_DOUBLE;
+    cholmod_l_solve2(CHOLMOD_A, own.cholesky, &right, nullptr, &own.solution, nullptr, &own.work_y, &own.work_e, &own.common);
+    answer = static_cast<const double*>(own.solution->x);
+  } else if (n > 0) {
+    umfpack_dl_solve(UMFPACK_A, as_long(own.first), as_long(own.row), own.value.data(), own.answer.data(), own.right.data(), own.numeric, nullptr, nullptr);
+  }
+  std::fill_n(x.data, x.size(), 0.0);
+  for (std::size_t k = 0; k < n; ++k) x.data[own.free.place(k)] = answer[k];
+}
+
+bool SparseSolver::factorised() const noexcept { return implementation_->ready; }
+bool SparseSolver::positive_definite() const noexcept { return implementation_->definite; }
+std::size_t SparseSolver::unknowns() const noexcept { return implementation_->free.unknowns(); }
+double SparseSolver::factor_entries() const noexcept { return implementation_->entries; }
+
+}  // namespace perikit

@@ -1,0 +1,40 @@
+#pragma once
+/// Direct solution of linear systems with assembled tangents: the one place that knows SuiteSparse.
+
+#include <memory>
+#include <string>
+
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+/// K x = b on the free components, K an assembled tangent: a supernodal Cholesky factorisation (CHOLMOD) where K is symmetric and
+/// positive definite, an LU factorisation with pivoting (UMFPACK) elsewhere. The fill-reducing ordering is found on the graph of
+/// points, once for all matrices of the same pattern and mask. BLAS runs on one thread, so that results do not depend on threads.
+class SparseSolver {
+ public:
+  SparseSolver();
+  ~SparseSolver();
+  SparseSolver(const SparseSolver&) = delete;
+  SparseSolver& operator=(const SparseSolver&) = delete;
+
+  /// False where K is singular to working accuracy or memory is short; `failure` says so. `free`: 1 on free components, K.dimension
+  /// components. The pattern of K and the mask must be those of the first call.
+  bool factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure);
+  /// x <- K^-1 b on free components, 0 elsewhere. b and x may be the same field.
+  void solve(ConstFieldView b, FieldView x);
+
+  bool factorised() const noexcept;
+  /// True where the last factorisation was Cholesky's.
+  bool positive_definite() const noexcept;
+  /// Unknowns, and numbers in the factors of the last factorisation.
+  std::size_t unknowns() const noexcept;
+  double factor_entries() const noexcept;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,156 @@
+/// Load stepping: cut-back, limit points, scales, and options that must change something. On small bodies, with every integrator.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tests/validation/quasi_static.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+using contract::BodyOptions;
+
+namespace {
+
+const std::vector<std::string> integrators{"newton", "jfnk", "kinsol", "dynamic_relaxation"};
+const std::string kinematics = "type = \"baqp\"";
+
+BodyOptions plate(const std::string& integrator, const std::string& more) {
+  registry();
+  BodyOptions body;
+  body.dimension = 2;
+  body.cells = 10;
+  body.material = "type = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = 2.0";
+  body.sets = "left = \"x < 2\"\nright = \"x > 6\"\n";
+  body.conditions = "[[boundary]]\nset = \"left\"\ndisplacement = [0, 0]\n";
+  body.integrator = "type = \"" + integrator + "\"\n" + more;
+  return body;
+}
+
+std::unique_ptr<Simulation> pulled(const std::string& integrator, const std::string& more, const std::string& motion = "[0.3, 0.1]") {
+  BodyOptions body = plate(integrator, more);
+  body.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = " + motion + "\n";
+  return contract::build(contract::scene_text(body, kinematics));
+}
+
+double distance(Simulation& a, Simulation& b) {
+  double most = 0;
+  for (const std::int32_t p : a.problem().body().internal())
+    for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(a.problem().displacement().component(c)[p] - b.problem().displacement().component(c)[p]));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("a step that is too long is cut back, grows again and still meets the planned points") {
+  for (const std::string& integrator : integrators) {
+    INFO(integrator);
+    // The right end jumps through the body: inadmissible, or too far, in one step.
+    const std::string few = integrator == "dynamic_relaxation" ? "max_iterations = 60\n" : "";   // it would take the jump
+    const auto simulation = pulled(integrator, "steps = 2\ntolerance = 1e-8\n" + few, "[-2.6, 1.5]");
+    const Protocol protocol = run(*simulation);
+    CHECK(protocol.reports.size() > 3);
+    bool half = false;
+    double shortest = 1, longest = 0;
+    for (const StepReport& report : protocol.reports) {
+      half = half || report.time == 0.5;
+      if (report.step == 0) continue;
+      shortest = std::min(shortest, report.time_step);
+      longest = std::max(longest, report.time_step);
+    }
+    CHECK(half);
+    CHECK(protocol.reports.back().time == 1.0);
+    CHECK(longest >= 2 * shortest);
+    CHECK(protocol.reports.back().time_step <= 0.5);
+    CHECK(protocol.text.find("no equilibrium at t = ") != std::string::npos);
+  }
+}
+
+TEST_CASE("past a limit point the run ends with load parameter, step and reason") {
+  for (const std::string& integrator : integrators) {
+    INFO(integrator);
+    // Hencky's nominal stress E ln(s)/s has its maximum E/e at s = e: the load reaches it at t = 0.5.
+    BodyOptions body = plate(integrator, "steps = 4\ntolerance = 1e-6\nmax_iterations = " + std::string(integrator == "dynamic_relaxation" ? "2000" : "12") + "\ncut_backs = 2\n");
+    body.dimension = 1;
+    body.cells = 12;
+    body.plane = "stress";
+    body.material = "type = \"hencky\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.0";
+    body.sets = "left = \"x < 3\"\nright = \"x > 11\"\n";
+    body.conditions = fmt::format("[[boundary]]\nset = \"left\"\ndisplacement = [0]\n[[load]]\nset = \"right\"\nforce = [{}]\n", 2 * 2.0 * 1.5 / std::exp(1.0));
+    const auto simulation = contract::build(contract::scene_text(body, "type = \"projection\""));
+    Protocol protocol;
+    std::string message;
+    try {
+      simulation->run(protocol);
+    } catch (const RunError& error) {
+      message = error.what();
+    }
+    CAPTURE(message);
+    CHECK(message.starts_with(integrator + ": no equilibrium found beyond load parameter 0."));
+    for (const char* part : {"the smallest step, 0.0625, failed because ", "limit point"}) CHECK(message.find(part) != std::string::npos);
+    CHECK(protocol.reports.back().time >= 0.25);
+    CHECK(protocol.reports.back().time <= 0.55);
+  }
+}
+
+TEST_CASE("convergence is relative: units do not matter, and a rigid motion converges") {
+  for (const std::string& integrator : integrators) {
+    INFO(integrator);
+    BodyOptions metres = plate(integrator, "steps = 3\ntolerance = 1e-9\n"), small = metres;
+    metres.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = [0.3, 0.1]\n";
+    small.scale = 1e-3;
+    small.material = "type = \"neo_hookean\"\nshear_modulus = 1.0e9\nbulk_modulus = 2.0e9";
+    small.sets = "left = \"x < 0.002\"\nright = \"x > 0.006\"\n";
+    small.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = [0.3e-3, 0.1e-3]\n";
+    const auto a = contract::build(contract::scene_text(metres, kinematics)), b = contract::build(contract::scene_text(small, kinematics));
+    const Protocol of_a = run(*a), of_b = run(*b);
+    double most = 0;
+    for (const std::int32_t p : a->problem().body().internal())
+      for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(a->problem().displacement().component(c)[p] - 1e3 * b->problem().displacement().component(c)[p]));
+    CHECK_MESSAGE(most <= 1e-8, "other units move a point by ", most);
+    CHECK(std::abs(of_a.iterations() - of_b.iterations()) <= of_a.iterations() / 10);
+
+    BodyOptions rigid = plate(integrator, "steps = 2\ntolerance = 1e-9\n");
+    rigid.conditions = "[[boundary]]\nset = \"left\"\ndisplacement = [4, -3]\n";
+    const auto moved = contract::build(contract::scene_text(rigid, kinematics));
+    run(*moved);
+    CHECK(std::abs(mean(*moved, "right", 0) - 4) <= 1e-6);
+    CHECK(std::abs(mean(*moved, "right", 1) + 3) <= 1e-6);
+  }
+}
+
+TEST_CASE("options of quasi-static integrators change the way and not the answer") {
+  struct Variant {
+    std::string integrator, plain, other;
+    bool linear_iterations;   ///< compare the log, not the number of iterations
+    std::string motion = "[1.2, 0.9]";
+  };
+  const std::vector<Variant> variants{
+      {"jfnk", "", "tangent = \"differences\"\n", true},
+      {"jfnk", "", "preconditioner = \"none\"\n", true},
+      {"jfnk", "preconditioner = \"none\"\n", "preconditioner = \"jacobi\"\n", true},
+      {"jfnk", "preconditioner = \"none\"\n", "preconditioner = \"none\"\nrestart = 5\n", true},
+      {"kinsol", "", "strategy = \"none\"\n", true, "[-2.2, 1.5]"},
+      {"kinsol", "", "strategy = \"picard\"\n", false},
+      {"kinsol", "", "strategy = \"fixed_point\"\nmax_iterations = 5000\n", false},
+      {"kinsol", "strategy = \"fixed_point\"\nmax_iterations = 5000\n", "strategy = \"fixed_point\"\nmax_iterations = 5000\nanderson = 3\n", false},
+      {"kinsol", "preconditioner = \"none\"\n", "preconditioner = \"none\"\nlinear_solver = \"spbcgs\"\n", true},
+      {"kinsol", "preconditioner = \"none\"\n", "preconditioner = \"none\"\nlinear_solver = \"sptfqmr\"\n", true},
+      {"kinsol", "preconditioner = \"none\"\n", "preconditioner = \"none\"\nrestart = 4\n", true},
+      {"kinsol", "preconditioner = \"none\"\n", "preconditioner = \"jacobi\"\n", true},
+      {"dynamic_relaxation", "", "damping = \"kinetic\"\n", false},
+  };
+  for (const Variant& variant : variants) {
+    INFO(variant.integrator, ": ", variant.plain, " against ", variant.other);
+    const std::string common = "steps = 2\ntolerance = 1e-9\n";
+    const auto reference = pulled("newton", "steps = 2\ntolerance = 1e-11\n", variant.motion);
+    run(*reference);
+    const auto a = pulled(variant.integrator, common + variant.plain, variant.motion), b = pulled(variant.integrator, common + variant.other, variant.motion);
+    const Protocol of_a = run(*a), of_b = run(*b);
+    CHECK(distance(*a, *reference) <= 1e-6);
+    CHECK(distance(*b, *reference) <= 1e-6);
+    if (variant.linear_iterations) CHECK(of_a.text != of_b.text);
+    else CHECK(of_a.iterations() != of_b.iterations());
+  }
+}
