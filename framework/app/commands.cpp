@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <sstream>
 #include <system_error>
 
 #include "bench.hpp"
@@ -61,9 +62,6 @@ void run(const Options& options) {
   }
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused()) recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
-  const auto running = std::chrono::steady_clock::now();
-  BodyProblem& problem = simulation.problem();
-  const std::int64_t first_step = problem.step();
   try {
     simulation.run(recorder);
   } catch (const RunError& error) {
@@ -71,15 +69,12 @@ void run(const Options& options) {
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
-  const double spent = seconds_since(running);
-  const auto steps = static_cast<double>(problem.step() - first_step);
-  const std::string end = fmt::format("set-up {:.2f} s, run {:.2f} s, {:.0f} steps, {:.3g} ns a point and step, {} frames in {}", set_up, spent, steps,
-                                      steps > 0 ? spent / steps / static_cast<double>(problem.points()) * 1e9 : 0.0, recorder.frames(), folder.string());
-  log_end(recorder, end);
-  if (!options.quiet) fmt::print("{}\n", end);
+  const std::string closing = recorder.closing(set_up);
+  log_end(recorder, closing);
+  if (!options.quiet) fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format("stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
-                                            problem.step(), problem.time(), recorder.frames() - 1, folder.string());
+                                            simulation.problem().step(), simulation.problem().time(), recorder.frames() - 1, folder.string());
     log_end(recorder, stopped);
     throw RunError(stopped);
   }
@@ -93,12 +88,8 @@ void check(const Options& options) {
   // The summary as comments: what is printed is itself a scene.
   std::string summary = simulation.summary();
   if (options.explain) summary += simulation.explanation(*registry);
-  std::size_t begin = 0;
-  while (begin < summary.size()) {
-    const std::size_t end = summary.find('\n', begin);
-    fmt::print("# {}\n", summary.substr(begin, end - begin));
-    begin = end == std::string::npos ? summary.size() : end + 1;
-  }
+  std::istringstream lines(summary);
+  for (std::string line; std::getline(lines, line);) fmt::print("# {}\n", line);
 }
 
 void study(const Options& options) {

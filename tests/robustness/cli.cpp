@@ -139,6 +139,23 @@ TEST_CASE("cli: --set, --explain, --quiet and --threads") {
   CHECK(desk.text("one/history.csv") == desk.text("two/history.csv"));
 }
 
+TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and warnings, here and in run.log") {
+  const Desk desk;
+  const Result run = desk.perikit("run scene.toml -o out");
+  REQUIRE(run.status == 0);
+  for (const std::string word : {"s set-up", "s steps", "s output (6 frames, 51 rows of history, 0 checkpoints)", "50 steps of 40 points", "points/s", "MB of arrays", "work put in",
+                                 "warnings      none", "6 frames in out"}) {
+    CHECK_MESSAGE(contains(run.out, word), "no '", word, "' in\n", run.out);
+    CHECK_MESSAGE(contains(desk.text("out/run.log"), word), "no '", word, "' in run.log");
+  }
+  const std::size_t at = run.out.find("balance off by ");
+  REQUIRE(at != std::string::npos);
+  CHECK(std::stod(run.out.substr(at + 15)) < 0.01);
+  // Poisson's ratio 0.3 is none that bonds can have.
+  const Result warned = desk.perikit("run scene.toml -o warned --set kinematics.type=bond_based");
+  CHECK_MESSAGE(contains(warned.out, "warnings      1\n  warning"), warned.out);
+}
+
 TEST_CASE("cli: the folder of a run") {
   const Desk desk;
   REQUIRE(desk.perikit("run scene.toml -o out").status == 0);

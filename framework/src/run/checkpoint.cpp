@@ -40,6 +40,7 @@ void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   image.attribute("next_time", checkpoint.output.next_time);
   image.attribute("steps_expected", checkpoint.output.steps_expected);
   image.attribute("end_time", checkpoint.output.end_time);
+  image.attribute("initial_energy", checkpoint.output.initial_energy);
   image.dataset("state", checkpoint.state);
   store_atomically(checkpoint_file(folder), image.bytes());
 }
@@ -58,6 +59,7 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.output.next_time = source.integer("/", "next_time");
   checkpoint.output.steps_expected = source.integer("/", "steps_expected");
   checkpoint.output.end_time = source.real("/", "end_time");
+  checkpoint.output.initial_energy = source.real("/", "initial_energy");
   checkpoint.state = source.read_bytes("state");
   return checkpoint;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <sstream>
 
 #include "output/atomic_file.hpp"
 #include "perikit/run/simulation.hpp"
@@ -92,7 +93,8 @@ void RunRecorder::start_from_checkpoint() {
   check_checkpoint(checkpoint, simulation_.scene(), body_, folder_);
   simulation_.problem().restore(checkpoint.state);
   done_ = checkpoint.output;
-  resumed_step_ = checkpoint.step;
+  resumed_step_ = first_step_ = checkpoint.step;
+  first_time_ = checkpoint.time;
   log_text_ = read_text(folder_ / "run.log");
 }
 
@@ -101,6 +103,9 @@ RunRecorder::~RunRecorder() {
 }
 
 void RunRecorder::log(std::string_view message) {
+  std::istringstream lines{std::string(message)};
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("warning")) warnings_.push_back(line);
   log_text_ += message;
   if (log_text_.empty() || log_text_.back() != '\n') log_text_ += '\n';
   write_file_atomically(folder_ / "run.log", log_text_);
@@ -148,6 +153,7 @@ void RunRecorder::step_done(const StepReport& report) {
     done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
+  const auto before = std::chrono::steady_clock::now();
   // What only the stop asks for is written but not counted: the run that goes on writes what the run without a stop had written.
   const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
   if (row || stopping_) write_history(report);
@@ -155,11 +161,14 @@ void RunRecorder::step_done(const StepReport& report) {
   done_.history_rows += row;
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
+  if (report.step == 0) done_.initial_energy = simulation_.problem().energies().strain + simulation_.problem().energies().kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
+  output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   progress(report);
 }
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
+  ++checkpoints_written_;
   history_->sync();   // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, done_, report.step, report.time, simulation_.problem().snapshot()});
 }
@@ -168,6 +177,7 @@ void RunRecorder::write_frame(const StepReport& report) {
   std::vector<OutputField> fields;
   for (const std::string& name : frame_fields_) fields.push_back(fields_.get(name));
   writer_->write(report.time, report.step, fields);
+  ++frames_written_;
 }
 
 double RunRecorder::reduce(const HistoryDescription& record) {
@@ -204,6 +214,7 @@ void RunRecorder::write_history(const StepReport& report) {
                           energies.external_work, energies.dissipated, static_cast<double>(report.iterations), report.residual};
   for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduce(record));
   history_->row(row);
+  ++rows_written_;
 }
 
 void RunRecorder::progress(const StepReport& report) {
@@ -214,8 +225,8 @@ void RunRecorder::progress(const StepReport& report) {
   if (!end && now - shown_ < (terminal ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000))) return;
   shown_ = now;
   const double spent = std::chrono::duration<double>(now - start_).count();
-  const double done = report.end_time > 0 ? report.time / report.end_time : 1.0;
-  const double rate = static_cast<double>(report.step) * static_cast<double>(simulation_.problem().points()) / std::max(spent, 1e-9);
+  const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().points()) / std::max(spent, 1e-9);
   const std::string line = fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time,
                                        report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
   if (terminal) {

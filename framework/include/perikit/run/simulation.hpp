@@ -56,6 +56,7 @@ struct OutputProgress {
   std::int64_t history_every = 0;              ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
+  double initial_energy = 0;                   ///< strain + kinetic [J] at step 0
 };
 
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
@@ -68,11 +69,14 @@ class RunRecorder final : public Observer {
 
   bool wants_sample(std::int64_t step, double time) override;
   void step_done(const StepReport& report) override;
+  /// Lines that begin with "warning" are told again at the end.
   void log(std::string_view message) override;
   bool cancelled() const noexcept override;
 
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
+  std::string closing(double set_up) const;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
 
@@ -105,6 +109,11 @@ class RunRecorder final : public Observer {
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
   bool stopping_ = false;
+  // Of this process; a resumed run does not know how long the earlier ones took.
+  double output_seconds_ = 0;
+  std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
+  double first_time_ = 0;
+  std::vector<std::string> warnings_;
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.
