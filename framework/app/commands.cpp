@@ -75,8 +75,10 @@ void run(const Options& options) {
   const auto steps = static_cast<double>(problem.step() - first_step);
   const std::string end = fmt::format("set-up {:.2f} s, run {:.2f} s, {:.0f} steps, {:.3g} ns a point and step, {} frames in {}", set_up, spent, steps,
                                       steps > 0 ? spent / steps / static_cast<double>(problem.points()) * 1e9 : 0.0, recorder.frames(), folder.string());
+  const std::string fracture = problem.fracture_summary();
+  if (!fracture.empty()) recorder.log(fracture);
   log_end(recorder, end);
-  if (!options.quiet) fmt::print("{}\n", end);
+  if (!options.quiet) fmt::print("{}{}\n", fracture, end);
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format("stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
                                             problem.step(), problem.time(), recorder.frames() - 1, folder.string());

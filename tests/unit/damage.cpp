@@ -14,11 +14,8 @@ using namespace perikit;
 namespace {
 
 std::unique_ptr<Damage> make(const std::string& type, const std::string& table) {
-  static Registry registry = [] {
-    Registry parts;
-    parts.add_folder(PERIKIT_PLUGIN_FOLDER);
-    return parts;
-  }();
+  static Registry registry;
+  if (registry.names(Kind::damage).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
   return registry.damage(*parse_part(Kind::damage, type, table, registry));
 }
 
