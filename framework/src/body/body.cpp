@@ -24,12 +24,12 @@ void check_cloud(const Scene& scene, std::size_t points, double ratio) {
 
 }  // namespace
 
-Body::Body(const Scene& scene) : dimension_(scene.body.dimension), space_(scene.body.space), section_(scene.body.section) {
+Body::Body(const Scene& scene, bool lists) : dimension_(scene.body.dimension), space_(scene.body.space), section_(scene.body.section) {
   for (const CrackDescription& crack : scene.cracks) cracks_.emplace_back(crack.vertices);
   if (scene.body.lattice) {
     spacing_ = scene.body.lattice->spacing;
     horizon_ = scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing_;
-    place_lattice(scene);
+    place_lattice(scene, lists);
   } else {
     PointCloud cloud = read_points(*scene.body.points_file, dimension_);
     double total = 0;
@@ -43,7 +43,7 @@ Body::Body(const Scene& scene) : dimension_(scene.body.dimension), space_(scene.
   collect_sets(scene);
 }
 
-void Body::place_lattice(const Scene& scene) {
+void Body::place_lattice(const Scene& scene, bool lists) {
   const LatticeDescription& description = *scene.body.lattice;
   double estimate = 1;
   for (int a = 0; a < dimension_; ++a) estimate *= std::max(1.0, (description.upper[a] - description.lower[a]) / spacing_ + 1);
@@ -76,7 +76,7 @@ void Body::place_lattice(const Scene& scene) {
   const double volume = std::pow(spacing_, dimension_) * section_;
   // Jitter needs a cloud; so does a body that fills so little of its box that dead cells would dominate.
   const bool sparse = static_cast<double>(internal_.size()) < 0.08 * static_cast<double>(cells[0] * cells[1] * cells[2]);
-  if (jittered || (sparse && !internal_.empty())) {
+  if (jittered || lists || (sparse && !internal_.empty())) {
     std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
     check_cloud(scene, internal_.size(), horizon_ / spacing_);
     std::vector<Point> positions;

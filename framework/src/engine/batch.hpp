@@ -103,6 +103,14 @@ struct Pass {
   double* energies = nullptr;     ///< by block
   std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
+  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
+  const std::uint8_t* only = nullptr;
+  const std::uint8_t* near = nullptr;
+
+  /// Evaluation points are taken one by one and nothing is scattered.
+  bool alone() const noexcept { return only || work.work() == Work::sample; }
+  bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
+  bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
 
   void report(std::int64_t point) {
     const std::lock_guard lock(guard);

@@ -91,6 +91,51 @@ void CloudFamilies::compact() {
   omega.resize(kept);
 }
 
+BondState& CloudFamilies::bond_state() {
+  if (bonds_) return *bonds_;
+  bonds_.emplace(body, lists);
+  whole_ = omega;
+  total_.resize(body.points());
+  for (std::size_t p = 0; p < body.points(); ++p) {
+    double intact = 0;
+    for (std::int64_t k = lists.first[p]; k < lists.first[p + 1]; ++k) {
+      intact += omega[static_cast<std::size_t>(k)] * body.volume(static_cast<std::size_t>(lists.neighbour[static_cast<std::size_t>(k)]));
+    }
+    total_[p] = intact > 0 ? intact / (1 - damage.data()[p]) : 0.0;
+  }
+  return *bonds_;
+}
+
+template <int D>
+void CloudFamilies::changed_point(std::size_t p) {
+  const Row* position = reinterpret_cast<const Row*>(body.rows().data());
+  double K[6] = {}, intact = 0;
+  for (std::int64_t at = lists.first[p]; at < lists.first[p + 1]; ++at) {
+    const auto k = static_cast<std::size_t>(at);
+    const std::int32_t j = lists.neighbour[k];
+    omega[k] = (*bonds_)[k] * whole_[k];
+    const double w = omega[k] * position[j][3];
+    intact += w;
+    const Row xi = position[j] - position[p];
+    for (int a = 0; a < D; ++a)
+      for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+  }
+  invert_shape<D>(K, &inverse[6 * p], condition.data() + p);
+  const double share = total_[p] > 0 ? intact / total_[p] : 0.0;
+  weight[p] = position[p][3] * share;
+  damage.data()[p] = total_[p] > 0 ? 1 - share : 1.0;
+}
+
+void CloudFamilies::changed(std::span<const std::int32_t> points) {
+  for (const std::int32_t p : points) {
+    switch (body.dimension()) {
+      case 1: changed_point<1>(static_cast<std::size_t>(p)); break;
+      case 2: changed_point<2>(static_cast<std::size_t>(p)); break;
+      default: changed_point<3>(static_cast<std::size_t>(p));
+    }
+  }
+}
+
 void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
   const std::span<const std::int32_t> family = neighbours(p);
   const Point x = body.position(p);
@@ -112,7 +157,8 @@ void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
 
 std::size_t CloudFamilies::bytes() const noexcept {
   return lists.neighbour.size() * sizeof(std::int32_t) + lists.first.size() * sizeof(std::int64_t) +
-         (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes();
+         (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes() +
+         (whole_.size() + total_.size()) * sizeof(double) + (bonds_ ? bonds_->bytes() : 0);
 }
 
 }  // namespace perikit

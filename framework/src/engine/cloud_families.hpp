@@ -2,8 +2,10 @@
 /// Families of a cloud: lists of intact bonds, their influence, and what point gradients and weights need of them.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
+#include "cloud_bonds.hpp"
 #include "local_stencil.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
@@ -16,7 +18,7 @@ struct CloudFamilies {
 
   const Body& body;
   FamilyLists lists;                  ///< intact bonds
-  AlignedVector<double> omega;        ///< by bond
+  AlignedVector<double> omega;        ///< by bond; with damage b omega
   AlignedVector<double> inverse;      ///< K^-1 by point, rows of 6; 0 where singular
   AlignedVector<double> weight;       ///< W_i = V_i (1 - D_i) of the point shape
   AlignedVector<double> normaliser;   ///< N_i of bond weights over the whole family: sum V_j or sum omega V_j
@@ -28,15 +30,28 @@ struct CloudFamilies {
   std::span<const std::int32_t> neighbours(std::size_t p) const noexcept {
     return {lists.neighbour.data() + lists.first[p], static_cast<std::size_t>(lists.first[p + 1] - lists.first[p])};
   }
+  /// The state of the bonds; made on the first call, bodies without damage have none.
+  BondState& bond_state();
+  /// b of a bond.
+  double integrity(std::size_t bond) const noexcept { return bonds_ ? (*bonds_)[bond] : 1.0; }
+  bool fails() const noexcept { return bonds_.has_value(); }
+  /// Shape tensors, weights and damage of points whose bonds have changed.
+  void changed(std::span<const std::int32_t> points);
   /// The family of p as arrays over its bonds.
   void load(std::size_t p, FamilyArrays& out) const;
   std::size_t bytes() const noexcept;
 
  private:
   template <int D>
+  void changed_point(std::size_t p);
+  template <int D>
   void measure(const InfluenceFunction& influence, BondWeight kind);
   /// Takes the bonds that are marked as cut out of the lists.
   void compact();
+
+  std::optional<CloudBonds> bonds_;
+  AlignedVector<double> whole_;       ///< with damage: omega by bond at the set-up,
+  AlignedVector<double> total_;       ///< and sum omega V_j of the whole family by point
 };
 
 }  // namespace perikit

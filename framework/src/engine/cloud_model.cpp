@@ -18,6 +18,7 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
+  if (parts.damage) fracture_.emplace(body_, *parts.damage, families_.bond_state(), parts.skip);
   u_.resize(n);
   flux_.resize(D * n);
   if (traits_.at == EvaluationPoints::bonds) {
@@ -81,9 +82,10 @@ void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
   for (std::size_t first = b * block_points; first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding, [](std::uint8_t m) { return m != 0; })) continue;
     for (int l = 0; l < lanes; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
-      if (l >= n) {
+      if (l >= n || !pass.wanted(static_cast<std::int64_t>(p))) {
         for (int c = 0; c < D * D; ++c) s.H[c * batch_points + l] = s.dH[c * batch_points + l] = 0.0;
         s.weight[l] = 0;
         s.owner[l] = static_cast<std::int32_t>(first);
@@ -104,6 +106,7 @@ void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
+    if (pass.only) continue;
     for (int l = 0; l < n; ++l) {
       Row S[D];
       for (int e = 0; e < D; ++e) {
@@ -119,7 +122,7 @@ void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
 template <int D>
 int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy) {
   const bool sample = pass.work.work() == Work::sample, tangent = pass.work.tangent(), mean = traits_.base == BondBase::mean;
-  const bool half = pairs_ && !sample;
+  const bool half = pairs_ && !pass.alone();
   double* xi = s.bond[0];
   double* g = s.bond[1];
   double* length = s.bond[2];
@@ -149,7 +152,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
       omega[l] = real ? families_.omega[k] : 0.0;
       volume[l] = real ? position_[j][3] : 0.0;
-      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? families_.omega[k] : 1.0;
+      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? families_.omega[k] : families_.integrity(k);
       s.weight[l] = scale_[p] * position_[j][3] * factor;
       s.far_weight[l] = scale_[j] * x[3] * factor;
       s.owner[l] = static_cast<std::int32_t>(p);
@@ -157,7 +160,9 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     }
     gather(u_, gradient_, begin, n, s.du, s.A);
     if (tangent) gather(w_, direction_, begin, n, s.dw, s.dA);
-    for (int l = n; l < lanes; ++l) {
+    for (int l = families_.fails() ? 0 : n; l < lanes; ++l) {
+      // Padding and broken bonds: H = 0, wherever the far end may be.
+      if (l < n && families_.integrity(static_cast<std::size_t>(begin + l)) > 0) continue;
       for (int c = 0; c < D; ++c) s.du[c * batch_points + l] = s.dw[c * batch_points + l] = 0.0;
       for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
     }
@@ -180,6 +185,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
+    if (pass.only) continue;
     bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
     Row own{}, own_stress[D] = {};
     const double share = mean ? 0.5 : 1.0;
@@ -208,6 +214,7 @@ void CloudModel<D>::bonds_block(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.begin_block(b);
   double energy = 0;
   for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+    if (!pass.wanted(static_cast<std::int64_t>(p))) continue;
     if (bonds_of_point(p, s, pass, &energy) >= 0) {
       pass.report(static_cast<std::int64_t>(p));
       return;
@@ -234,8 +241,8 @@ template <int D>
 EvaluationStatus CloudModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   mirror_rows(pass.u, body_.points(), u_);
+  const bool alone = pass.alone();
   if (pass.work.tangent()) mirror_rows(pass.w, body_.points(), w_);
-  const bool sample = pass.work.work() == Work::sample;
   const auto over_points = [&](auto&& body) {
     parallel_for(blocks(), [&](std::size_t b) {
       for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) body(p);
@@ -246,16 +253,17 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
   } else {
     if (pass.work.tangent()) direction_.resize(D * body_.points());
     over_points([&](std::size_t p) {
+      if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
       gradient_rows(p, u_, gradient_);
       if (pass.work.tangent()) gradient_rows(p, w_, direction_);
       force_[p] = Row{};
       for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
     });
-    if (sample) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
+    if (alone) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
     else colouring_.for_each([&](std::size_t b) { bonds_block(b, pass); });
-    over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+    if (!alone) over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
   }
-  if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
+  if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
   over_points([&](std::size_t p) { divergence(p, pass.out); });
   return {};
 }
@@ -278,6 +286,19 @@ EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) 
 }
 
 template <int D>
+BondUpdate CloudModel<D>::update_bonds(ConstFieldView u) {
+  if (!fracture_) return {};
+  return fracture_->update(u, [&](const GroupMarks& marks) {
+    return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
+  }, [&](std::span<const std::int32_t> points) { families_.changed(points); });
+}
+
+template <int D>
+void CloudModel<D>::restore_bonds(std::span<const BondChange> changes) {
+  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { families_.changed(points); });
+}
+
+template <int D>
 ModelReport CloudModel<D>::report() const {
   ModelReport report;
   report.bonds = families_.bonds();
@@ -286,7 +307,7 @@ ModelReport CloudModel<D>::report() const {
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
   report.bytes = families_.bytes() + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
-                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) + scratch_.bytes();
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) + scratch_.bytes() + (fracture_ ? fracture_->bytes() : 0);
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {
     report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", report.bonds / 2, report.bonds)});

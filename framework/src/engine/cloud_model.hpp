@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 
 #include "batch.hpp"
 #include "blocks.hpp"
@@ -23,6 +24,10 @@ class CloudModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return families_.condition; }
   Field damage() override { return families_.damage; }
   ModelReport report() const override;
+  BondUpdate update_bonds(ConstFieldView u) override;
+  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
+  void restore_bonds(std::span<const BondChange> changes) override;
+  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
   const CloudFamilies& families() const noexcept { return families_; }
   /// H of point p as rows: H[D p + e][c] = H_ce.
@@ -57,6 +62,7 @@ class CloudModel final : public AssemblingModel {
   AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point
   AlignedVector<Row> flux_;                    ///< S, then Q; likewise
   AlignedVector<Row> force_;                   ///< scattered bond forces
+  std::optional<Fracture> fracture_;
   ScratchPool scratch_;
 };
 

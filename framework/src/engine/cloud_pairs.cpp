@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
+#include "cloud_bonds.hpp"
 #include "cloud_rows.hpp"
 #include "pair_loop.hpp"
 
@@ -18,10 +20,12 @@ class CloudPairs final : public PairLoop {
   explicit CloudPairs(const PairLoopParts& parts);
 
   void families(const Visit& visit) const override;
+  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
+  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(body_, lists_); }
   std::size_t blocks() const noexcept override { return cloud_blocks(body_.points()); }
   PairCounts counts() const noexcept override {
     return {lists_.neighbour.size(), broken_.size(),
-            lists_.neighbour.size() * 4 + lists_.first.size() * 16 + omega_.size() * 8 + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row),
+            lists_.neighbour.size() * 4 + lists_.first.size() * 16 + omega_.size() * 8 + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row) + (bonds_ ? bonds_->bytes() : 0),
             lists_.neighbour.size() * 8 * (D + 1)};
   }
   std::int64_t run(const PairPass& pass) override;
@@ -40,10 +44,14 @@ class CloudPairs final : public PairLoop {
     alignas(64) double omega[batch_points];
     alignas(64) double q[batch_points];        ///< q_i + q_j
     alignas(64) double dq[batch_points];
-    alignas(64) double far_volume[batch_points];
+    alignas(64) double far_volume[batch_points];   ///< b V_j
+    alignas(64) double integrity[batch_points];    ///< b, where damage is on
     alignas(64) double t[3][batch_points];
   };
 
+  void family_of(std::size_t p, std::vector<FamilyBond>& bonds) const;
+  /// Each bond once, for both ends.
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass);
   /// Whether all bonds of the point had a finite positive length.
@@ -61,6 +69,7 @@ class CloudPairs final : public PairLoop {
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
   AlignedVector<double> omega_;                ///< by bond; empty where the law does not ask
   std::vector<BrokenBond> broken_;             ///< ascending by point
+  std::optional<CloudBonds> bonds_;            ///< only where damage is on
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
   AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
@@ -116,24 +125,37 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
 }
 
 template <int D>
+void CloudPairs<D>::family_of(std::size_t p, std::vector<FamilyBond>& bonds) const {
+  bonds.clear();
+  const auto add = [&](std::int32_t j, double omega, double integrity) {
+    const Row xi = position_[j] - position_[p];
+    bonds.push_back({{xi[0], xi[1], xi[2]}, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]), omega, position_[j][3], integrity});
+  };
+  for (std::int64_t at = lists_.first[p]; at < lists_.first[p + 1]; ++at) {
+    const auto k = static_cast<std::size_t>(at);
+    add(lists_.neighbour[k], omega_.empty() ? 1.0 : omega_[k], bonds_ ? (*bonds_)[k] : 1.0);
+  }
+  for (auto cut = std::lower_bound(broken_.begin(), broken_.end(), p, [](const BrokenBond& b, std::size_t q) { return b.point < q; });
+       cut != broken_.end() && cut->point == p; ++cut) {
+    add(cut->far, omega_.empty() ? 1.0 : cut->omega, 0.0);
+  }
+}
+
+template <int D>
 void CloudPairs<D>::families(const Visit& visit) const {
   std::vector<FamilyBond> bonds;
-  std::vector<std::int32_t> points(1);
-  std::size_t next_broken = 0;
   for (std::size_t p = 0; p < body_.points(); ++p) {
-    bonds.clear();
-    const auto add = [&](std::int32_t j, double omega, bool intact) {
-      const Row xi = position_[j] - position_[p];
-      bonds.push_back({{xi[0], xi[1], xi[2]}, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]), omega, position_[j][3], intact});
-    };
-    for (std::int64_t k = lists_.first[p]; k < lists_.first[p + 1]; ++k) {
-      add(lists_.neighbour[static_cast<std::size_t>(k)], omega_.empty() ? 1.0 : omega_[static_cast<std::size_t>(k)], true);
-    }
-    for (; next_broken < broken_.size() && broken_[next_broken].point == p; ++next_broken) {
-      add(broken_[next_broken].far, omega_.empty() ? 1.0 : broken_[next_broken].omega, false);
-    }
-    points[0] = static_cast<std::int32_t>(p);
-    visit(bonds, points);
+    family_of(p, bonds);
+    visit(bonds, {static_cast<std::int32_t>(p)});
+  }
+}
+
+template <int D>
+void CloudPairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
+  std::vector<FamilyBond> bonds;
+  for (const std::int32_t p : points) {
+    family_of(static_cast<std::size_t>(p), bonds);
+    visit(bonds, {p});
   }
 }
 
@@ -146,7 +168,9 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
   for (int l = 0; l < n; ++l) {
     const auto k = static_cast<std::size_t>(begin + l);
     const auto j = static_cast<std::size_t>(lists_.neighbour[k]);
-    const Row far = position_[j], xi = far - x, du = u_[j] - own;
+    // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
+    const double b = bonds_ ? (*bonds_)[k] : 1.0;
+    const Row far = position_[j], xi = far - x, du = b > 0 ? u_[j] - own : Row{};
     double square = 0;
     for (int c = 0; c < D; ++c) {
       g.xi[c][l] = xi[c];
@@ -154,7 +178,8 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
       square += xi[c] * xi[c];
     }
     g.length[l] = square;
-    g.far_volume[l] = far[3];
+    g.far_volume[l] = b * far[3];
+    if (bonds_) g.integrity[l] = b;
     g.omega[l] = omega_.empty() ? 1.0 : omega_[k];
     if constexpr (rate) {
       const Row dw = w_[j] - own_w;
@@ -188,7 +213,7 @@ template <PairWork work>
 bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total) {
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
-  const bool half = half_ && work != PairWork::energy;
+  const bool half = at_once(pass);
   const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
   alignas(64) PairScratch s;
   alignas(64) Gathered g;
@@ -223,7 +248,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     if constexpr (sums) {
       for (int l = 0; l < n; ++l) {
         own_sum += g.t[0][l] * g.far_volume[l];
-        if (half) pass.out.data[far_point(l)] += g.t[0][l] * volume;
+        if (half) pass.out.data[far_point(l)] += g.t[0][l] * (bonds_ ? g.integrity[l] * volume : volume);
       }
       continue;
     }
@@ -268,6 +293,7 @@ template <PairWork work>
 void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
   double energy = 0;
   for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p) {
+    if (pass.only && !pass.only[p / padding]) continue;
     if (run_point<work>(p, pass, energy)) continue;
     report_bad(static_cast<std::int64_t>(p));
     return;
@@ -308,7 +334,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
       case PairWork::energy: return run_block<PairWork::energy>(b, pass);
     }
   };
-  if (half_ && pass.work != PairWork::energy) colouring_.for_each(block);
+  if (at_once(pass)) colouring_.for_each(block);
   else parallel_for(blocks(), block);
   if (vectors && bad() < 0) {
     over_points([&](std::size_t p) {

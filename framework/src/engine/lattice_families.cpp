@@ -11,7 +11,7 @@
 namespace perikit {
 
 LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influence, BondWeight weight)
-    : body(b), lattice(*b.lattice()), spacing(lattice.spacing), volume(b.uniform_volume()), offsets(family_offsets(lattice, b.horizon())) {
+    : body(b), lattice(*b.lattice()), spacing(lattice.spacing), volume(b.uniform_volume()), offsets(family_offsets(lattice, b.horizon())), weight_(weight) {
   half = offsets.size() / 2;
   std::vector<double> r;
   for (const auto& d : offsets) {
@@ -28,7 +28,7 @@ LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influen
   }
   collect_rows();
   make_blocks();
-  make_patterns(weight);
+  make_patterns();
 }
 
 void LatticeFamilies::collect_rows() {
@@ -110,14 +110,15 @@ void LatticeFamilies::make_blocks() {
   colouring = Colouring(touches, static_cast<std::size_t>(count[0] * count[1] * count[2]));
 }
 
-void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, BondWeight weight) const {
+void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, unsigned lanes) const {
   const int d = lattice.dimension;
   for (int l = 0; l < chunk_points; ++l) {
+    if (!(lanes >> l & 1)) continue;
     double K[6] = {}, moment[3] = {}, live_omega = 0, intact_omega = 0, normaliser = 0, inverse[6] = {}, condition = 0;
     for (std::size_t s = 0; s < offsets.size(); ++s) {
       if (!(live_mask[s] >> l & 1)) continue;
       live_omega += omega[s];
-      normaliser += weight == BondWeight::kernel ? omega[s] * volume : volume;
+      normaliser += weight_ == BondWeight::kernel ? omega[s] * volume : volume;
       if (!intact(p, s, l)) continue;
       intact_omega += omega[s];
       for (int a = 0; a < d; ++a) {
@@ -128,7 +129,7 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
     const bool regular = d == 3 ? invert_shape<3>(K, inverse, &condition)
                        : d == 2 ? invert_shape<2>(K, inverse, &condition) : invert_shape<1>(K, inverse, &condition);
     const bool live = p.live >> l & 1;
-    if (live && !regular) p.singular |= static_cast<std::uint8_t>(1u << l);
+    p.singular = static_cast<std::uint8_t>((p.singular & ~(1u << l)) | (live && !regular ? 1u << l : 0u));
     for (int c = 0; c < 6; ++c) p.inverse[c][l] = live ? inverse[c] : 0.0;
     for (int c = 0; c < 3; ++c) p.moment[c][l] = live ? moment[c] : 0.0;
     const double share = live_omega > 0 ? intact_omega / live_omega : 0.0;
@@ -139,30 +140,34 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
   }
 }
 
-void LatticeFamilies::make_patterns(BondWeight weight) {
+std::uint8_t LatticeFamilies::live_bits(std::int64_t index) const noexcept {
   const auto alive = body.alive_bits();
+  const auto byte = static_cast<std::size_t>(index / 8);
+  const int shift = static_cast<int>(index % 8);
+  const unsigned pair = alive[byte] | (byte + 1 < alive.size() ? alive[byte + 1] << 8 : 0u);
+  return static_cast<std::uint8_t>(pair >> shift);
+}
+
+std::uint8_t LatticeFamilies::live_masks(std::int64_t first, std::vector<std::uint8_t>& live_mask) const {
+  const std::uint8_t live = live_bits(first);
+  live_mask.resize(offsets.size());
+  for (std::size_t s = 0; s < offsets.size(); ++s) live_mask[s] = live & live_bits(first + shifts[s]);
+  return live;
+}
+
+void LatticeFamilies::make_patterns() {
   const std::size_t slots = offsets.size();
   whole.mask.assign(slots, 0xff);
-  finish_pattern(whole, whole.mask, weight);
+  finish_pattern(whole, whole.mask);
   for (int l = 0; l < chunk_points; ++l) {
     for (auto& moment : whole.moment) moment[l] = 0.0;   // exactly, not to rounding
   }
-  const auto live_bits = [&](std::int64_t index) {      // of cells index ... index + 7
-    const auto byte = static_cast<std::size_t>(index / 8);
-    const int shift = static_cast<int>(index % 8);
-    const unsigned pair = alive[byte] | (byte + 1 < alive.size() ? alive[byte + 1] << 8 : 0u);
-    return static_cast<std::uint8_t>(pair >> shift);
-  };
   const bool cracked = !body.cracks().empty();
   std::unordered_map<std::string, std::int32_t> known;
   std::vector<std::uint8_t> live_mask(slots), mask(slots);
   for (LatticeChunk& chunk : chunks) {
-    const std::uint8_t live = live_bits(chunk.first);
-    bool full = live == 0xff;
-    for (std::size_t s = 0; s < slots; ++s) {
-      live_mask[s] = live & live_bits(chunk.first + shifts[s]);
-      full = full && live_mask[s] == 0xff;
-    }
+    const std::uint8_t live = live_masks(chunk.first, live_mask);
+    const bool full = live == 0xff && std::all_of(live_mask.begin(), live_mask.end(), [](std::uint8_t m) { return m == 0xff; });
     mask = live_mask;
     std::uint8_t irregular = 0;
     for (int l = 0; cracked && l < chunk_points; ++l) {
@@ -187,7 +192,7 @@ void LatticeFamilies::make_patterns(BondWeight weight) {
       pattern.mask = mask;
       pattern.live = live;
       pattern.irregular = irregular;
-      finish_pattern(pattern, live_mask, weight);
+      finish_pattern(pattern, live_mask);
     }
     chunk.pattern = entry->second;
     singular += static_cast<std::size_t>(__builtin_popcount(patterns[static_cast<std::size_t>(entry->second)].singular));
@@ -212,6 +217,76 @@ void LatticeFamilies::load(std::span<const std::uint16_t> slots, FamilyArrays& o
   }
 }
 
+LatticePattern& LatticeFamilies::own_pattern(LatticeChunk& chunk) {
+  if (chunk.pattern < 0 || static_cast<std::size_t>(chunk.pattern) < shared_) {
+    owned_.push_back({static_cast<std::int32_t>(&chunk - chunks.data()), chunk.pattern});
+    patterns.push_back(LatticePattern(pattern(chunk)));   // a copy first: the vector may move
+    chunk.pattern = static_cast<std::int32_t>(patterns.size()) - 1;
+  }
+  return patterns[static_cast<std::size_t>(chunk.pattern)];
+}
+
+std::vector<std::int32_t> LatticeFamilies::break_bonds(std::span<const BondChange> changes) {
+  if (chunk_at_.empty()) {
+    shared_ = patterns.size();
+    chunk_at_.assign(body.stride() / chunk_points, -1);
+    for (std::size_t c = 0; c < chunks.size(); ++c) chunk_at_[static_cast<std::size_t>(chunks[c].first) / chunk_points] = static_cast<std::int32_t>(c);
+  }
+  std::vector<std::int32_t> ends;
+  const auto clear = [&](std::int32_t point, std::size_t slot) {
+    LatticePattern& p = own_pattern(chunks[static_cast<std::size_t>(chunk_of(point))]);
+    const auto bit = static_cast<std::uint8_t>(1u << (point % chunk_points));
+    if (!(p.mask[slot] & bit)) return;
+    p.mask[slot] &= static_cast<std::uint8_t>(~bit);
+    p.irregular |= bit;
+    --bonds, ++broken, ++failed;
+    ends.push_back(point);
+  };
+  for (const BondChange& c : changes) {
+    clear(c.point, static_cast<std::size_t>(c.bond));
+    clear(c.far, reverse(static_cast<std::size_t>(c.bond)));
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  std::vector<std::uint8_t> live_mask;
+  for (std::size_t k = 0; k < ends.size();) {
+    const std::int32_t first = ends[k] / chunk_points * chunk_points;
+    unsigned lanes = 0;
+    for (; k < ends.size() && ends[k] < first + chunk_points; ++k) lanes |= 1u << (ends[k] - first);
+    live_masks(first, live_mask);
+    LatticePattern& p = own_pattern(chunks[static_cast<std::size_t>(chunk_of(first))]);
+    singular -= static_cast<std::size_t>(__builtin_popcount(p.singular));
+    finish_pattern(p, live_mask, lanes);
+    singular += static_cast<std::size_t>(__builtin_popcount(p.singular));
+  }
+  return ends;
+}
+
+std::vector<std::int32_t> LatticeFamilies::mend() {
+  std::vector<std::int32_t> points;
+  for (std::size_t k = 0; k < owned_.size(); ++k) {
+    LatticeChunk& chunk = chunks[static_cast<std::size_t>(owned_[k].chunk)];
+    const LatticePattern own = pattern(chunk);
+    singular -= static_cast<std::size_t>(__builtin_popcount(own.singular));
+    chunk.pattern = owned_[k].original;
+    const LatticePattern& original = pattern(chunk);
+    singular += static_cast<std::size_t>(__builtin_popcount(original.singular));
+    for (int l = 0; l < chunk_points; ++l) {
+      const auto differs = [&](std::size_t s) { return intact(own, s, l) != intact(original, s, l); };
+      bool any = false;
+      for (std::size_t s = 0; s < offsets.size(); ++s) any = any || differs(s);
+      if (any) points.push_back(chunk.first + l);
+    }
+  }
+  bonds += failed;
+  broken -= failed;
+  failed = 0;
+  owned_.clear();
+  if (!chunk_at_.empty()) patterns.resize(shared_);
+  std::sort(points.begin(), points.end());
+  return points;
+}
+
 void LatticeFamilies::inverse_shape(const LatticePattern& pattern, int lane, double* out) const noexcept {
   const int d = lattice.dimension;
   const double scale = 1 / (spacing * spacing * volume);
@@ -221,7 +296,7 @@ void LatticeFamilies::inverse_shape(const LatticePattern& pattern, int lane, dou
 
 std::size_t LatticeFamilies::bytes() const noexcept {
   return chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
-         patterns.size() * (sizeof(LatticePattern) + offsets.size());
+         patterns.size() * (sizeof(LatticePattern) + offsets.size()) + chunk_at_.size() * sizeof(std::int32_t) + owned_.size() * sizeof(Owned);
 }
 
 }  // namespace perikit

@@ -10,6 +10,7 @@
 #include "blocks.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
+#include "perikit/engine/fracture.hpp"
 #include "perikit/model/kinematics.hpp"
 
 namespace perikit {
@@ -82,7 +83,8 @@ class LatticeFamilies {
   std::vector<LatticeRow> rows;
   std::vector<LatticeBlock> blocks;
   Colouring colouring;
-  std::size_t bonds = 0, broken = 0, singular = 0;
+  std::size_t bonds = 0, broken = 0, singular = 0;   ///< directed intact bonds; broken ones; points
+  std::size_t failed = 0;                      ///< of the broken ones those of `break_bonds`
 
   const LatticePattern& pattern(const LatticeChunk& chunk) const noexcept {
     return chunk.pattern < 0 ? whole : patterns[static_cast<std::size_t>(chunk.pattern)];
@@ -98,6 +100,16 @@ class LatticeFamilies {
   std::vector<std::uint16_t> intact_slots(const LatticePattern& pattern, int lane) const;
   /// The family of the bonds at these slots as arrays; its inverse shape tensor is left alone.
   void load(std::span<const std::uint16_t> slots, FamilyArrays& out) const;
+  std::size_t reverse(std::size_t slot) const noexcept { return slot < half ? slot + half : slot - half; }
+  /// Index into `chunks` of the chunk with this point; -1: none. Filled by the first call of `break_bonds`.
+  std::int32_t chunk_of(std::int64_t point) const noexcept { return chunk_at_[static_cast<std::size_t>(point) / chunk_points]; }
+  /// Breaks the bonds `slot` at `point` and their reverses. Chunks that they touch get patterns of their own; only the lanes that
+  /// they touch are computed anew. Returns the ends, ascending.
+  std::vector<std::int32_t> break_bonds(std::span<const BondChange> changes);
+  /// The patterns of the set-up. Returns the points whose bonds had been broken.
+  std::vector<std::int32_t> mend();
+  /// Live cells among index ... index + 7.
+  std::uint8_t live_bits(std::int64_t index) const noexcept;
   /// K^-1 of a lane with the components of the input axes and the volumes in K [1/m^2 per volume]: what a FamilyView holds.
   void inverse_shape(const LatticePattern& pattern, int lane, double* out) const noexcept;
   std::size_t bytes() const noexcept;
@@ -105,8 +117,20 @@ class LatticeFamilies {
  private:
   void collect_rows();
   void make_blocks();
-  void make_patterns(BondWeight weight);
-  void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, BondWeight weight) const;
+  void make_patterns();
+  /// All that follows from the masks, for some of the lanes.
+  void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, unsigned lanes = 0xff) const;
+  /// Live cells of a chunk, and for each slot those whose far ends are live too.
+  std::uint8_t live_masks(std::int64_t first, std::vector<std::uint8_t>& live_mask) const;
+  LatticePattern& own_pattern(LatticeChunk& chunk);
+
+  BondWeight weight_;
+  std::size_t shared_ = 0;                     ///< patterns of the set-up; the others belong to one chunk each
+  struct Owned {
+    std::int32_t chunk, original;              ///< its pattern at the set-up
+  };
+  std::vector<Owned> owned_;                   ///< of pattern shared_ + k
+  std::vector<std::int32_t> chunk_at_;
 };
 
 }  // namespace perikit

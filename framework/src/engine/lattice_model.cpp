@@ -37,6 +37,7 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip && !laws_.history()),
       pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_ && !laws_.history()),
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
+  if (parts.damage) fracture_.emplace(body_, *parts.damage, bonds_.emplace(families_), skip_);
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
     for (int c = 0; c < row.chunks; ++c) {
@@ -120,19 +121,21 @@ void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
   BatchScratch& s = scratch_.begin_block(b);
   const bool sample = pass.work.work() == Work::sample;
-  if (!sample) zero_rows(block, pass.out);
+  if (!pass.alone()) zero_rows(block, pass.out);
   double energy = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     // Several short runs share one batch.
     int lanes = 0;
+    while (c < block.chunk_end && !pass.wanted(families_.chunks[c].first)) ++c;
     const std::size_t first = c;
-    while (c < block.chunk_end && lanes < batch_points) {
-      const int n = run_length(families_.chunks, c, block.chunk_end, slots_at_once - lanes / chunk_points);
+    while (c < block.chunk_end && lanes < batch_points && pass.wanted(families_.chunks[c].first)) {
+      const int n = pass.only ? 1 : run_length(families_.chunks, c, block.chunk_end, slots_at_once - lanes / chunk_points);
       operator_.gradient(&families_.chunks[c], n, pass.u, s.H + lanes, batch_points);
       if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, s.dH + lanes, batch_points);
       c += static_cast<std::size_t>(n);
       lanes += n * chunk_points;
     }
+    if (lanes == 0) break;
     for (std::size_t i = first; i < c; ++i) {
       const LatticeChunk& chunk = families_.chunks[i];
       const int lane = static_cast<int>(i - first) * chunk_points;
@@ -155,6 +158,7 @@ void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
       pass.work.add_samples(lanes, s, *pass.sums);
       continue;
     }
+    if (pass.only) continue;
     for (std::size_t i = first; i < c; ++i) {
       operator_.stress_to_flux(families_.chunks[i], s.P + static_cast<int>(i - first) * chunk_points, batch_points, flux_, pass.out);
     }
@@ -165,12 +169,16 @@ void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
-  if (pass.work.work() != Work::sample) {
+  if (!pass.alone()) {
     zero_rows(block, pass.out);
     zero_rows(block, flux_);
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
-    const int n = run_length(families_.chunks, c, block.chunk_end, 4);
+    if (!pass.gradient_wanted(families_.chunks[c].first)) {
+      ++c;
+      continue;
+    }
+    const int n = pass.near ? 1 : run_length(families_.chunks, c, block.chunk_end, 4);
     const std::int64_t p = families_.chunks[c].first;
     operator_.gradient(&families_.chunks[c], n, pass.u, gradient_.data() + p, gradient_.stride());
     if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, direction_.data() + p, direction_.stride());
@@ -188,7 +196,7 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
     }
     return;
   }
-  if (!pattern_g_.empty()) {
+  if (static_cast<std::size_t>(chunk.pattern) < pattern_g_.size()) {
     vectors.per_slot = false;
     const std::size_t first = slot / slots_at_once * D * batch_points;
     for (std::size_t c = 0; c < D; ++c) {
@@ -235,6 +243,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   const LatticePattern& pattern = families_.pattern(chunk);
   const LaneFactors& factors = lane_factors();
   const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const bool half = pairs_ && !pass.alone();
   const std::int64_t p = chunk.first;
   if (traits_.selective) {
     for (int k = 0; k < slots; ++k) {
@@ -270,7 +279,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       const int lane = k * chunk_points + l;
       const Pack exists = Pack::load(factors.value[mask] + l) * Pack(slot_weight_[at]);
       (exists * Pack::load(pattern.scale + l)).store(s.weight + lane);
-      if (pairs_ && !sample) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
+      if (half) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
       if (mask == 0xff) continue;
       const Pack keep = Pack::load(factors.value[mask] + l);
       for (int c = 0; c < D * D; ++c) {
@@ -285,12 +294,13 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       }
     }
   }
-  const int bad = pass.work.evaluate(lanes, s, pairs_ && !sample, energy);
+  const int bad = pass.work.evaluate(lanes, s, half, energy);
   if (bad >= 0) return bad;
   if (sample) {
     pass.work.add_samples(lanes, s, *pass.sums);
     return -1;
   }
+  if (pass.only) return -1;
   choose(adjoint);
   for (int c = 0; c < D * D && traits_.selective; ++c) {
     for (int l = 0; l < chunk_points; l += pack_width) {
@@ -306,10 +316,11 @@ template <int D>
 void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
   BatchScratch& s = scratch_.begin_block(b);
-  const std::size_t slots = pairs_ && pass.work.work() != Work::sample ? families_.half : families_.offsets.size();
+  const std::size_t slots = pairs_ && !pass.alone() ? families_.half : families_.offsets.size();
   double energy = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = families_.chunks[c];
+    if (!pass.wanted(chunk.first)) continue;
     for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
       const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
       const int bad = bonds_of_chunk(chunk, slot, n, s, pass, &energy);
@@ -334,12 +345,12 @@ template <int D>
 EvaluationStatus LatticeModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   const std::size_t blocks = families_.blocks.size();
-  const bool sample = pass.work.work() == Work::sample;
+  const bool alone = pass.alone();
   if (traits_.at == EvaluationPoints::points) {
     parallel_for(blocks, [&](std::size_t b) { points_block(b, pass); });
   } else {
     parallel_for(blocks, [&](std::size_t b) { gradient_block(b, pass); });
-    if (sample) {
+    if (alone) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
       families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
@@ -351,7 +362,7 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
       });
     }
   }
-  if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
+  if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
   families_.colouring.for_each([&](std::size_t b) {
     for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
   });
@@ -386,6 +397,19 @@ EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples
 }
 
 template <int D>
+BondUpdate LatticeModel<D>::update_bonds(ConstFieldView u) {
+  if (!fracture_) return {};
+  return fracture_->update(u, [&](const GroupMarks& marks) {
+    return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_, [&](Pass& pass) { return run(pass); });
+  }, [](std::span<const std::int32_t>) {});
+}
+
+template <int D>
+void LatticeModel<D>::restore_bonds(std::span<const BondChange> changes) {
+  if (fracture_) fracture_->restore(changes, [](std::span<const std::int32_t>) {});
+}
+
+template <int D>
 Field LatticeModel<D>::shape_tensor_condition() {
   Field out = body_.make_field(1);
   for (const LatticeChunk& chunk : families_.chunks) std::copy_n(families_.pattern(chunk).condition, chunk_points, out.data() + chunk.first);
@@ -403,10 +427,10 @@ template <int D>
 ModelReport LatticeModel<D>::report() const {
   ModelReport report;
   report.bonds = families_.bonds;
-  report.broken_bonds = families_.broken;
+  report.broken_bonds = families_.broken - families_.failed;
   report.singular_families = families_.singular;
   report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
-                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
+                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + (fracture_ ? fracture_->bytes() : 0);
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);

@@ -5,7 +5,7 @@
 
 #include "batch.hpp"
 #include "bond_kernel.hpp"
-#include "lattice_families.hpp"
+#include "lattice_bonds.hpp"
 #include "lattice_kernels.hpp"
 #include "engine/assembly/assembly.hpp"
 
@@ -25,6 +25,10 @@ class LatticeModel final : public AssemblingModel {
   Field shape_tensor_condition() override;
   Field damage() override;
   ModelReport report() const override;
+  BondUpdate update_bonds(ConstFieldView u) override;
+  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
+  void restore_bonds(std::span<const BondChange> changes) override;
+  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
   const LatticeFamilies& families() const noexcept { return families_; }
   /// Zero in the dead lanes of chunks.
@@ -55,6 +59,8 @@ class LatticeModel final : public AssemblingModel {
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
+  std::optional<LatticeBonds> bonds_;              ///< only with damage
+  std::optional<Fracture> fracture_;
   ScratchPool scratch_;
 };
 

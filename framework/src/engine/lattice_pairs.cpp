@@ -4,8 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <optional>
 
-#include "lattice_families.hpp"
+#include "lattice_bonds.hpp"
 #include "pair_loop.hpp"
 
 namespace perikit {
@@ -34,14 +35,16 @@ class LatticePairs final : public PairLoop {
   }
 
   void families(const Visit& visit) const override;
+  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
+  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(families_); }
   std::size_t blocks() const noexcept override { return families_.blocks.size(); }
   PairCounts counts() const noexcept override {
-    return {families_.bonds, families_.broken, families_.bytes(), families_.bonds * (4 + 8 * (D + 2))};
+    return {families_.bonds, families_.broken - families_.failed, families_.bytes(), families_.bonds * (4 + 8 * (D + 2))};
   }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
-    parallel_for(blocks(), [&](std::size_t b) {
+    if (!pass.only) parallel_for(blocks(), [&](std::size_t b) {
       for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) {
         const LatticeRow& row = families_.rows[r];
         for (int c = 0; c < pass.out.components; ++c) {
@@ -58,19 +61,26 @@ class LatticePairs final : public PairLoop {
         case PairWork::energy: return run_block<PairWork::energy>(b, pass);
       }
     };
-    if (half_ && pass.work != PairWork::energy) families_.colouring.for_each(block);
+    if (at_once(pass)) families_.colouring.for_each(block);
     else parallel_for(blocks(), block);
     return bad();
   }
 
  private:
+  /// Each bond once, for both ends.
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
+
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass) {
     const LatticeBlock& block = families_.blocks[b];
     double energy = 0;
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
       const LatticeChunk& chunk = families_.chunks[c];
-      const int lane = half_ && work != PairWork::energy ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
+      if (pass.only) {
+        if (!pass.only[chunk.first / chunk_points]) continue;
+        for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
+      }
+      const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane < 0) continue;
       report_bad(chunk.first + lane);
       return;
@@ -82,10 +92,13 @@ class LatticePairs final : public PairLoop {
   template <PairWork work, bool half>
   int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
 
+  void family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const;
+
   const Kinematics& law_;
   const PairFields& fields_;
   bool dilatation_, half_;
   LatticeFamilies families_;
+  std::optional<LatticeBonds> bonds_;
   double squared_volume_;
   std::vector<std::array<double, D>> xi_;      ///< by slot, input axes
   AlignedVector<double> length_, omega_;       ///< by slot, one value a lane
@@ -237,8 +250,18 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
 }
 
 template <int D>
+void LatticePairs<D>::family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const {
+  bonds.clear();
+  for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+    if (!families_.body.alive(static_cast<std::size_t>(point + families_.shifts[s]))) continue;
+    const auto xi = families_.bond(s);
+    const bool intact = LatticeFamilies::intact(pattern, s, static_cast<int>(point % chunk_points));
+    bonds.push_back({{xi[0], xi[1], xi[2]}, length_[s * chunk_points], omega_[s * chunk_points], families_.volume, intact ? 1.0 : 0.0});
+  }
+}
+
+template <int D>
 void LatticePairs<D>::families(const Visit& visit) const {
-  const auto alive = [&](std::int64_t index) { return families_.body.alive(static_cast<std::size_t>(index)); };
   std::vector<std::vector<std::int32_t>> chunks(families_.patterns.size() + 1);
   for (const LatticeChunk& chunk : families_.chunks) chunks[static_cast<std::size_t>(chunk.pattern + 1)].push_back(chunk.first);
   std::vector<FamilyBond> bonds;
@@ -249,18 +272,20 @@ void LatticePairs<D>::families(const Visit& visit) const {
     for (int lane = 0; lane < chunk_points; ++lane) {
       if (!(pattern.live >> lane & 1)) continue;
       // All chunks of a pattern have the same live neighbours.
-      if (k > 0 || lane == 0) {
-        bonds.clear();
-        for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
-          if (!alive(chunks[k].front() + lane + families_.shifts[s])) continue;
-          const auto xi = families_.bond(s);
-          bonds.push_back({{xi[0], xi[1], xi[2]}, length_[s * chunk_points], omega_[s * chunk_points], families_.volume, LatticeFamilies::intact(pattern, s, lane)});
-        }
-      }
+      if (k > 0 || lane == 0) family_of(chunks[k].front() + lane, pattern, bonds);
       points.clear();
       for (const std::int32_t first : chunks[k]) points.push_back(first + lane);
       visit(bonds, points);
     }
+  }
+}
+
+template <int D>
+void LatticePairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
+  std::vector<FamilyBond> bonds;
+  for (const std::int32_t p : points) {
+    family_of(p, families_.pattern(families_.chunks[static_cast<std::size_t>(families_.chunk_of(p))]), bonds);
+    visit(bonds, {p});
   }
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "bond_state.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
 #include "perikit/core/simd.hpp"
@@ -26,6 +27,7 @@ struct PairPass {
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
   double* energies = nullptr;     ///< by block
+  const std::uint8_t* only = nullptr;   ///< by group of eight points: others are left alone (dilatation and energy)
 };
 
 /// Point quantities that bonds need.
@@ -39,7 +41,7 @@ struct PairFields {
 struct FamilyBond {
   double xi[3];                   ///< input axes [m]
   double length, omega, volume;
-  bool intact;
+  double integrity;
 };
 
 struct PairCounts {
@@ -52,6 +54,10 @@ class PairLoop {
   virtual ~PairLoop() = default;
   /// Every family once, with all points that have it.
   virtual void families(const Visit& visit) const = 0;
+  /// The families of these points, one by one.
+  virtual void families_of(std::span<const std::int32_t> points, const Visit& visit) const = 0;
+  /// Made on the first call: bodies without damage have no state.
+  virtual BondState& bond_state() = 0;
   virtual std::size_t blocks() const noexcept = 0;
   /// `out` is fully overwritten. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;

@@ -35,7 +35,7 @@ std::array<double, D> axial_stiffness(const Kinematics& law, double modulus, con
 
 double weighted_volume(const std::vector<FamilyBond>& bonds, bool intact_only) {
   double m = 0;
-  for (const FamilyBond& b : bonds) m += b.intact || !intact_only ? b.omega * b.length * b.length * b.volume : 0.0;
+  for (const FamilyBond& b : bonds) m += (intact_only ? b.integrity : 1.0) * b.omega * b.length * b.length * b.volume;
   return m;
 }
 
@@ -51,7 +51,7 @@ std::vector<FamilyBond> regular_family(const Body& body, const InfluenceFunction
   std::vector<double> r, omega;
   const double volume = body.section() * std::pow(body.spacing(), D);
   for (const auto& d : family_offsets(lattice, body.horizon())) {
-    FamilyBond bond{{}, 0, 1, volume, true};
+    FamilyBond bond{{}, 0, 1, volume, 1};
     double square = 0;
     for (std::size_t a = 0; a < D; ++a) {
       bond.xi[a] = d[a] * body.spacing();
@@ -71,70 +71,101 @@ std::vector<FamilyBond> regular_family(const Body& body, const InfluenceFunction
 
 template <int D>
 PairModel<D>::PairModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), law_(parts.kinematics), traits_(law_->traits()), skip_(parts.skip), damage_(body_.make_field(1)) {
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), law_(parts.kinematics), traits_(law_->traits()), skip_(parts.skip), damage_(body_.make_field(1)) {
   const PairLoopParts loop{body_, *parts.influence, *law_, fields_, skip_};
   loop_ = body_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (traits_.dilatation) {
     for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
   }
-  set_moduli(*parts.laws);
-  if (traits_.surface_correction) set_correction(*parts.laws, *parts.influence);
+  set_moduli();
+  if (traits_.surface_correction) set_correction(*parts.influence);
+  if (parts.damage) fracture_.emplace(body_, *parts.damage, loop_->bond_state(), skip_);
 }
 
 template <int D>
-PairPoint PairModel<D>::point(const Laws& laws, std::size_t p) const {
-  return {family_point(body_, laws, p), 0, 1};
+PairPoint PairModel<D>::point(std::size_t p) const {
+  return {family_point(body_, laws_, p), 0, 1};
 }
 
 template <int D>
-void PairModel<D>::set_moduli(const Laws& laws) {
-  Field modulus = body_.make_field(1);
-  std::vector<const MaterialRecord*> warned;
-  loop_->families([&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points) {
-    double whole = 0, intact = 0;
-    for (const FamilyBond& b : bonds) {
-      whole += b.omega * b.volume;
-      intact += b.intact ? b.omega * b.volume : 0.0;
-    }
-    const double m = weighted_volume(bonds, true), share = whole > 0 ? intact / whole : 0.0;
-    PairPoint x;
-    PairModuli moduli;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const auto p = static_cast<std::size_t>(points[k]);
-      damage_.data()[p] = whole > 0 ? 1 - share : 0.0;
-      if (!(m > 0)) {
-        ++lone_;
-        continue;
-      }
-      if (k == 0 || !laws.single()) {
-        x = point(laws, p);
-        x.weighted_volume = m;
-        x.intact = share;
-        moduli = law_->pair_moduli(x);
-        const MaterialRecord* record = &laws.record_of(p);
-        if (std::find(warned.begin(), warned.end(), record) == warned.end()) {
-          const std::string warning = law_->pair_warning(x);
-          if (!warning.empty()) {
-            warned.push_back(record);
-            if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
-          }
+bool PairModel<D>::set_moduli_of(const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points, Field& modulus) {
+  double whole = 0, intact = 0;
+  for (const FamilyBond& b : bonds) {
+    whole += b.omega * b.volume;
+    intact += b.integrity * b.omega * b.volume;
+  }
+  const double m = weighted_volume(bonds, true), share = whole > 0 ? intact / whole : 0.0;
+  PairPoint x;
+  PairModuli moduli;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto p = static_cast<std::size_t>(points[k]);
+    damage_.data()[p] = whole > 0 ? 1 - share : 0.0;
+    if (m > 0 && (k == 0 || !laws_.single())) {
+      x = point(p);
+      x.weighted_volume = m;
+      x.intact = share;
+      moduli = law_->pair_moduli(x);
+      const MaterialRecord* record = &laws_.record_of(p);
+      if (std::find(warned_.begin(), warned_.end(), record) == warned_.end()) {
+        const std::string warning = law_->pair_warning(x);
+        if (!warning.empty()) {
+          warned_.push_back(record);
+          if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
         }
       }
-      modulus.data()[p] = moduli.bond;
-      if (!traits_.dilatation) continue;
-      scale_.data()[p] = D / m;
-      dilatation_modulus_.data()[p] = moduli.dilatation;
     }
+    // A point without bonds is a free mass: nothing to divide by, nothing stored.
+    if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
+    if (!traits_.dilatation) continue;
+    scale_.data()[p] = m > 0 ? D / m : 0.0;
+    dilatation_modulus_.data()[p] = moduli.dilatation;
+  }
+  return m > 0;
+}
+
+template <int D>
+void PairModel<D>::set_moduli() {
+  Field modulus = body_.make_field(1);
+  loop_->families([&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points) {
+    if (!set_moduli_of(bonds, points, modulus)) lone_ += points.size();
   });
-  if (skip_ && laws.single() && traits_.constant_moduli && !traits_.surface_correction) {
-    fields_.uniform = law_->pair_moduli(point(laws, static_cast<std::size_t>(body_.internal().front()))).bond;
+  if (skip_ && laws_.single() && traits_.constant_moduli && !traits_.surface_correction) {
+    fields_.uniform = law_->pair_moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
   } else {
     fields_.modulus = std::move(modulus);
   }
 }
 
 template <int D>
-void PairModel<D>::set_correction(const Laws& laws, const InfluenceFunction& influence) {
+void PairModel<D>::bonds_changed(std::span<const std::int32_t> points) {
+  loop_->families_of(points, [&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& one) { set_moduli_of(bonds, one, fields_.modulus); });
+}
+
+template <int D>
+double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  if (density_.size() == 0) density_ = body_.make_field(2);
+  if (traits_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
+  loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
+  double energy = 0;
+  for (std::size_t p = 0; p < body_.stride(); ++p) {
+    if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
+  }
+  return energy;
+}
+
+template <int D>
+BondUpdate PairModel<D>::update_bonds(ConstFieldView u) {
+  if (!fracture_) return {};
+  return fracture_->update(u, [&](const GroupMarks& marks) { return energy_of(u, marks); }, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+}
+
+template <int D>
+void PairModel<D>::restore_bonds(std::span<const BondChange> changes) {
+  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+}
+
+template <int D>
+void PairModel<D>::set_correction(const InfluenceFunction& influence) {
   fields_.correction = body_.make_field(D);
   const std::vector<FamilyBond> regular = regular_family<D>(body_, influence, traits_.influence);
   // Pre-cracks weaken a body on purpose: the correction is that of the uncut family.
@@ -146,10 +177,10 @@ void PairModel<D>::set_correction(const Laws& laws, const InfluenceFunction& inf
     std::array<double, D> G;
     for (std::size_t k = 0; k < points.size(); ++k) {
       const auto p = static_cast<std::size_t>(points[k]);
-      if (k == 0 || !laws.single()) {
+      if (k == 0 || !laws_.single()) {
         G.fill(1.0);
         if (!bonds.empty()) {
-          const PairPoint x = point(laws, p);
+          const PairPoint x = point(p);
           const auto own = stiffness(bonds, x), exact = stiffness(regular, x);
           for (std::size_t a = 0; a < D; ++a)
             if (own[a] > 0) G[a] = exact[a] / own[a];
@@ -161,8 +192,8 @@ void PairModel<D>::set_correction(const Laws& laws, const InfluenceFunction& inf
 }
 
 template <int D>
-EvaluationStatus PairModel<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density) {
-  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr});
+EvaluationStatus PairModel<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
+  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return status_at(body_, bad);
   const bool rates = w.data != nullptr;
   if (rates) {
@@ -175,6 +206,7 @@ EvaluationStatus PairModel<D>::dilatation(ConstFieldView u, ConstFieldView w, st
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
+    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding, [](std::uint8_t m) { return m != 0; })) return;
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
@@ -243,7 +275,8 @@ ModelReport PairModel<D>::report() const {
   report.singular_families = lone_;
   report.evaluation_points = skip_ ? counts.bonds / 2 : counts.bonds;
   report.bytes = counts.bytes;
-  for (const Field* field : {&damage_, &scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction}) report.bytes += field->bytes();
+  for (const Field* field : {&damage_, &scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
+  if (fracture_) report.bytes += fracture_->bytes();
   report.warnings = warnings_;
   report.skips.push_back({"bond vectors and lengths", body_.lattice() ? "lattice: neighbours lie at fixed shifts" : "recomputed from positions",
                           fmt::format("{:.3g} MB", static_cast<double>(counts.recomputed) / 1e6)});

@@ -1,4 +1,6 @@
 #pragma once
+#include <optional>
+
 #include "pair_loop.hpp"
 #include "engine/assembly/assembly.hpp"
 
@@ -18,16 +20,27 @@ class PairModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return body_.make_field(1); }
   Field damage() override { return damage_; }
   ModelReport report() const override;
+  BondUpdate update_bonds(ConstFieldView u) override;
+  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
+  void restore_bonds(std::span<const BondChange> changes) override;
+  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
  private:
   std::unique_ptr<Assembly> make_assembly(const ModelParts& parts) const override;
-  void set_moduli(const Laws& laws);
-  void set_correction(const Laws& laws, const InfluenceFunction& influence);
-  PairPoint point(const Laws& laws, std::size_t p) const;
+  void set_moduli();
+  /// Moduli and damage of points with the same family; false where it has no intact bond.
+  bool set_moduli_of(const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points, Field& modulus);
+  void bonds_changed(std::span<const std::int32_t> points);
+  /// Strain energy of the marked groups: half of each of their bonds, and their dilatation.
+  double energy_of(ConstFieldView u, const GroupMarks& marks);
+  void set_correction(const InfluenceFunction& influence);
+  PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
-  EvaluationStatus dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density);
+  /// only: groups of points to do, null for all.
+  EvaluationStatus dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only = nullptr);
 
   const Body& body_;
+  const Laws& laws_;
   std::shared_ptr<const Kinematics> law_;
   KinematicsTraits traits_;
   bool skip_;
@@ -37,8 +50,11 @@ class PairModel final : public AssemblingModel {
   Field scale_;                  ///< d/m_i; 0 without bonds
   Field dilatation_modulus_;     ///< k_i
   Field theta_, q_, rate_;
-  std::size_t lone_ = 0;         ///< points without bonds
+  std::size_t lone_ = 0;         ///< points without bonds at the set-up
+  std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
+  std::optional<Fracture> fracture_;
+  Field density_;                ///< work field of energy_of
 };
 
 }  // namespace perikit

@@ -27,6 +27,22 @@ EvaluationStatus run_forces(const Laws& laws, bool selective, std::size_t blocks
   return status;
 }
 
+double run_energy(const Body& body, const Laws& laws, bool selective, std::size_t blocks, ConstFieldView u, const GroupMarks& marks, const BondState& bonds,
+                  const std::function<EvaluationStatus(Pass&)>& run) {
+  std::vector<std::int32_t> points;
+  for (std::size_t p = 0; p < body.stride(); ++p)
+    if (marks[p / padding] && body.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+  GroupMarks near(marks.size(), 0);
+  bonds.mark_families(points, near);
+  const BatchWork work(laws, Work::force, true, selective);
+  std::vector<double> energies(blocks, 0.0);
+  Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
+  run(pass);
+  double energy = 0;
+  for (const double e : energies) energy += e;
+  return energy;
+}
+
 EvaluationStatus run_samples(const Body& body, const Laws& laws, bool selective, ConstFieldView u, PointSamples& s,
                              const std::function<EvaluationStatus(Pass&)>& run) {
   Field weight = body.make_field(1);

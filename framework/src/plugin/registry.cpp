@@ -271,7 +271,7 @@ std::unique_ptr<Material> Registry::material(const PartValues& values) const {
   return implementation_->create<Material>(Kind::material, values, *this);
 }
 std::unique_ptr<Damage> Registry::damage(const PartValues& values) const {
-  throw implementation_->not_made(Kind::damage, values, "the interface of its kind is not part of this version");
+  return implementation_->create<Damage>(Kind::damage, values, *this);
 }
 std::unique_ptr<InfluenceFunction> Registry::influence(const PartValues& values) const {
   return implementation_->create<InfluenceFunction>(Kind::influence, values, *this);

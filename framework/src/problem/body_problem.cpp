@@ -11,7 +11,8 @@
 
 namespace perikit {
 
-BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static) : scene_(scene), body_(scene) {
+BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static)
+    : scene_(scene), damage_law_(scene.damage ? factory.damage(*scene.damage) : nullptr), body_(scene, damage_law_ && !damage_law_->traits().bits) {
   influence_ = factory.influence(*scene_.influence);
   kinematics_ = factory.kinematics(*scene_.kinematics);
   const KinematicsTraits traits = kinematics_->traits();
@@ -22,7 +23,8 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   read_materials(factory);
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());
-  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip});
+  read_damage(quasi_static);
+  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, damage_.get()});
   prepare_history(quasi_static);
   read_initial();
   read_constraints(quasi_static);
@@ -93,7 +95,7 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
 
 bool BodyProblem::advance_history(double) {
   if (laws_->history()) laws_->history()->advance();
-  return false;
+  return damage_ && update_bonds();
 }
 
 void BodyProblem::prepare_history(bool quasi_static) {
@@ -203,6 +205,16 @@ std::vector<std::byte> BodyProblem::snapshot() const {
   scalar(last_step_);
   scalar(step_);
   scalar(energies_);
+  scalar(gains_);
+  scalar(gained_);
+  const std::vector<BondChange> bonds = model_->changed_bonds();
+  scalar(static_cast<std::uint64_t>(bonds.size()));
+  for (const BondChange& b : bonds) {
+    scalar(b.point);
+    scalar(b.far);
+    scalar(b.bond);
+    scalar(b.integrity);
+  }
   scalar(static_cast<std::uint64_t>(numbers_.size()));
   for (const auto& [name, values] : numbers_) {
     scalar(static_cast<std::uint64_t>(name.size()));
@@ -233,6 +245,18 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   last_step_ = in.value<double>();
   step_ = in.value<std::int64_t>();
   energies_ = in.value<Energies>();
+  gains_ = in.value<std::int64_t>();
+  gained_ = in.value<double>();
+  std::vector<BondChange> bonds;
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    BondChange b;
+    b.point = in.value<std::int32_t>();
+    b.far = in.value<std::int32_t>();
+    b.bond = in.value<std::int64_t>();
+    b.integrity = in.value<double>();
+    bonds.push_back(b);
+  }
+  model_->restore_bonds(bonds);
   const auto text = [&] {
     const auto length = in.value<std::uint64_t>();
     if (length > 256) throw InputError("the saved state is damaged");

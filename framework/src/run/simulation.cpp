@@ -63,8 +63,9 @@ std::string Simulation::explanation(const Registry& registry) const {
   for (const Kind kind : all_kinds) known += registry.names(kind).size();
   notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
   if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
+  if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
   if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
-  if (problem_->laws().constant_tangent()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
+  if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
   notes.push_back({"fields that nobody asked for", "computed when written", fmt::format("{} of {} point fields", PointFields::names().size() - std::min(PointFields::names().size(), std::max<std::size_t>(scene_.output.fields.size(), 3)), PointFields::names().size())});
   std::string text = "skipped:\n";

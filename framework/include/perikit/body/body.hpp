@@ -38,7 +38,8 @@ class Crack {
 class Body {
  public:
   /// Throws InputError for an empty body, an empty set, a horizon smaller than the spacing of all points, too many points.
-  explicit Body(const Scene& scene);
+  /// lists: a lattice is treated as a cloud, since every bond has a number of its own.
+  explicit Body(const Scene& scene, bool lists = false);
 
   int dimension() const noexcept { return dimension_; }
   Space space() const noexcept { return space_; }
@@ -75,7 +76,7 @@ class Body {
   std::size_t bytes() const noexcept;
 
  private:
-  void place_lattice(const Scene& scene);
+  void place_lattice(const Scene& scene, bool lists);
   void place_cloud(std::vector<Point> positions, std::vector<double> volumes);
   void collect_sets(const Scene& scene);
 

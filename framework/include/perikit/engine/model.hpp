@@ -3,12 +3,14 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
 #include "perikit/core/block_matrix.hpp"
+#include "perikit/engine/fracture.hpp"
 #include "perikit/engine/laws.hpp"
 #include "perikit/model/kinematics.hpp"
 #include "perikit/model/stabilization.hpp"
@@ -64,6 +66,14 @@ class Model {
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
   virtual Field damage() = 0;
   virtual ModelReport report() const = 0;
+
+  // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
+  /// Lowers the integrity of bonds that u stretches too far, and recomputes what depends on them. To be called after every step.
+  virtual BondUpdate update_bonds(ConstFieldView /*u*/) { return {}; }
+  /// Every bond that is not as it was at the set-up: run state, for checkpoints.
+  virtual std::vector<BondChange> changed_bonds() const { return {}; }
+  virtual void restore_bonds(std::span<const BondChange> /*changes*/) {}
+  virtual BondChecks bond_checks() const { return {}; }
 };
 
 struct ModelParts {
@@ -73,6 +83,7 @@ struct ModelParts {
   const Laws* laws = nullptr;
   std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients of order 1
   bool skip = true;                           ///< false: no savings by symmetry or uniformity
+  const BodyDamage* damage = nullptr;         ///< null: bonds never fail
 };
 
 std::unique_ptr<Model> make_model(const ModelParts& parts);

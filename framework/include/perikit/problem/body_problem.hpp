@@ -45,7 +45,7 @@ class BodyProblem final : public Problem {
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
-  bool advance_history(double time_step) override;
+  bool advance_history(double) override;
 
   bool any_constraint() const noexcept override { return !constrained_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
@@ -56,7 +56,7 @@ class BodyProblem final : public Problem {
 
   double largest_eigenvalue(ConstFieldView u) override;
   double bond_based_time_step() const override;
-  bool constant_stiffness() const noexcept override { return model_->has_gradients() && laws_->constant_tangent(); }
+  bool constant_stiffness() const noexcept override { return model_->has_gradients() && laws_->constant_tangent() && !damage_; }
 
   const Body& body() const noexcept { return body_; }
   Model& model() noexcept { return *model_; }
@@ -69,6 +69,8 @@ class BodyProblem final : public Problem {
   Field acceleration(double t);
   /// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs.
   Field reaction(bool dynamic, double t);
+  /// How bonds failed so far, in words; empty without [damage].
+  std::string fracture_summary() const;
   /// Bytes held by body, model and state.
   std::size_t bytes() const noexcept;
 
@@ -96,6 +98,9 @@ class BodyProblem final : public Problem {
   void read_materials(const PartFactory& factory);
   /// Laws with history: refuses runs that have no steps of a path, and makes room.
   void prepare_history(bool quasi_static);
+  void read_damage(bool quasi_static);
+  /// Lets bonds fail at the present displacement; true where any changed.
+  bool update_bonds();
   void read_initial();
   void read_constraints(bool quasi_static);
   void read_loads(bool quasi_static);
@@ -104,10 +109,12 @@ class BodyProblem final : public Problem {
   std::vector<double> face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const;
 
   Scene scene_;
+  std::shared_ptr<const Damage> damage_law_;   ///< null without [damage]
   Body body_;
   std::shared_ptr<const InfluenceFunction> influence_;
   std::shared_ptr<const Kinematics> kinematics_;
   std::unique_ptr<Laws> laws_;
+  std::unique_ptr<BodyDamage> damage_;
   std::unique_ptr<Model> model_;
   std::vector<Constraint> constraints_;
   std::vector<Load> loads_;
@@ -122,6 +129,8 @@ class BodyProblem final : public Problem {
   double time_ = 0, last_step_ = 0;
   std::int64_t step_ = 0;
   Energies energies_;
+  std::int64_t gains_ = 0;                     ///< updates of bonds that raised the strain energy
+  double gained_ = 0;                          ///< what they added [J]
 };
 
 }  // namespace perikit

@@ -1,6 +1,7 @@
 #pragma once
 /// Everything that a plugin needs.
 #include "perikit/body/influence.hpp"
+#include "perikit/model/damage.hpp"
 #include "perikit/model/kinematics.hpp"
 #include "perikit/model/material.hpp"
 #include "perikit/model/stabilization.hpp"

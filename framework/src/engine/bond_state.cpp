@@ -1,0 +1,64 @@
+#include "bond_state.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+namespace {
+
+bool before(const BondChange& a, const BondChange& b) noexcept { return a.point != b.point ? a.point < b.point : a.bond < b.bond; }
+
+}  // namespace
+
+BondUpdate Fracture::update(ConstFieldView u, const Energy& energy, const Changed& changed) {
+  ++updates_;
+  const std::vector<BondChange> changes = monitor_->find(u);
+  if (changes.empty()) return {};
+  std::vector<std::int32_t> ends;
+  for (const BondChange& c : changes) {
+    ends.push_back(c.point);
+    ends.push_back(c.far);
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  GroupMarks marks(body_.stride() / padding, 0);
+  state_.mark_families(ends, marks);
+  const double held = energy(marks);
+  changed(state_.lower(changes));
+  remember(changes);
+  return {changes.size(), held - energy(marks)};
+}
+
+std::vector<BondChange> Fracture::changes() const {
+  std::vector<BondChange> sorted = log_;
+  std::stable_sort(sorted.begin(), sorted.end(), before);
+  // Of several entries of one bond the last one holds.
+  std::vector<BondChange> present;
+  for (const BondChange& c : sorted) {
+    if (!present.empty() && !before(present.back(), c)) present.pop_back();
+    present.push_back(c);
+  }
+  return present;
+}
+
+void Fracture::remember(std::span<const BondChange> changes) {
+  log_.insert(log_.end(), changes.begin(), changes.end());
+  if (log_.size() < 2 * compact_ + 1024) return;
+  log_ = this->changes();
+  compact_ = log_.size();
+}
+
+void Fracture::restore(std::span<const BondChange> log, const Changed& changed) {
+  changed(state_.mend());
+  log_.assign(log.begin(), log.end());
+  changed(state_.lower(log_));
+  monitor_->forget();
+}
+
+BondChecks Fracture::checks() const {
+  const std::vector<BondChange> present = changes();
+  const auto failed = static_cast<std::size_t>(std::count_if(present.begin(), present.end(), [](const BondChange& c) { return c.integrity == 0; }));
+  return {updates_, updates_ * monitor_->groups(), monitor_->checked(), failed, present.size() - failed};
+}
+
+}  // namespace perikit

@@ -1,0 +1,165 @@
+#include "cloud_bonds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "cloud_rows.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// One point at a time; each bond at the end with the smaller index. Margins are lengths: the ends of a bond move apart by no more than
+/// the diagonal of a box around the motion of its cell and the cells of the partners. Rigid translations count for nothing.
+class CloudMonitor final : public BondMonitor {
+ public:
+  CloudMonitor(const Body& body, const FamilyLists& lists, const CloudBonds& bonds, const BodyDamage& damage, bool skip)
+      : BondMonitor(body, skip), lists_(lists), bonds_(bonds), damage_(damage), position_(reinterpret_cast<const Row*>(body.rows().data())) {
+    make_cells();
+  }
+
+ private:
+  void make_cells();
+  void bound_motion(ConstFieldView u, std::span<double> moved) override;
+  double check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) override;
+
+  const FamilyLists& lists_;
+  const CloudBonds& bonds_;
+  const BodyDamage& damage_;
+  const Row* position_;
+  std::vector<std::vector<std::int32_t>> near_;   ///< by cell: those with partners of its points, itself too
+  std::vector<Row> low_, high_;                   ///< motion by cell
+};
+
+void CloudMonitor::make_cells() {
+  constexpr std::size_t cell_points = 64;   // consecutive points lie near each other
+  const std::size_t n = body_.points(), cells = (n + cell_points - 1) / cell_points;
+  std::vector<Group> groups;
+  std::vector<std::size_t> first;
+  near_.resize(cells);
+  low_.resize(cells);
+  high_.resize(cells);
+  for (std::size_t c = 0; c < cells; ++c) {
+    first.push_back(groups.size());
+    const std::size_t end = std::min(n, (c + 1) * cell_points);
+    for (std::size_t p = c * cell_points; p < end; p += padding) {
+      const std::size_t live = std::min(padding, end - p);
+      groups.push_back({static_cast<std::int32_t>(p), static_cast<std::uint8_t>((1u << live) - 1), 0});
+    }
+    std::vector<std::int32_t>& near = near_[c];
+    near.push_back(static_cast<std::int32_t>(c));
+    for (std::int64_t k = lists_.first[c * cell_points]; k < lists_.first[end]; ++k) {
+      const auto cell = static_cast<std::int32_t>(static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(k)]) / cell_points);
+      if (cell != near.back()) near.push_back(cell);
+    }
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+  }
+  first.push_back(groups.size());
+  set_cells(std::move(groups), std::move(first));
+}
+
+void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  over_cells([&](std::size_t cell) {
+    Row low{infinite, infinite, infinite}, high = -low;
+    for (const Group& group : groups_of(cell))
+      for (int l = 0; l < static_cast<int>(padding); ++l) {
+        if (!(group.live >> l & 1)) continue;
+        for (int c = 0; c < u.components; ++c) {
+          const double step = u.component(c)[group.first + l] - reference_.component(c)[group.first + l];
+          low[c] = std::min(low[c], step);
+          high[c] = std::max(high[c], step);
+        }
+      }
+    low_[cell] = low;
+    high_[cell] = high;
+  });
+  over_cells([&](std::size_t cell) {
+    Row low = low_[cell], high = high_[cell];
+    for (const std::int32_t k : near_[cell]) {
+      const Row below = low_[static_cast<std::size_t>(k)], above = high_[static_cast<std::size_t>(k)];
+      low = below < low ? below : low;
+      high = above > high ? above : high;
+    }
+    double square = 0;
+    for (int c = 0; c < u.components; ++c) square += (high[c] - low[c]) * (high[c] - low[c]);
+    moved[cell] = std::sqrt(square);
+  });
+}
+
+double CloudMonitor::check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) {
+  const double* onset = damage_.onset.data();
+  const double* last = damage_.last().data();
+  double margin = std::numeric_limits<double>::infinity();
+  for (int l = 0; l < static_cast<int>(padding); ++l) {
+    if (!(group.live >> l & 1)) continue;
+    const std::int32_t p = group.first + l;
+    for (std::int64_t k = lists_.first[static_cast<std::size_t>(p)]; k < lists_.first[static_cast<std::size_t>(p) + 1]; ++k) {
+      const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k)];
+      const double b = bonds_[static_cast<std::size_t>(k)];
+      if (j < p || b == 0) continue;
+      // e = (|y|^2 - |xi|^2)/(|y| + |xi|)
+      const Row xi = position_[j] - position_[p];
+      double square = 0, difference = 0;
+      for (int c = 0; c < u.components; ++c) {
+        const double du = u.component(c)[j] - u.component(c)[p];
+        square += xi[c] * xi[c];
+        difference += du * (2 * xi[c] + du);
+      }
+      const double length = std::sqrt(square), e = difference / (std::sqrt(square + difference) + length), limit = 0.5 * (onset[p] + onset[j]);
+      const double left = limit * length - e;
+      if (left > 1e-13 * length) {
+        margin = std::min(margin, left);
+        continue;
+      }
+      alignas(64) double stretch[padding] = {e / length}, start[padding] = {limit}, failure[padding] = {0.5 * (last[p] + last[j])}, now[padding] = {};
+      damage_.law->integrity({1, stretch, start, failure, now});
+      if (now[0] < b) changes.push_back({p, j, k, now[0]});
+      if (std::min(now[0], b) > 0) margin = 0;   // between whole and broken: looked at every time
+    }
+  }
+  return margin;
+}
+
+}  // namespace
+
+std::unique_ptr<BondMonitor> CloudBonds::make_monitor(const BodyDamage& damage, bool skip) const {
+  return std::make_unique<CloudMonitor>(body_, lists_, *this, damage, skip);
+}
+
+std::vector<std::int32_t> CloudBonds::lower(std::span<const BondChange> changes) {
+  std::vector<std::int32_t> ends;
+  for (const BondChange& c : changes) {
+    const auto begin = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(c.far)], end = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(c.far) + 1];
+    integrity_[static_cast<std::size_t>(c.bond)] = c.integrity;
+    integrity_[static_cast<std::size_t>(std::lower_bound(begin, end, c.point) - lists_.neighbour.begin())] = c.integrity;
+    ends.push_back(c.point);
+    ends.push_back(c.far);
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  return ends;
+}
+
+std::vector<std::int32_t> CloudBonds::mend() {
+  std::vector<std::int32_t> points;
+  for (std::size_t p = 0; p < body_.points(); ++p) {
+    const auto begin = integrity_.begin() + lists_.first[p], end = integrity_.begin() + lists_.first[p + 1];
+    if (std::all_of(begin, end, [](double b) { return b == 1; })) continue;
+    points.push_back(static_cast<std::int32_t>(p));
+    std::fill(begin, end, 1.0);
+  }
+  return points;
+}
+
+void CloudBonds::mark_families(std::span<const std::int32_t> points, GroupMarks& marks) const {
+  for (const std::int32_t point : points) {
+    const auto p = static_cast<std::size_t>(point);
+    marks[p / padding] = 1;
+    for (std::int64_t k = lists_.first[p]; k < lists_.first[p + 1]; ++k) marks[static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(k)]) / padding] = 1;
+  }
+}
+
+}  // namespace perikit

@@ -1,0 +1,24 @@
+#pragma once
+#include "bond_state.hpp"
+
+namespace perikit {
+
+/// Bonds of a cloud: one number by directed bond.
+class CloudBonds final : public BondState {
+ public:
+  CloudBonds(const Body& body, const FamilyLists& lists) : body_(body), lists_(lists), integrity_(lists.neighbour.size(), 1.0) {}
+
+  double operator[](std::size_t bond) const noexcept { return integrity_[bond]; }
+  std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip) const override;
+  std::vector<std::int32_t> lower(std::span<const BondChange> changes) override;
+  std::vector<std::int32_t> mend() override;
+  void mark_families(std::span<const std::int32_t> points, GroupMarks& marks) const override;
+  std::size_t bytes() const noexcept { return integrity_.size() * sizeof(double); }
+
+ private:
+  const Body& body_;
+  const FamilyLists& lists_;
+  AlignedVector<double> integrity_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "perikit/problem/body_problem.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// <xi> = int omega xi^d / int omega xi^(d-1) over (0, delta), by the midpoint rule.
+double mean_bond_length(const InfluenceFunction& influence, int dimension, double horizon) {
+  constexpr std::size_t steps = 20000;
+  std::vector<double> r(steps), omega(steps);
+  for (std::size_t k = 0; k < steps; ++k) r[k] = (static_cast<double>(k) + 0.5) / steps;
+  influence.evaluate(r, omega);
+  double above = 0, below = 0;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double weight = omega[k] * std::pow(r[k], dimension - 1);
+    above += weight * r[k];
+    below += weight;
+  }
+  return above / below * horizon;
+}
+
+}  // namespace
+
+void BodyProblem::read_damage(bool quasi_static) {
+  if (!damage_law_) return;
+  const KinematicsTraits traits = kinematics_->traits();
+  const auto refuse = [&](const std::string& found, const std::string& allowed) {
+    throw InputError(scene_.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
+  };
+  if (quasi_static) refuse(fmt::format("integrator \"{}\"", scene_.integrator->type), "integrators of dynamic runs, whose forces are not assembled");
+  if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
+  if (scene_.stabilization) refuse("kinematics.stabilization", "kinematics without one");
+  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) {
+    refuse(fmt::format("kinematics \"{}\", whose stencils are made once", scene_.kinematics->type), "pair laws, and kinematics over the point gradient of order 1");
+  }
+  damage_ = std::make_unique<BodyDamage>();
+  damage_->law = damage_law_;
+  damage_->onset = body_.make_field(1);
+  damage_->failure = body_.make_field(1);
+  DamagePoint at{{body_.space(), body_.section(), body_.horizon(), {}}, mean_bond_length(*influence_, dimension(), body_.horizon())};
+  const bool uniform = laws_->same(static_cast<std::size_t>(body_.internal().front()), static_cast<std::size_t>(body_.internal().back())) && laws_->records().size() == 1;
+  StretchLimits limits;
+  bool equal = true;
+  for (std::size_t k = 0; k < body_.internal().size(); ++k) {
+    const auto p = static_cast<std::size_t>(body_.internal()[k]);
+    if (k == 0 || !uniform) {
+      at.moduli = laws_->moduli(p);
+      try {
+        limits = damage_law_->limits(at);
+      } catch (const std::domain_error& error) {
+        throw InputError(scene_.damage->values.position(""), "damage", error.what());
+      }
+    }
+    damage_->onset.data()[p] = limits.onset;
+    damage_->failure.data()[p] = limits.failure;
+    equal = equal && limits.onset == limits.failure;
+  }
+  for (const std::string& set : scene_.no_fail)
+    for (const std::int32_t p : body_.set(set)) {
+      damage_->onset.data()[p] = damage_->failure.data()[p] = std::numeric_limits<double>::infinity();
+    }
+  if (equal) damage_->failure = Field();
+}
+
+bool BodyProblem::update_bonds() {
+  const BondUpdate update = model_->update_bonds(displacement_);
+  energies_.dissipated += update.released;
+  energies_.strain -= update.released;
+  if (update.released < 0) {
+    ++gains_;
+    gained_ -= update.released;
+  }
+  return update.changed > 0;
+}
+
+std::string BodyProblem::fracture_summary() const {
+  if (!damage_) return {};
+  const BondChecks checks = model_->bond_checks();
+  std::string text = fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, energies_.dissipated);
+  if (checks.groups > 0) {
+    text += fmt::format("bond checks   {} of {} groups of eight points in {} steps ({:.2f} %); the others were too far from failing\n", checks.checked, checks.groups,
+                        checks.updates, 100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
+  }
+  if (gains_ > 0) {
+    text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all ({:.3g} of what was dissipated)\n", gains_, gained_,
+                        gained_ / std::max(energies_.dissipated, 1e-300));
+  }
+  return text;
+}
+
+}  // namespace perikit

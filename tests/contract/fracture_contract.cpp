@@ -1,0 +1,252 @@
+/// What must hold for every kinematics when bonds fail during a run: a body whose bonds have failed is the body that was built
+/// without them, failed bonds never come back, both ends feel the same, energy that is released is accounted for, and a run that is
+/// resumed goes on bitwise.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "tests/contract/integrator_fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+const char* const limit = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.6\n";
+
+/// Height of a plane through the whole body, between two layers of points of a lattice.
+double plane_height(const Body& body) {
+  double low = INFINITY, high = -INFINITY;
+  for (const std::int32_t p : body.internal()) {
+    const double y = body.position(static_cast<std::size_t>(p))[1];
+    low = std::min(low, y);
+    high = std::max(high, y);
+  }
+  return std::round(0.5 * (low + high) / body.spacing()) * body.spacing() + 0.013 * body.spacing();
+}
+
+/// A crack through the whole body at that height, as a scene says it.
+std::string crack_text(const Body& body) {
+  const double y = plane_height(body);
+  if (body.dimension() == 2) return fmt::format("[[crack]]\nsegment = [[-9, {0:.17g}], [99, {0:.17g}]]\n", y);
+  return fmt::format("[[crack]]\npolygon = [[-9, {0:.17g}, -9], [99, {0:.17g}, -9], [99, {0:.17g}, 99], [-9, {0:.17g}, 99]]\n", y);
+}
+
+/// Moves everything above the plane away, so that every bond across it is stretched beyond the limit and no other bond changes.
+void part_at(const Body& body, FieldView u, double height) {
+  set_field(body, u, [&](const Point& x) { return Point{0.0, x[1] > height ? 20 * body.spacing() : 0.0, 0.0}; });
+}
+
+/// A finite deformation with noise in which every direction grows.
+void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed) {
+  deform(body, u, seed, 0.02);
+  for (const std::int32_t p : body.internal()) {
+    const Point x = body.position(static_cast<std::size_t>(p));
+    for (int c = 0; c < u.components; ++c) u.component(c)[p] += 0.2 * x[static_cast<std::size_t>(c)];
+  }
+}
+
+struct Response {
+  double energy = 0;
+  Field force;
+};
+
+Response respond(BodyProblem& problem, std::uint64_t seed) {
+  stretch_at_random(problem.body(), problem.displacement(), seed);
+  Response r{0, problem.make_field(problem.dimension())};
+  const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), r.force, &r.energy);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return r;
+}
+
+double difference(const Body& body, const Field& a, const Field& b) {
+  double most = 0;
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < body.dimension(); ++c) most = std::max(most, std::abs(a.component(c)[p] - b.component(c)[p]));
+  return most;
+}
+
+struct Stretched {
+  std::int32_t point, far;
+  double stretch;
+};
+
+/// The stretch of every pair of the body within the horizon, looked at one by one.
+std::vector<Stretched> stretches(const Body& body, ConstFieldView u) {
+  std::vector<Stretched> all;
+  for (const std::int32_t p : body.internal())
+    for (const std::int32_t q : body.internal()) {
+      if (q <= p) continue;
+      const Point x = body.position(static_cast<std::size_t>(p)), y = body.position(static_cast<std::size_t>(q));
+      double xi2 = 0, y2 = 0;
+      for (int c = 0; c < body.dimension(); ++c) {
+        const double xi = y[static_cast<std::size_t>(c)] - x[static_cast<std::size_t>(c)], du = u.component(c)[q] - u.component(c)[p];
+        xi2 += xi * xi;
+        y2 += (xi + du) * (xi + du);
+      }
+      if (std::sqrt(xi2) <= body.horizon() * (1 + 1e-10)) all.push_back({p, q, std::sqrt(y2 / xi2) - 1});
+    }
+  return all;
+}
+
+/// A limit between two neighbours that leaves this share of the bonds whole.
+double quantile(std::vector<Stretched> all, double share) {
+  std::sort(all.begin(), all.end(), [](const Stretched& a, const Stretched& b) { return a.stretch < b.stretch; });
+  const auto k = static_cast<std::size_t>(share * static_cast<double>(all.size()));
+  return 0.5 * (all[k].stretch + all[k - 1].stretch);
+}
+
+/// Whether the kinematics runs in this dimension and its stencils follow broken bonds; scenes with the others are refused.
+bool suits(const Example& example, int dimension) {
+  const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
+  const KinematicsTraits traits = kinematics->traits();
+  if (traits.at != EvaluationPoints::weighted && (traits.at != EvaluationPoints::points || traits.order == 1)) return true;
+  CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: a body whose bonds have failed is the body that was built without them") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (const bool cloud : {false, true})
+      for (const int d : {2, 3}) {
+        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d)) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const auto whole = build(scene_text(options, kinematics_table(example)));
+        const double height = plane_height(whole->problem().body());
+        options.conditions = limit;
+        const auto failing = build(scene_text(options, kinematics_table(example)));
+        options.conditions = crack_text(whole->problem().body());
+        const auto cut = build(scene_text(options, kinematics_table(example)));
+        BodyProblem& problem = failing->problem();
+        const Body& body = problem.body();
+        // Before anything fails the criterion changes nothing.
+        const Response before = respond(problem, 5), plain = respond(whole->problem(), 5);
+        CHECK(difference(body, before.force, plain.force) == 0);
+        CHECK(before.energy == plain.energy);
+        part_at(body, problem.displacement(), height);
+        const BondUpdate update = problem.model().update_bonds(problem.displacement());
+        CHECK(2 * update.changed == cut->problem().model().report().broken_bonds);
+        CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
+        const Response after = respond(problem, 6), expected = respond(cut->problem(), 6);
+        CHECK(std::abs(after.energy - expected.energy) <= 1e-11 * expected.energy);
+        CHECK(difference(body, after.force, expected.force) <= 1e-10 * largest(body, expected.force));
+        const Field damage = problem.model().damage(), cut_damage = cut->problem().model().damage();
+        for (const std::int32_t p : body.internal()) CHECK(std::abs(damage.data()[p] - cut_damage.data()[p]) <= 1e-12);
+        // At rest again, and closed: nothing heals.
+        set_field(body, problem.displacement(), [](const Point&) { return Point{}; });
+        CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
+        CHECK(problem.model().changed_bonds().size() == update.changed);
+      }
+}
+
+TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bonds that fail at random") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d)) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const auto plain = build(scene_text(options, kinematics_table(example)));
+        stretch_at_random(plain->problem().body(), plain->problem().displacement(), 11);
+        const double most = quantile(stretches(plain->problem().body(), plain->problem().displacement()), 0.95);
+        options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\nno_fail = [\"part\"]\n", most);
+        const std::string text = scene_text(options, kinematics_table(example));
+        const auto simulation = build(text);
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        const auto intact = respond(problem, 11);
+        const BondUpdate update = problem.model().update_bonds(problem.displacement());
+        CHECK(update.changed > 0);
+        Response r = respond(problem, 11);
+        CHECK(std::abs(intact.energy - r.energy - update.released) <= 1e-11 * intact.energy);
+        // Momentum; and force = -dE/du along a random direction.
+        for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, r.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, r.force));
+        Field w = problem.make_field(d), kept = problem.make_field(d), scratch = problem.make_field(d);
+        Noise random(3);
+        set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
+        const FieldView u = problem.displacement();
+        std::copy_n(u.data, u.size(), kept.data());
+        const double h = 1e-5;
+        double energies[2] = {};
+        for (const int side : {0, 1}) {
+          for (std::size_t k = 0; k < u.size(); ++k) u.data[k] = kept.data()[k] + (side == 0 ? -h : h) * w.data()[k];
+          REQUIRE(problem.evaluate_forces(u, scratch, &energies[side]).ok());
+        }
+        const double slope = (energies[1] - energies[0]) / (2 * h);
+        CHECK(slope == doctest::Approx(-dot(body, r.force, w)).epsilon(1e-6));
+        std::copy_n(kept.data(), u.size(), u.data);
+        // No bond of a protected point failed, and every failed one is named once.
+        const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
+        std::set<std::pair<std::int32_t, std::int32_t>> named;
+        for (const BondChange& b : problem.model().changed_bonds()) {
+          CHECK((!safe.contains(b.point) && !safe.contains(b.far)));
+          CHECK(b.integrity == 0);
+          CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
+        }
+        std::size_t expected = 0;
+        for (const Stretched& b : stretches(body, u)) {
+          if (b.stretch <= most || safe.contains(b.point) || safe.contains(b.far)) continue;
+          ++expected;
+          CHECK(named.contains({b.point, b.far}));
+        }
+        CHECK(named.size() == expected);
+        // A fresh problem that takes over the state answers bitwise the same; and one that is taken back is whole again.
+        const std::vector<std::byte> saved = problem.snapshot();
+        const auto other = build(text);
+        const std::vector<std::byte> fresh = other->problem().snapshot();
+        other->problem().restore(saved);
+        const Response same = respond(other->problem(), 11);
+        CHECK(same.energy == r.energy);
+        CHECK(difference(body, same.force, r.force) == 0);
+        other->problem().restore(fresh);
+        const Response mended = respond(other->problem(), 11);
+        CHECK(mended.energy == intact.energy);
+        CHECK(difference(body, mended.force, intact.force) == 0);
+      }
+}
+
+TEST_CASE("kinematics: points without bonds are free masses") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d)) continue;
+        const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        set_field(body, problem.displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
+        CHECK(problem.model().update_bonds(problem.displacement()).released > 0);
+        // Wherever they fly, even onto each other.
+        set_field(body, problem.displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
+        Field force = problem.make_field(d);
+        double energy = 1;
+        REQUIRE(problem.evaluate_forces(problem.displacement(), force, &energy).ok());
+        CHECK(energy == 0);
+        CHECK(largest(body, force) == 0);
+        const Field damage = problem.model().damage();
+        for (const std::int32_t p : body.internal()) CHECK(damage.data()[p] == 1);
+      }
+}
+
+TEST_CASE("kinematics: a scene without damage pays nothing") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (const bool cloud : {false, true}) {
+      INFO(example.part, " (", example.table, ") ", cloud ? "cloud" : "lattice");
+      if (!suits(example, 2)) continue;
+      BodyOptions options{.dimension = 2, .cloud = cloud};
+      const auto plain = build(scene_text(options, kinematics_table(example)));
+      options.conditions = limit;
+      const auto failing = build(scene_text(options, kinematics_table(example)));
+      CHECK(plain->problem().model().report().bytes < failing->problem().model().report().bytes);
+      CHECK(plain->problem().model().update_bonds(plain->problem().displacement()).changed == 0);
+      CHECK(plain->problem().model().bond_checks().updates == 0);
+      CHECK(plain->problem().fracture_summary().empty());
+    }
+}
