@@ -94,7 +94,8 @@ void check(const Options& options) {
 
 void study(const Options& options) {
   const auto registry = open_registry(options);
-  if (options.threads > 0) set_thread_count(options.threads);
+  // Runs side by side share the cores.
+  if (const int threads = options.threads > 0 ? options.threads : std::max(1, thread_count() / options.jobs); threads != thread_count()) set_thread_count(threads);
   const Study study = read_study(options.scene, *registry);
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / study.file.stem() : options.output;
   const auto runner = [&](const Scene& scene, const std::filesystem::path& own) { return run_in_child(scene, *registry, own); };
@@ -102,7 +103,7 @@ void study(const Options& options) {
     if (!options.quiet) fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress);
+  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress, {options.jobs, options.resume});
   const auto done = std::ranges::count(table.rows, "done", &StudyRow::status);
   if (!options.quiet) fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(), study.plot ? " and plot" : "", folder.string());
   if (done == 0) throw RunError(fmt::format("no run of the study came to its end; the first: {}", table.rows.front().reason));
@@ -182,6 +183,8 @@ void add_commands(CLI::App& app, Options& options) {
   study_command->add_option("-o,--output", options.output, "Folder for table, plot and runs; default: out/<study>");
   study_command->add_option("--set", options.overrides, "key=value: overrides a value of the scene in every run");
   study_command->add_option("--threads", options.threads, "Threads of each run; default: all cores")->check(CLI::Range(1, 1024));
+  study_command->add_option("--jobs", options.jobs, "Runs side by side; the default, 1, is for run times that are to be compared")->default_val(1)->check(CLI::Range(1, 1024));
+  study_command->add_flag("--resume", options.resume, "Keep the runs of the folder that are done already");
   study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");
   study_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", draw);

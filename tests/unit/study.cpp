@@ -84,6 +84,7 @@ RunOutcome pretend(const Scene& scene, const fs::path& folder) {
   const double k = scene.constants.at("k");
   if (k == 4 && scene.kinematics->type == "baqp") return {"failed", "det F < 0 at point 3, \"x\" = 1", {}};
   fs::create_directories(folder);
+  std::ofstream(folder / "scene.toml") << scene.resolved;
   std::ofstream(folder / "history.csv") << "step,time\n0,0\n1," << 1.5 * k << "\n2," << k << '\n';
   return {"done", "", {{"run_time", 0.25}}};
 }
@@ -203,6 +204,47 @@ TEST_CASE("the table holds values, quantities, errors and what went wrong; a fai
   CHECK(contains(csv, "5,baqp,4,,,,failed,\"det F < 0 at point 3, \"\"x\"\" = 1\"\n"));
   CHECK(contains(content(folder.path / "out" / "table.md"), "| 2 | conventional | 4 | 6 | 0.25 | 0.25 | done |  |\n"));
   CHECK(fs::exists(folder.path / "out" / "runs" / "4" / "history.csv"));
+}
+
+TEST_CASE("runs side by side give the table of runs one by one") {
+  StudyFolder folder;
+  const Study study = folder.parse(replaced(study_text, "\"baqp\"]", "\"baqp\", \"bapq\"]"));
+  const std::string expected = run_study(study, folder.parts, {}, folder.path / "one", pretend, silent).csv();
+  for (const int jobs : {2, 20}) {
+    const fs::path out = folder.path / fmt::format("side{}", jobs);
+    CHECK(run_study(study, folder.parts, {}, out, pretend, silent, {jobs, false}).csv() == expected);
+    CHECK(content(out / "table.csv") == expected);
+  }
+  // A process that dies takes its own run with it alone.
+  const auto dies = [](const Scene& scene, const fs::path& own) -> RunOutcome {
+    if (scene.constants.at("k") == 2) std::_Exit(3);
+    return pretend(scene, own);
+  };
+  const StudyTable table = run_study(study, folder.parts, {}, folder.path / "dies", dies, silent, {3, false});
+  CHECK(table.rows[1].status == "failed");
+  CHECK(contains(table.rows[1].reason, "left no outcome"));
+  CHECK(table.rows[0].status == "done");
+}
+
+TEST_CASE("a study goes on where it was stopped: what is done is kept, what failed or changed runs again") {
+  StudyFolder folder;
+  const fs::path out = folder.path / "out";
+  const Study study = folder.parse(study_text);
+  const std::string first = run_study(study, folder.parts, {}, out, pretend, silent).csv();
+  std::vector<double> again;
+  const auto counted = [&](const Scene& scene, const fs::path& own) {
+    again.push_back(scene.constants.at("k"));
+    return pretend(scene, own);
+  };
+  fs::remove_all(out / "runs" / "1");
+  CHECK(run_study(study, folder.parts, {}, out, counted, silent, {1, true}).csv() == first);
+  CHECK(again == std::vector<double>{2, 4});   // the one that is gone, and the one that failed
+  again.clear();
+  CHECK(run_study(study, folder.parts, {{"title=\"another\""}, false}, out, counted, silent, {1, true}).csv() == first);
+  CHECK(again.size() == 6);
+  again.clear();
+  run_study(study, folder.parts, {{"title=\"another\""}, false}, out, counted, silent);
+  CHECK(again.size() == 6);
 }
 
 TEST_CASE("reductions over the history") {

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "output/atomic_file.hpp"
 #include "output/history_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"
+#include "run/processes.hpp"
 #include "run/study_plot.hpp"
 #include "scene/diagnostics.hpp"
 
@@ -154,24 +156,63 @@ std::vector<std::vector<std::size_t>> combinations(const Study& study) {
 }
 
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
-                     const StudyRunner& run, const std::function<void(const std::string&)>& progress) {
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how) {
   std::vector<Planned> runs = plan_all(study, parts, options);
-  fs::create_directories(folder);
+  make_folder(folder);
+  for (std::size_t i = 0; i < runs.size(); ++i) runs[i].row.run = i;
+  const auto own = [&](std::size_t i) { return folder / "runs" / fmt::format("{}", i); };
+  std::vector<bool> ended(runs.size(), false);
   StudyTable table{study, {}};
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    StudyRow& row = runs[i].row;
-    progress(fmt::format("run {} of {}: {}", i + 1, runs.size(), described(study, row)));
-    if (runs[i].scene) {
-      const fs::path own = folder / "runs" / fmt::format("{}", i);
-      fill(row, study, run(*runs[i].scene, own), runs[i].references, own);
-    }
-    progress(row.reason.empty() ? row.status : fmt::format("{}: {}", row.status, row.reason));
-    table.rows.push_back(row);
+  const auto write_table = [&] {
+    table.rows.clear();
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      if (ended[i]) table.rows.push_back(runs[i].row);
     write_file_atomically(folder / "table.csv", table.csv());
     write_file_atomically(folder / "table.md", table.markdown());
-    if (stop_requested())
-      throw RunError(
-          fmt::format("stopped by a signal; {} of {} runs are in {}", i + 1, runs.size(), (folder / "table.csv").string()));
+  };
+  const auto end = [&](std::size_t i, const std::string& note) {
+    StudyRow& row = runs[i].row;
+    ended[i] = true;
+    progress(fmt::format("run {} {}{}{}{}", i + 1, row.status, note, row.reason.empty() ? "" : ": ", row.reason));
+    write_table();
+  };
+  const auto take = [&](std::size_t i, const RunOutcome& outcome) { fill(runs[i].row, study, outcome, runs[i].references, own(i)); };
+  Processes processes;
+  const auto collect = [&] {
+    const std::size_t i = processes.wait();
+    const auto outcome = kept_outcome(own(i));
+    take(i, outcome ? *outcome : RunOutcome{"failed", "its process left no outcome", {}});
+    end(i, "");
+  };
+  for (std::size_t i = 0; i < runs.size() && !stop_requested(); ++i) {
+    progress(fmt::format("run {} of {}: {}", i + 1, runs.size(), described(study, runs[i].row)));
+    if (!runs[i].scene) {
+      end(i, "");
+      continue;
+    }
+    const bool same = how.resume && read_text(own(i) / "scene.toml") == runs[i].scene->resolved;
+    if (const auto kept = same ? kept_outcome(own(i)) : std::nullopt; kept && kept->status == "done") {
+      take(i, *kept);
+      end(i, " before");
+      continue;
+    }
+    const auto work = [&run, &scene = *runs[i].scene, path = own(i)] {
+      remove_file(path / "outcome.txt");
+      const RunOutcome outcome = run(scene, path);
+      keep_outcome(path, outcome);
+      return outcome;
+    };
+    if (how.jobs > 1) {
+      processes.start(i, work);
+      if (processes.running() == static_cast<std::size_t>(how.jobs)) collect();
+    } else {
+      take(i, work());
+      end(i, "");
+    }
+  }
+  while (processes.running() > 0) collect();
+  if (stop_requested()) {
+    throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
   }
   if (study.plot) draw(table, folder / "plot.png");
   return table;

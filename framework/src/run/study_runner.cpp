@@ -46,6 +46,8 @@ RunOutcome unpacked(std::string text) {
   return outcome;
 }
 
+constexpr const char* outcome_file = "outcome.txt";
+
 /// What the child writes until it ends; a stop that reaches this process alone is handed on.
 std::string received(int pipe, pid_t child) {
   std::string text;
@@ -103,6 +105,17 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     return failed(error.what());
   }
   return outcome;
+}
+
+void keep_outcome(const fs::path& folder, const RunOutcome& outcome) {
+  make_folder(folder);
+  write_file_atomically(folder / outcome_file, packed(outcome));
+}
+
+std::optional<RunOutcome> kept_outcome(const fs::path& folder) {
+  const std::string text = read_text(folder / outcome_file);
+  if (text.empty() || text.back() != '\0') return std::nullopt;
+  return unpacked(text);
 }
 
 RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const fs::path& folder) {

@@ -21,10 +21,9 @@ std::vector<std::string> header(const Study& study) {
   return columns;
 }
 
-std::vector<std::string> cells(const StudyTable& table, std::size_t index, int digits) {
-  const StudyRow& row = table.rows[index];
+std::vector<std::string> cells(const StudyTable& table, const StudyRow& row, int digits) {
   const auto number = [&](const std::optional<double>& value) { return value ? fmt::format("{:.{}g}", *value, digits) : ""; };
-  std::vector<std::string> texts{fmt::format("{}", index)};
+  std::vector<std::string> texts{fmt::format("{}", row.run)};
   for (const StudyValue& value : row.values) texts.push_back(value.shown);
   for (std::size_t q = 0; q < row.quantities.size(); ++q) {
     texts.push_back(number(row.quantities[q]));
@@ -67,7 +66,7 @@ std::string StudyTable::csv() const {
     text += fmt::format("{}\n", fmt::join(texts, ","));
   };
   line(header(study));
-  for (std::size_t i = 0; i < rows.size(); ++i) line(cells(*this, i, 17));
+  for (const StudyRow& row : rows) line(cells(*this, row, 17));
   return text;
 }
 
@@ -79,7 +78,7 @@ std::string StudyTable::markdown() const {
   };
   line(header(study));
   line(std::vector<std::string>(header(study).size(), "---"));
-  for (std::size_t i = 0; i < rows.size(); ++i) line(cells(*this, i, 6));
+  for (const StudyRow& row : rows) line(cells(*this, row, 6));
   return text;
 }
 

@@ -92,7 +92,17 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::fil
 /// computed in parallel before: a copied process has none of the threads.
 RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
 
+/// The outcome of a run in its folder; nothing where the run came to no end.
+void keep_outcome(const std::filesystem::path& folder, const RunOutcome& outcome);
+std::optional<RunOutcome> kept_outcome(const std::filesystem::path& folder);
+
+struct StudyExecution {
+  int jobs = 1;         ///< runs side by side; more than one disturbs what is measured in seconds
+  bool resume = false;  ///< keep the runs that are done already
+};
+
 struct StudyRow {
+  std::size_t run = 0;                                    ///< index among the combinations
   std::vector<StudyValue> values;                         ///< one for each key
   std::vector<std::optional<double>> quantities, errors;  ///< one for each quantity; errors: |quantity - reference| / |reference|
   std::string status, reason;
@@ -109,12 +119,12 @@ struct StudyTable {
   std::string markdown() const;
 };
 
-/// Runs every combination into folder/runs/<index>, one after the other, and writes folder/table.csv and table.md after each, and
+/// Runs every combination into folder/runs/<index>, `jobs` at a time, and writes folder/table.csv and table.md after each, and
 /// folder/plot.png at the end where the study wants one. A combination that is refused or fails gives a row that says so.
 /// options: for every run; `progress` gets a line before and after each.
 /// Throws InputError where no combination makes a scene, or a quantity or reference does not fit a scene - before the first run;
 /// RunError where a file cannot be written, or request_stop was called (the rows so far are kept).
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const std::filesystem::path& folder,
-                     const StudyRunner& run, const std::function<void(const std::string&)>& progress);
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how = {});
 
 }  // namespace perikit
