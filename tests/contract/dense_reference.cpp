@@ -207,7 +207,8 @@ Operator build(const Cloud& cloud, const Description& description, const std::ve
   if (description.name == "selective") {
     result = build(cloud, description.base ? *description.base : Description{.name = "bond_associated"}, owners);
     result.owner_gradient.resize(cloud.points());
-    for (const int i : chosen) result.owner_gradient[i] = point_gradient(cloud, i, 1, description.singular);
+    const int order = description.base ? description.base->order : 1;
+    for (const int i : chosen) result.owner_gradient[i] = point_gradient(cloud, i, order, description.singular);
     return result;
   }
   Builder builder(cloud, description);

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
+#include "reproducing_kernel.hpp"
 #include "samples.hpp"
 #include "shape_tensor.hpp"
 
@@ -31,7 +33,24 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
       upper_[p] = families_.lists.first[p] + (std::upper_bound(family.begin(), family.end(), static_cast<std::int32_t>(p)) - family.begin());
       scale_[p] = families_.normaliser[p] > 0 ? position_[p][3] / families_.normaliser[p] : 0.0;
     }
+    if (traits_.order > 1) store_stencils();
   }
+}
+
+template <int D>
+void CloudModel<D>::store_stencils() {
+  stencil_.assign(D * families_.bonds(), 0.0);
+  std::atomic<std::size_t> lower{0};
+  parallel_for(blocks(), [&](std::size_t b) {
+    FamilyArrays family;
+    std::vector<double> g;
+    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+      families_.load(p, family);
+      lower += reproducing_kernel(family, body_.horizon(), traits_.order, g) < traits_.order;
+      std::copy(g.begin(), g.end(), stencil_.begin() + D * families_.lists.first[p]);
+    }
+  });
+  fallbacks_ = lower;
 }
 
 template <int D>
@@ -68,9 +87,18 @@ void CloudModel<D>::gradient_lane(std::size_t p, const AlignedVector<Row>& u, do
 
 template <int D>
 void CloudModel<D>::gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept {
-  Row S[D];
-  moments(p, u, S);
-  flux_row(p, S, &H[D * p]);
+  if (stencil_.empty()) {
+    Row S[D];
+    moments(p, u, S);
+    flux_row(p, S, &H[D * p]);
+    return;
+  }
+  Row h[D] = {};
+  for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+    const Row du = u[static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)])] - u[p];
+    for (int e = 0; e < D; ++e) h[e] += stencil_[static_cast<std::size_t>(k * D + e)] * du;
+  }
+  std::copy_n(h, D, &H[D * p]);
 }
 
 template <int D>
@@ -217,6 +245,21 @@ void CloudModel<D>::bonds_block(std::size_t b, Pass& pass) {
 }
 
 template <int D>
+void CloudModel<D>::scatter_block(std::size_t b) noexcept {
+  for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+    const Row* S = &flux_[D * p];
+    Row own{};
+    for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+      Row t{};
+      for (int e = 0; e < D; ++e) t += stencil_[static_cast<std::size_t>(k * D + e)] * S[e];
+      own += t;
+      force_[static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)])] -= t;
+    }
+    force_[p] += own;
+  }
+}
+
+template <int D>
 void CloudModel<D>::divergence(std::size_t p, FieldView out) const noexcept {
   const Row x = position_[p];
   Row f = force_.empty() ? Row{} : force_[p];
@@ -253,10 +296,14 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
     });
     if (sample) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
     else colouring_.for_each([&](std::size_t b) { bonds_block(b, pass); });
-    over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+    if (stencil_.empty()) over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+    else if (!sample) colouring_.for_each([&](std::size_t b) { scatter_block(b); });
   }
   if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
-  over_points([&](std::size_t p) { divergence(p, pass.out); });
+  over_points([&](std::size_t p) {
+    if (stencil_.empty()) return divergence(p, pass.out);
+    for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
+  });
   return {};
 }
 
@@ -283,9 +330,10 @@ ModelReport CloudModel<D>::report() const {
   report.bonds = families_.bonds();
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
+  report.fallbacks = fallbacks_;
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
-  report.bytes = families_.bytes() + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
+  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) + scratch_.bytes();
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {

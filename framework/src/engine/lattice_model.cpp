@@ -45,6 +45,7 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
       if (live != 0xff) partly_dead_.emplace_back(first, live);
     }
   if (traits_.at != EvaluationPoints::bonds) return;
+  if (traits_.order > 1) stencils_.emplace(families_, traits_.order);
   gradient_ = body_.make_field(D * D);
   scale_ = body_.make_field(1);
   for (const LatticeChunk& chunk : families_.chunks) {
@@ -168,6 +169,13 @@ void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
   if (pass.work.work() != Work::sample) {
     zero_rows(block, pass.out);
     zero_rows(block, flux_);
+  }
+  if (stencils_) {
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+      stencils_->gradient(families_.chunks[c], pass.u, gradient_);
+      if (pass.work.tangent()) stencils_->gradient(families_.chunks[c], pass.w, direction_);
+    }
+    return;
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     const int n = run_length(families_.chunks, c, block.chunk_end, 4);
@@ -322,6 +330,27 @@ void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
   if (pass.energies) pass.energies[b] = energy;
 }
 
+/// Adds the adjoint of the point gradient: of Q, or of the stress on Hbar for stored stencils.
+template <int D>
+void LatticeModel<D>::divergence(Pass& pass) const {
+  const auto chunks_of = [&](std::size_t b, auto&& each) {
+    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) each(families_.chunks[c]);
+  };
+  if (stencils_) {
+    families_.colouring.for_each([&](std::size_t b) { chunks_of(b, [&](const LatticeChunk& chunk) { stencils_->adjoint(chunk, flux_, pass.out); }); });
+    return;
+  }
+  families_.colouring.for_each([&](std::size_t b) {
+    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
+  });
+  if (families_.broken == 0) return;
+  parallel_for(families_.blocks.size(), [&](std::size_t b) {
+    chunks_of(b, [&](const LatticeChunk& chunk) {
+      if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
+    });
+  });
+}
+
 template <int D>
 void LatticeModel<D>::clean(FieldView out) const noexcept {
   for (const auto& [first, live] : partly_dead_)
@@ -343,7 +372,7 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
       families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
-      parallel_for(blocks, [&](std::size_t b) {
+      if (!stencils_) parallel_for(blocks, [&](std::size_t b) {
         for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
           const LatticeChunk& chunk = families_.chunks[c];
           operator_.stress_to_flux(chunk, flux_.data() + chunk.first, flux_.stride(), flux_, pass.out);
@@ -352,17 +381,7 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
     }
   }
   if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
-  families_.colouring.for_each([&](std::size_t b) {
-    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
-  });
-  if (families_.broken > 0) {
-    parallel_for(blocks, [&](std::size_t b) {
-      for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
-        const LatticeChunk& chunk = families_.chunks[c];
-        if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
-      }
-    });
-  }
+  divergence(pass);
   clean(pass.out);
   return {};
 }
@@ -405,7 +424,8 @@ ModelReport LatticeModel<D>::report() const {
   report.bonds = families_.bonds;
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
-  report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
+  report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
                  (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();

@@ -7,6 +7,7 @@
 #include "bond_kernel.hpp"
 #include "lattice_families.hpp"
 #include "lattice_kernels.hpp"
+#include "lattice_stencils.hpp"
 #include "engine/assembly/assembly.hpp"
 
 namespace perikit {
@@ -14,6 +15,7 @@ namespace perikit {
 /// Any point or bond kinematics on a lattice. One evaluation runs through fixed blocks:
 ///   points: gradient -> law -> flux                              | divergence
 ///   bonds:  gradient of points | bonds by colour: law, scatter   | flux | divergence
+///   (order 2 and more: stored stencils take the places of the gradient, and of flux and divergence)
 template <int D>
 class LatticeModel final : public AssemblingModel {
  public:
@@ -39,6 +41,7 @@ class LatticeModel final : public AssemblingModel {
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
   void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
+  void divergence(Pass& pass) const;
 
   const Body& body_;
   const Laws& laws_;
@@ -47,7 +50,8 @@ class LatticeModel final : public AssemblingModel {
   bool skip_;
   bool pairs_;                       ///< each bond evaluated once for both ends
   LatticeFamilies families_;
-  LatticeOperator<D> operator_;
+  LatticeOperator<D> operator_;      ///< order 1
+  std::optional<LatticeStencils<D>> stencils_;   ///< higher orders
   Field flux_;                       ///< Q; for bonds also the stress on Hbar
   Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
   Field scale_;                      ///< V_i / N_i of bond weights

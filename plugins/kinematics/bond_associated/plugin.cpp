@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "perikit/core/simd.hpp"
+#include "perikit/sdk/kinematics_options.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -46,7 +47,7 @@ PartDescription description() {
                        .limits = "work grows with the square of the family; domains without a gradient of their own (all of them with the "
                                  "nearest neighbours only) use the whole family"};
   part.parameters.number("bond_horizon_ratio", "-", "radius r of the ball around the far end, to the horizon").by_default("1.0").positive();
-  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  add_bond_weight(part.parameters, BondWeight::volume);
   return part;
 }
 
@@ -54,6 +55,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"), values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"), bond_weight(values));
   });
 }

@@ -30,8 +30,8 @@ PERIKIT_PLUGIN(registrar) {
       {.name = "selective",
        .summary = "any bond-level kinematics with the volume change of the whole family: no volumetric locking",
        .parameters = std::move(table),
-       .examples = {"base = \"baqp\"", "base = { type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", "base = \"projection\"", "base = \"sub_horizon\""},
-       .equations = "Fh = (Jbar_i / Jt_q)^(1/3) Ft_q, Ft_q from the base, Jbar_i from the point gradient of the owner i\n"
+       .examples = {"base = \"baqp\"", "base = { type = \"non_spherical\", n1 = 1.0, n2 = 1.0 }", "base = { type = \"projection\", order = 2 }", "base = \"sub_horizon\""},
+       .equations = "Fh = (Jbar_i / Jt_q)^(1/3) Ft_q, Ft_q from the base, Jbar_i from the point gradient of the owner i (of the order of the base)\n"
                     "forces and tangent by the exact chain rule of Fh(Ft, Fbar)",
        .source = "Scabbia et al., eqs. 24-30, in variational form",
        .limits = "Not in plane or uniaxial stress; not over a base with evaluation points at points."},

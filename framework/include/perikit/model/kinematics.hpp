@@ -82,7 +82,7 @@ enum class PartWeight { equal, volume };    ///< W_q of the admissible parts of 
 
 struct KinematicsTraits {
   EvaluationPoints at = EvaluationPoints::points;
-  int order = 1;                            ///< of the point gradient (point shape; 1 for the others)
+  int order = 1;                            ///< of the point gradient (point and bond shapes)
   BondBase base = BondBase::own;            ///< bond shape
   BondWeight weight = BondWeight::volume;   ///< evaluation points that belong to bonds
   PartWeight part_weight = PartWeight::equal;   ///< evaluation points that belong to parts of the family
