@@ -35,8 +35,9 @@ const LaneFactors& lane_factors() {
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_),
-      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && skip_),
+      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)),
+      slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
     for (int c = 0; c < row.chunks; ++c) {
@@ -47,6 +48,12 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
   if (traits_.at != EvaluationPoints::bonds) return;
   if (traits_.order > 1) stencils_.emplace(families_, traits_.order);
   gradient_ = body_.make_field(D * D);
+  if (traits_.selective) {
+    volume_ = body_.make_field(volume_components);
+    pressure_ = body_.make_field(2);
+    for (const LatticeChunk& chunk : families_.chunks)
+      for (int l = 0; l < chunk_points; ++l) volume_.component(volume_regular)[chunk.first + l] = families_.pattern(chunk).singular >> l & 1 ? 0.0 : 1.0;
+  }
   scale_ = body_.make_field(1);
   for (const LatticeChunk& chunk : families_.chunks) {
     std::memcpy(scale_.data() + chunk.first, families_.pattern(chunk).scale, sizeof families_.whole.scale);
@@ -166,23 +173,65 @@ void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
+  const bool tangent = pass.work.tangent();
   if (pass.work.work() != Work::sample) {
     zero_rows(block, pass.out);
     zero_rows(block, flux_);
-  }
-  if (stencils_) {
-    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
-      stencils_->gradient(families_.chunks[c], pass.u, gradient_);
-      if (pass.work.tangent()) stencils_->gradient(families_.chunks[c], pass.w, direction_);
-    }
-    return;
+    if (traits_.selective) zero_rows(block, pressure_);
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
-    const int n = run_length(families_.chunks, c, block.chunk_end, 4);
-    const std::int64_t p = families_.chunks[c].first;
-    operator_.gradient(&families_.chunks[c], n, pass.u, gradient_.data() + p, gradient_.stride());
-    if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, direction_.data() + p, direction_.stride());
+    const int n = stencils_ ? 1 : run_length(families_.chunks, c, block.chunk_end, 4);
+    const LatticeChunk& chunk = families_.chunks[c];
+    if (stencils_) {
+      stencils_->gradient(chunk, pass.u, gradient_);
+      if (tangent) stencils_->gradient(chunk, pass.w, direction_);
+    } else {
+      operator_.gradient(&chunk, n, pass.u, gradient_.data() + chunk.first, gradient_.stride());
+      if (tangent) operator_.gradient(&chunk, n, pass.w, direction_.data() + chunk.first, direction_.stride());
+    }
     c += static_cast<std::size_t>(n);
+  }
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end && traits_.selective; ++c) {
+    owner_volume(laws_.space(), owner_gradients(families_.chunks[c], tangent), volume_.data() + families_.chunks[c].first, volume_.stride());
+  }
+}
+
+template <int D>
+OwnerGradients LatticeModel<D>::owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept {
+  return {chunk_points, gradient_.stride(), gradient_.data() + chunk.first, tangent ? direction_.data() + chunk.first : nullptr};
+}
+
+/// Volume changes of the owners, and of the far ends after all of them.
+template <int D>
+void LatticeModel<D>::load_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept {
+  for (int c = 0; c < volume_components; ++c) {
+    const double* from = volume_.component(c) + chunk.first;
+    double* to = s.volume + c * batch_points;
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      const Pack own = Pack::load(from + l);
+      for (int k = 0; k < slots; ++k) own.store(to + k * chunk_points + l);
+      for (int k = 0; k < slots && both_ends; ++k) {
+        Pack::load(from + families_.shifts[slot + static_cast<std::size_t>(k)] + l).store(to + (slots + k) * chunk_points + l);
+      }
+    }
+  }
+}
+
+template <int D>
+void LatticeModel<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  for (int c = 0; c < (tangent ? 2 : 1); ++c) {
+    const double* from = c == 0 ? s.pressure : s.pressure_rate;
+    double* to = pressure_.component(c) + chunk.first;
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack own = Pack::load(to + l);
+      for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
+      own.store(to + l);
+      for (int k = 0; k < slots && both_ends; ++k) {
+        const std::size_t at = slot + static_cast<std::size_t>(k);
+        add_to_cells(to + families_.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pattern.mask[at] >> l & ((1u << pack_width) - 1));
+      }
+    }
   }
 }
 
@@ -198,7 +247,7 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
   }
   if (!pattern_g_.empty()) {
     vectors.per_slot = false;
-    const std::size_t first = slot / slots_at_once * D * batch_points;
+    const std::size_t first = slot / slots_at_once * D * batch_points + slot % slots_at_once * chunk_points;
     for (std::size_t c = 0; c < D; ++c) {
       vectors.xi[c] = lane_xi_.data() + first + c * batch_points;
       vectors.g[c] = pattern_g_[static_cast<std::size_t>(chunk.pattern)].data() + first + c * batch_points;
@@ -243,15 +292,11 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   const LatticePattern& pattern = families_.pattern(chunk);
   const LaneFactors& factors = lane_factors();
   const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const bool both_ends = pairs_ && !sample;
   const std::int64_t p = chunk.first;
-  if (traits_.selective) {
-    for (int k = 0; k < slots; ++k) {
-      for (int c = 0; c < D * D; ++c) {
-        std::memcpy(s.Hbar + c * batch_points + k * chunk_points, gradient_.component(c) + p, sizeof(double) * chunk_points);
-        if (tangent) std::memcpy(s.dHbar + c * batch_points + k * chunk_points, direction_.component(c) + p, sizeof(double) * chunk_points);
-      }
-    }
-  }
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
+  if (traits_.selective) load_volumes(chunk, slot, slots, s, both_ends);
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
@@ -268,8 +313,8 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
     if (vectors.per_slot) mean ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
     else mean ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
   };
-  choose(gradient, pass.u, ConstFieldView(gradient_), s.H);
-  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), s.dH);
+  choose(gradient, pass.u, ConstFieldView(gradient_), H);
+  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
   for (int k = 0; k < slots; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t shift = families_.shifts[at];
@@ -278,12 +323,12 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       const int lane = k * chunk_points + l;
       const Pack exists = Pack::load(factors.value[mask] + l) * Pack(slot_weight_[at]);
       (exists * Pack::load(pattern.scale + l)).store(s.weight + lane);
-      if (pairs_ && !sample) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
+      if (both_ends) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
       if (mask == 0xff) continue;
       const Pack keep = Pack::load(factors.value[mask] + l);
       for (int c = 0; c < D * D; ++c) {
-        (keep * Pack::load(s.H + c * batch_points + lane)).store(s.H + c * batch_points + lane);
-        if (tangent) (keep * Pack::load(s.dH + c * batch_points + lane)).store(s.dH + c * batch_points + lane);
+        (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
+        if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
       }
     }
     if (!laws_.single() || sample) {
@@ -293,20 +338,14 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       }
     }
   }
-  const int bad = pass.work.evaluate(lanes, s, pairs_ && !sample, energy);
+  const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
   if (sample) {
     pass.work.add_samples(lanes, s, *pass.sums);
     return -1;
   }
   choose(adjoint);
-  for (int c = 0; c < D * D && traits_.selective; ++c) {
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      Pack own = Pack::load(flux_.component(c) + p + l);
-      for (int k = 0; k < slots; ++k) own += Pack::load(s.bar + c * batch_points + k * chunk_points + l);
-      own.store(flux_.component(c) + p + l);
-    }
-  }
+  if (traits_.selective) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
 }
 
@@ -318,8 +357,8 @@ void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
   double energy = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = families_.chunks[c];
-    for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
-      const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
+    for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
+      const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
       const int bad = bonds_of_chunk(chunk, slot, n, s, pass, &energy);
       if (bad >= 0) {
         pass.report(chunk.first + bad % chunk_points);
@@ -328,6 +367,20 @@ void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
     }
   }
   if (pass.energies) pass.energies[b] = energy;
+}
+
+/// What is left to do with the stress on Hbar once all bonds are in.
+template <int D>
+void LatticeModel<D>::finish_stress(std::size_t b, Pass& pass) {
+  for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
+    const LatticeChunk& chunk = families_.chunks[c];
+    double* const stress = flux_.data() + chunk.first;
+    if (traits_.selective) {
+      add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
+                       stress, flux_.stride());
+    }
+    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, pass.out);
+  }
 }
 
 /// Adds the adjoint of the point gradient: of Q, or of the stress on Hbar for stored stencils.
@@ -372,12 +425,7 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
       families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
-      if (!stencils_) parallel_for(blocks, [&](std::size_t b) {
-        for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
-          const LatticeChunk& chunk = families_.chunks[c];
-          operator_.stress_to_flux(chunk, flux_.data() + chunk.first, flux_.stride(), flux_, pass.out);
-        }
-      });
+      parallel_for(blocks, [&](std::size_t b) { finish_stress(b, pass); });
     }
   }
   if (pass.bad >= 0 || sample) return status_at(body_, pass.bad);
@@ -425,7 +473,7 @@ ModelReport LatticeModel<D>::report() const {
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
   report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
-  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
                  (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();

@@ -41,6 +41,10 @@ class LatticeModel final : public AssemblingModel {
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
   void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
+  void load_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept;
+  void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
+  OwnerGradients owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept;
+  void finish_stress(std::size_t b, Pass& pass);
   void divergence(Pass& pass) const;
 
   const Body& body_;
@@ -55,6 +59,8 @@ class LatticeModel final : public AssemblingModel {
   Field flux_;                       ///< Q; for bonds also the stress on Hbar
   Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
   Field scale_;                      ///< V_i / N_i of bond weights
+  Field volume_, pressure_;          ///< selective: volume changes of points; pressures (and their rates) on them
+  int slots_at_once_;                ///< of a bond batch
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
