@@ -60,7 +60,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const do
 int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   const bool tangent = work_ == Work::tangent;
-  const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.volume, s.inverse, s.growth};
+  const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
   selective_map(laws_.space(), batch, s.H, s.dH);
   if (ends == 2 && !laws_.single()) std::copy_n(s.far, lanes, s.owner + lanes);
   const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, s.P, tangent ? s.other : nullptr);

@@ -28,11 +28,13 @@ struct BatchScratch {
   alignas(64) double du[3 * batch_points];
   alignas(64) double dw[3 * batch_points];
   alignas(64) double t[3 * batch_points];
-  // Selective map: gradients before it and volume changes of the owners by end (to be filled in by the engine), weighted
-  // pressures on the owners by end (result).
+  // Selective map: gradients before it, and where the volume changes of the owners are, by end (to be filled in by the engine),
+  // `volume` a place to gather them; weighted pressures on the owners by end (result).
   alignas(64) double Ht[9 * batch_points];
   alignas(64) double dHt[9 * batch_points];
   alignas(64) double volume[volume_components * batch_points];
+  OwnerVolumes owner_volumes;
+  std::int64_t volume_group[batch_points / padding];
   alignas(64) double pressure[batch_points];
   alignas(64) double pressure_rate[batch_points];
   alignas(64) double inverse[batch_points];
@@ -77,7 +79,7 @@ class BatchWork {
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
-  /// With the selective map gradients come in as s.Ht, s.dHt, with s.volume; s.pressure and s.pressure_rate are results too; both
+  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].

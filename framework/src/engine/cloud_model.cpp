@@ -197,11 +197,16 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
     }
     if (traits_.selective) {
-      for (int l = 0; l < lanes; ++l) {
-        for (int c = 0; c < volume_components; ++c) {
-          s.volume[c * batch_points + l] = volume_[p][c];
-          if (half) s.volume[c * batch_points + lanes + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
-        }
+      // One group for the owner, then those of the far ends.
+      constexpr int group = static_cast<int>(padding);
+      s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular == 0};
+      for (int l = 0; l < lanes; l += group) {
+        s.volume_group[l / group] = 0;
+        if (half) s.volume_group[(lanes + l) / group] = l + group;
+      }
+      for (int c = 0; c < volume_components; ++c) {
+        std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
+        for (int l = 0; l < lanes && half; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
       }
     }
     const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &families_.inverse[6 * p], 0};

@@ -201,20 +201,12 @@ OwnerGradients LatticeModel<D>::owner_gradients(const LatticeChunk& chunk, bool 
   return {chunk_points, gradient_.stride(), gradient_.data() + chunk.first, tangent ? direction_.data() + chunk.first : nullptr};
 }
 
-/// Volume changes of the owners, and of the far ends after all of them.
+/// Volume changes of the owners, and those of the far ends after them.
 template <int D>
-void LatticeModel<D>::load_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept {
-  for (int c = 0; c < volume_components; ++c) {
-    const double* from = volume_.component(c) + chunk.first;
-    double* to = s.volume + c * batch_points;
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      const Pack own = Pack::load(from + l);
-      for (int k = 0; k < slots; ++k) own.store(to + k * chunk_points + l);
-      for (int k = 0; k < slots && both_ends; ++k) {
-        Pack::load(from + families_.shifts[slot + static_cast<std::size_t>(k)] + l).store(to + (slots + k) * chunk_points + l);
-      }
-    }
-  }
+void LatticeModel<D>::point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept {
+  s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, families_.singular == 0};
+  std::fill_n(s.volume_group, slots, chunk.first);
+  for (int k = 0; k < slots && pairs_; ++k) s.volume_group[slots + k] = chunk.first + families_.shifts[slot + static_cast<std::size_t>(k)];
 }
 
 template <int D>
@@ -229,7 +221,7 @@ void LatticeModel<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
       own.store(to + l);
       for (int k = 0; k < slots && both_ends; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
-        add_to_cells(to + families_.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pattern.mask[at] >> l & ((1u << pack_width) - 1));
+        add_to_cells(to + families_.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pack_mask(pattern.mask[at], l));
       }
     }
   }
@@ -296,7 +288,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   const std::int64_t p = chunk.first;
   double* const H = traits_.selective ? s.Ht : s.H;
   double* const dH = traits_.selective ? s.dHt : s.dH;
-  if (traits_.selective) load_volumes(chunk, slot, slots, s, both_ends);
+  if (traits_.selective) point_to_volumes(chunk, slot, slots, s);
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;

@@ -41,7 +41,7 @@ class LatticeModel final : public AssemblingModel {
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
   void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
-  void load_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept;
+  void point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept;
   void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   OwnerGradients owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept;
   void finish_stress(std::size_t b, Pass& pass);

@@ -1,15 +1,17 @@
 #include "lattice_stencils.hpp"
 
-#include "perikit/core/parallel.hpp"
 #include "bond_kernel.hpp"
 #include "local_stencil.hpp"
+#include "perikit/core/parallel.hpp"
 #include "reproducing_kernel.hpp"
 
 namespace perikit {
 
 template <int D>
 LatticeStencils<D>::LatticeStencils(const LatticeFamilies& families, int order)
-    : f_(families), stencil_size_(families.offsets.size() * D * chunk_points), g_((families.patterns.size() + 1) * stencil_size_, 0.0) {
+    : f_(families),
+      stencil_size_(families.offsets.size() * D * chunk_points),
+      g_((families.patterns.size() + 1) * stencil_size_, 0.0) {
   std::vector<std::size_t> lower(f_.patterns.size() + 1, 0), members(lower.size(), 0);
   for (const LatticeChunk& chunk : f_.chunks) ++members[static_cast<std::size_t>(chunk.pattern + 1)];
   parallel_for(lower.size(), [&](std::size_t k) {
@@ -39,7 +41,8 @@ void LatticeStencils<D>::gradient(const LatticeChunk& chunk, ConstFieldView u, F
     for (std::size_t s = 0; s < f_.shifts.size(); ++s) {
       for (int c = 0; c < D; ++c) {
         const Pack du = Pack::load(u.component(c) + p + f_.shifts[s]) - own[c];
-        for (int e = 0; e < D; ++e) sums[c * D + e] += du * Pack::load(g + (s * D + static_cast<std::size_t>(e)) * chunk_points + l);
+        for (int e = 0; e < D; ++e)
+          sums[c * D + e] += du * Pack::load(g + (s * D + static_cast<std::size_t>(e)) * chunk_points + l);
       }
     }
     for (int c = 0; c < D * D; ++c) sums[c].store(H.component(c) + p);
@@ -55,11 +58,12 @@ void LatticeStencils<D>::adjoint(const LatticeChunk& chunk, ConstFieldView S, Fi
     Pack stress[D * D], own[D];
     for (int c = 0; c < D * D; ++c) stress[c] = Pack::load(S.component(c) + p);
     for (std::size_t s = 0; s < f_.shifts.size(); ++s) {
-      const unsigned mask = pattern.mask[s] >> l & ((1u << pack_width) - 1);
+      const std::uint8_t mask = pack_mask(pattern.mask[s], l);
       if (mask == 0) continue;
       for (int c = 0; c < D; ++c) {
         Pack t(0.0);
-        for (int e = 0; e < D; ++e) t += stress[c * D + e] * Pack::load(g + (s * D + static_cast<std::size_t>(e)) * chunk_points + l);
+        for (int e = 0; e < D; ++e)
+          t += stress[c * D + e] * Pack::load(g + (s * D + static_cast<std::size_t>(e)) * chunk_points + l);
         own[c] += t;
         add_to_cells(f.component(c) + p + f_.shifts[s], -t, mask);
       }

@@ -23,11 +23,13 @@ class LatticeStencils {
   std::size_t bytes() const noexcept { return g_.size() * sizeof(double); }
 
  private:
-  const double* stencil(const LatticeChunk& chunk) const noexcept { return g_.data() + static_cast<std::size_t>(chunk.pattern + 1) * stencil_size_; }
+  const double* stencil(const LatticeChunk& chunk) const noexcept {
+    return g_.data() + static_cast<std::size_t>(chunk.pattern + 1) * stencil_size_;
+  }
 
   const LatticeFamilies& f_;
   std::size_t stencil_size_;
-  AlignedVector<double> g_;   ///< [whole, patterns ...][slot][e][lane]
+  AlignedVector<double> g_;  ///< [whole, patterns ...][slot][e][lane]
   std::size_t fallbacks_ = 0;
 };
 

@@ -13,7 +13,8 @@ namespace {
 template <class S>
 Tensor<Pack, S> load_in_space(const double* x, std::size_t stride) noexcept {
   constexpr int d = S::dimension;
-  return Tensor<Pack, S>::map([&](int c) { return c < d * d ? Pack::load(x + static_cast<std::size_t>(c) * stride) : Pack(0.0); });
+  return Tensor<Pack, S>::map(
+      [&](int c) { return c < d * d ? Pack::load(x + static_cast<std::size_t>(c) * stride) : Pack(0.0); });
 }
 
 template <class S>
@@ -43,7 +44,8 @@ template <class S>
 }
 
 template <class S>
-[[gnu::flatten]] void add_stress(const OwnerGradients& in, const double* pressure, const double* rate, double* out, std::size_t stride) noexcept {
+[[gnu::flatten]] void add_stress(const OwnerGradients& in, const double* pressure, const double* rate, double* out,
+                                 std::size_t stride) noexcept {
   for (int l = 0; l < in.n; l += pack_width) {
     const auto Fm = inverse_transpose(load_in_space<S>(in.H + l, in.stride));
     const Pack p = Pack::load(pressure + l);
@@ -57,75 +59,107 @@ template <class S>
   }
 }
 
+Pack load_volume(const OwnerVolumes& owners, int component, int at) noexcept {
+  constexpr int group = static_cast<int>(padding);
+  return Pack::load(owners.data + static_cast<std::size_t>(component) * owners.stride + owners.group[at / group] + at % group);
+}
+
+/// x, or 0 for owners without a gradient.
+Pack regular(const OwnerVolumes& owners, int at, Pack x) noexcept {
+  return owners.all_regular ? x : load_volume(owners, volume_regular, at) * x;
+}
+
 /// a - 1 = cbrt(1 + r) - 1 = r / (a^2 + a + 1) with r = Jbar/Jt - 1: exactly 0 at rest, no digits lost near it.
 struct Growth {
-  const double* volume;
-  Pack jt, inverse, root;   ///< Jt - 1, 1/Jt, Jt^(-1/3)
-  Pack operator()(int at) const noexcept {
-    const Pack r = (Pack::load(volume + volume_jacobian * batch_points + at) - jt) * inverse;
-    const Pack a = Pack::load(volume + volume_root * batch_points + at) * root;
-    return Pack::load(volume + volume_regular * batch_points + at) * (r * reciprocal(a * a + a + Pack(1.0)));
+  Pack jt, inverse, root;  ///< Jt - 1, 1/Jt, Jt^(-1/3)
+  Pack operator()(const OwnerVolumes& owners, int at) const noexcept {
+    const Pack r = (load_volume(owners, volume_jacobian, at) - jt) * inverse, a = load_volume(owners, volume_root, at) * root;
+    return regular(owners, at, r * reciprocal(a * a + a + Pack(1.0)));
   }
 };
 
 /// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = a phi.
-Pack growth_rate(const double* volume, int at, Pack rate) noexcept {
-  return Pack(1.0 / 3.0) * Pack::load(volume + volume_regular * batch_points + at) * (Pack::load(volume + volume_rate * batch_points + at) - rate);
+Pack growth_rate(const OwnerVolumes& owners, int at, Pack rate) noexcept {
+  return regular(owners, at, Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate));
 }
 
-template <class S>
+template <class S, bool tangent>
 [[gnu::flatten]] void map(const SelectiveBatch& in, double* H, double* dH) noexcept {
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ht = load_in_space<S>(in.Ht + l, batch_points), Ft = add_diagonal(Ht, Pack(1.0));
     const Pack jt = jacobian_minus_one(Ht), J = positive_or_nan(jt + Pack(1.0)), inverse = reciprocal(J);
     inverse.store(in.inverse + l);
-    const Growth growth{in.volume, jt, inverse, reciprocal_cbrt(J)};
+    const Growth growth{jt, inverse, reciprocal_cbrt(J)};
     for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
-      const Pack grow = growth(at);
+      const Pack grow = growth(in.volume, at);
       grow.store(in.growth + at);
-      const auto Hh = Ht + grow * Ft;
-      for (int c = 0; c < S::components; ++c) Hh[c].store(H + c * batch_points + at);
+      PERIKIT_UNROLL for (int c = 0; c < S::components; ++c)(Ht[c] + grow * Ft[c]).store(H + c * batch_points + at);
     }
-    if (!in.dHt) continue;
-    const auto dFt = load_in_space<S>(in.dHt + l, batch_points);
-    const Pack rate = inverse * inner(cofactor(Ft), dFt);
-    for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
-      const auto dFh = (Pack::load(in.growth + at) + Pack(1.0)) * (dFt + growth_rate(in.volume, at, rate) * Ft);
-      for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + at);
+    if constexpr (tangent) {
+      const auto dFt = load_in_space<S>(in.dHt + l, batch_points);
+      const Pack rate = inverse * inner(cofactor(Ft), dFt);
+      for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
+        const auto dFh = (Pack::load(in.growth + at) + Pack(1.0)) * (dFt + growth_rate(in.volume, at, rate) * Ft);
+        PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + at);
+      }
     }
   }
+}
+
+/// What the pull-backs of forces and tangents share: W a and W p/3 of one end, the latter stored.
+struct EndOfBond {
+  Pack a, weight, share;
+  EndOfBond(const SelectiveBatch& in, const SelectiveStress& stress, int end, int l) noexcept
+      : a(Pack::load(in.growth + end * in.lanes + l) + Pack(1.0)),
+        weight(Pack(stress.sign) * Pack::load(stress.weight[end] + l)),
+        share(regular(in.volume, end * in.lanes + l, Pack(1.0 / 3.0) * weight * a)) {}
+};
+
+template <class S>
+void store_in_space(const Tensor<Pack, S>& t, double* x) noexcept {
+  PERIKIT_UNROLL for (int c = 0; c < S::dimension * S::dimension; ++c) t[c].store(x + c * batch_points);
 }
 
 template <class S>
 [[gnu::flatten]] void pull_back(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
+    auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
+    Pack sum_p(0.0);
+    for (int end = 0; end < in.ends; ++end) {
+      const EndOfBond bond(in, stress, end, l);
+      const auto P = load<S>(stress.P + end * in.lanes + l);
+      const Pack p = bond.share * inner(P, Ft);
+      p.store(stress.pressure + end * in.lanes + l);
+      sum_p += p;
+      sum = sum + (bond.weight * bond.a) * P;
+    }
+    store_in_space(sum - (sum_p * Pack::load(in.inverse + l)) * cofactor(Ft), stress.S + l);
+  }
+}
+
+/// d(a P - p/3 F^-T) = a (dP + phi P) - dp/3 F^-T + p/3 F^-T dF^T F^-T
+template <class S>
+[[gnu::flatten]] void pull_back_tangent(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0)),
+               dFt = load_in_space<S>(in.dHt + l, batch_points);
     const auto Ftm = Pack::load(in.inverse + l) * cofactor(Ft);
     auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
     Pack sum_p(0.0), sum_dp(0.0);
     for (int end = 0; end < in.ends; ++end) {
       const int at = end * in.lanes + l;
-      const auto P = load<S>(stress.P + at);
-      const Pack weight = Pack(stress.sign) * Pack::load(stress.weight[end] + l), a = Pack::load(in.growth + at) + Pack(1.0);
-      const Pack share = Pack(1.0 / 3.0) * weight * Pack::load(in.volume + volume_regular * batch_points + at);
-      const Pack p = share * (a * inner(P, Ft));
-      p.store(stress.pressure + at);
-      sum_p += p;
-      if (!in.dHt) {
-        sum = sum + (weight * a) * P;
-        continue;
-      }
-      // d(a P - p/3 F^-T) = a (dP + phi P) - dp/3 F^-T + p/3 F^-T dF^T F^-T
-      const auto dFt = load_in_space<S>(in.dHt + l, batch_points), dP = load<S>(stress.dP + at);
+      const EndOfBond bond(in, stress, end, l);
+      const auto P = load<S>(stress.P + at), dP = load<S>(stress.dP + at);
       const Pack phi = growth_rate(in.volume, at, inner(Ftm, dFt));
-      const Pack dp = share * (a * (inner(dP, Ft) + inner(P, dFt + phi * Ft)));
+      const Pack p = bond.share * inner(P, Ft), dp = bond.share * (inner(dP, Ft) + inner(P, dFt + phi * Ft));
+      p.store(stress.pressure + at);
       dp.store(stress.pressure_rate + at);
+      sum_p += p;
       sum_dp += dp;
-      sum = sum + (weight * a) * (dP + phi * P);
+      sum = sum + (bond.weight * bond.a) * (dP + phi * P);
     }
-    sum = sum - (in.dHt ? sum_dp : sum_p) * Ftm;
-    if (in.dHt) sum = sum + sum_p * (Ftm * transpose_times(load_in_space<S>(in.dHt + l, batch_points), Ftm));
-    for (int c = 0; c < S::dimension * S::dimension; ++c) sum[c].store(stress.S + c * batch_points + l);
+    store_in_space(sum - sum_dp * Ftm + sum_p * (Ftm * transpose_times(dFt, Ftm)), stress.S + l);
   }
 }
 
@@ -133,9 +167,12 @@ template <class S>
 template <class F>
 void in_space(Space space, const F& f) noexcept {
   switch (dimension(space)) {
-    case 1: return f(Line());
-    case 2: return f(Plane());
-    default: return f(Solid());
+    case 1:
+      return f(Line());
+    case 2:
+      return f(Plane());
+    default:
+      return f(Solid());
   }
 }
 
@@ -145,16 +182,17 @@ void owner_volume(Space space, const OwnerGradients& in, double* volume, std::si
   in_space(space, [&]<class S>(S) { volume_of<S>(in, volume, stride); });
 }
 
-void add_owner_stress(Space space, const OwnerGradients& in, const double* pressure, const double* pressure_rate, double* S, std::size_t stride) noexcept {
+void add_owner_stress(Space space, const OwnerGradients& in, const double* pressure, const double* pressure_rate, double* S,
+                      std::size_t stride) noexcept {
   in_space(space, [&]<class T>(T) { add_stress<T>(in, pressure, pressure_rate, S, stride); });
 }
 
 void selective_map(Space space, const SelectiveBatch& in, double* H, double* dH) noexcept {
-  in_space(space, [&]<class S>(S) { map<S>(in, H, dH); });
+  in_space(space, [&]<class S>(S) { in.dHt ? map<S, true>(in, H, dH) : map<S, false>(in, H, dH); });
 }
 
 void selective_pull_back(Space space, const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
-  in_space(space, [&]<class S>(S) { pull_back<S>(in, stress); });
+  in_space(space, [&]<class S>(S) { in.dHt ? pull_back_tangent<S>(in, stress) : pull_back<S>(in, stress); });
 }
 
 }  // namespace perikit

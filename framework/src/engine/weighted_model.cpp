@@ -211,9 +211,9 @@ void WeightedModel<D>::keep_owner_gradients(int points, Memory& m, BatchScratch&
     if (tangent) std::copy_n(s.dHt + c * batch_points, 8, m.owner_dH + c * 8);
   }
   owner_volume(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, s.volume, batch_points);
-  std::fill_n(s.volume + volume_regular * batch_points, 8, 1.0);
-  for (int c = 0; c < volume_components; ++c)
-    for (int l = points; l < batch_points; ++l) s.volume[c * batch_points + l] = s.volume[c * batch_points + l % points];
+  for (int c = 0; c < volume_components && points == 1; ++c) std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
+  std::fill(std::begin(s.volume_group), std::end(s.volume_group), 0);
+  s.owner_volumes = {s.volume, batch_points, s.volume_group, true};   // an owner without a gradient has none at its evaluation points either
 }
 
 template <int D>

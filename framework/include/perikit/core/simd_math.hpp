@@ -150,10 +150,14 @@ inline Pack expm1(Pack x) noexcept {
 namespace detail {
 /// x = m 2^(3 third) for normal x > 0, m in [1/2, 4); returns m^(-1/3) to a few units in the last place.
 inline Pack reduced_reciprocal_cbrt(Pack x, Pack& m, Pack& third) noexcept {
-  const Bits exponent = (bits(x) - one_bits) >> 52;
-  const Pack e = to_double(exponent), mantissa = from_bits(bits(x) - (exponent << 52));
-  third = nearest_integer(e * (1.0 / 3.0));
-  m = mantissa * power_of_two(e - 3.0 * third);
+  m = x;
+  third = 0.0;
+  if (any(!((x >= 0.5) & (x < 4.0)))) {   // else this changes nothing
+    const Bits exponent = (bits(x) - one_bits) >> 52;
+    const Pack e = to_double(exponent), mantissa = from_bits(bits(x) - (exponent << 52));
+    third = nearest_integer(e * (1.0 / 3.0));
+    m = mantissa * power_of_two(e - 3.0 * third);
+  }
   // y -> m^(-1/3): y (1 - h)^(-1/3) with h = 1 - m y^3, first from a cubic fit (2.6 %), then to 6e-6 and below rounding
   Pack y = 1.518645700691947 + m * (-0.6744191525243759 + m * (0.19491008005708438 + m * -0.020547832477409447));
   for (int i = 0; i < 2; ++i) {

@@ -31,4 +31,14 @@ inline int gradient_order(const ParameterValues& values) {
   return static_cast<int>(values.integer("order"));
 }
 
+/// force_state = "variational" | "local".
+inline void add_force_state(ParameterTable& table) {
+  table.choice("force_state", {"variational", "local"}, "forces: the derivative of the energy, or the bond's own force state alone (not conservative, for comparison)")
+      .by_default("\"variational\"");
+}
+
+inline ForceState force_state(const ParameterValues& values) {
+  return values.text("force_state") == "local" ? ForceState::local : ForceState::variational;
+}
+
 }  // namespace perikit
