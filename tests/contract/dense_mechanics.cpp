@@ -39,6 +39,12 @@ void subtract_force(const Stencil& stencil, int d, const Tensor& WP, Vector& f) 
   for (const auto& [k, g] : stencil) f.segment(d * k, d) -= in_space * g;
 }
 
+/// T_ij V_j V_i on i and its reaction on j, from the bond's own entry of its stencil.
+void subtract_bond_force(const EvaluationPoint& q, int d, const Tensor& WP, Vector& f) {
+  for (const auto& [k, g] : q.stencil)
+    if (k == q.far) subtract_force({{q.far, g}, {q.owner, -g}}, d, WP, f);
+}
+
 }  // namespace
 
 Tensor gradient(const Stencil& stencil, int d, const Vector& u) {
@@ -92,11 +98,15 @@ Vector force(const Operator& op, const Law& law, const Vector& u) {
   for (const EvaluationPoint& q : op.q) {
     const auto s = stencils(op, q);
     const Tensor H = gradient(*s[0], d, u);
+    const auto subtract_own = [&](const Tensor& P) {
+      if (op.owner_volume.empty()) subtract_force(*s[0], d, q.weight * P, f);
+      else subtract_bond_force(q, d, op.owner_volume[q.owner] * q.volume_share * P, f);
+    };
     if (s.size() == 1) {
-      subtract_force(*s[0], d, q.weight * law.P(H), f);
+      subtract_own(law.P(H));
     } else {
       const Selective r = selective(law, H, gradient(*s[1], d, u));
-      subtract_force(*s[0], d, q.weight * r.S_own, f);
+      subtract_own(r.S_own);
       subtract_force(*s[1], d, q.weight * r.S_bar, f);
     }
   }

@@ -95,7 +95,10 @@ class Builder {
       append_parts(i, out);
     } else {
       for (const int j : family_)
-        if (cloud_.intact(i, j) > 0) out.push_back({i, j, bond_weight(i, j), bond_stencil(i, j)});
+        if (cloud_.intact(i, j) > 0) {
+          out.push_back({i, j, bond_weight(i, j), bond_stencil(i, j)});
+          if (description_.local_force) out.back().volume_share = domain_volume(i, j) / sum_V_;
+        }
     }
   }
 
@@ -140,7 +143,16 @@ class Builder {
     const double limit = description_.name == "bond_augmented" ? description_.singular : description_.poor;   // it holds the whole family
     Stencil g = kernel_gradient(cloud_, i, 1, limit, family_,
                                 [&](int k) { return cloud_.intact(i, k) * bond_influence(i, j, k); });
-    return g.empty() ? own_gradient(i) : g;
+    whole_ = g.empty();
+    return whole_ ? own_gradient(i) : g;
+  }
+
+  /// Of the bond whose stencil was built last; bonds count by their share in the domain.
+  double domain_volume(int i, int j) const {
+    double volume = 0;
+    for (const int k : family_)
+      if (cloud_.omega(i, k) > 0) volume += cloud_.intact(i, k) * (whole_ ? 1.0 : bond_influence(i, j, k) / cloud_.omega(i, k)) * cloud_.volume[k];
+    return volume;
   }
 
   /// omega(xi_ik, xi_ij) of the bond-level sums.
@@ -179,6 +191,7 @@ class Builder {
   std::map<int, Stencil> gradients_;
   std::vector<int> family_;
   double omega0_ = 0, sum_V_ = 0, surviving_ = 0;
+  bool whole_ = false;
 };
 
 }  // namespace
@@ -199,19 +212,23 @@ Stencil point_gradient(const Cloud& cloud, int i, int order, double singular) {
 }
 
 Operator build(const Cloud& cloud, const Description& description, const std::vector<int>& owners) {
-  Operator result{cloud.dimension, cloud.points(), {}, {}};
+  Operator result{cloud.dimension, cloud.points(), {}, {}, {}};
   std::vector<int> chosen = owners;
   if (owners.empty())
     for (int i = 0; i < cloud.points(); ++i) chosen.push_back(i);
 
   if (description.name == "selective") {
-    result = build(cloud, description.base ? *description.base : Description{.name = "bond_associated"}, owners);
+    Description base = description.base ? *description.base : Description{.name = "bond_associated"};
+    base.local_force = base.local_force || description.local_force;
+    result = build(cloud, base, owners);
     result.owner_gradient.resize(cloud.points());
-    for (const int i : chosen) result.owner_gradient[i] = point_gradient(cloud, i, 1, description.singular);
+    const int order = description.base ? description.base->order : 1;
+    for (const int i : chosen) result.owner_gradient[i] = point_gradient(cloud, i, order, description.singular);
     return result;
   }
   Builder builder(cloud, description);
   for (const int i : chosen) builder.append(i, result.q);
+  if (description.local_force) result.owner_volume = cloud.volume;
   return result;
 }
 

@@ -49,6 +49,7 @@ struct Description {
   double n1 = 1, n2 = 1;                              ///< non_spherical
   std::optional<Weight> weight = {};                  ///< bond-level; unset: kernel for baqp, volume for the others
   std::shared_ptr<const Description> base = nullptr;  ///< selective
+  bool local_force = false;                           ///< bond-level: the bond's own force state T_ij, not -dE/du
   /// A moment (of xi / delta) whose smallest eigenvalue is below this fraction of its largest is singular.
   double singular = 1e-10;
   /// The same for parts of families and domains of bonds.
@@ -63,6 +64,7 @@ struct EvaluationPoint {
   int far = -1;       ///< far end of the bond it belongs to, or -1
   double weight = 0;  ///< W_q [m^3]
   Stencil stencil;
+  double volume_share = 0;   ///< volume of the bond's domain over that of the owner's family
 };
 
 struct Operator {
@@ -71,6 +73,7 @@ struct Operator {
   std::vector<EvaluationPoint> q;
   /// selective: stencil of Hbar at each point (empty where it is dead or was not needed); other kinematics: no entries.
   std::vector<Stencil> owner_gradient;
+  std::vector<double> owner_volume;   ///< local_force: V_i; otherwise no entries
 };
 
 /// Evaluation points of the given owners, in their order; no owners: of all points.
@@ -91,7 +94,7 @@ struct Law {
 Tensor gradient(const Stencil&, int dimension, const Vector& u);
 
 double energy(const Operator&, const Law&, const Vector& u);
-/// -dE/du.
+/// -dE/du, or the forces of local force states.
 Vector force(const Operator&, const Law&, const Vector& u);
 /// d2E/du2.
 Matrix stiffness(const Operator&, const Law&, const Vector& u);

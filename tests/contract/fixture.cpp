@@ -78,6 +78,11 @@ std::string Case::label() const {
                      body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
 }
 
+bool Case::conservative() const {
+  const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
+  return subject().registry.kinematics(*part)->traits().force_state == ForceState::variational;
+}
+
 std::vector<Case> cases() {
   std::vector<Case> all;
   for (const Example& example : kinematics_examples()) {

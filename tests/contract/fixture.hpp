@@ -61,6 +61,8 @@ struct Case {
   Example example;
   BodyOptions body;
   std::string label() const;
+  /// Whether the part declares its forces as -dE/du.
+  bool conservative() const;
 };
 /// Every kinematics in every space, on lattices and clouds, intact and cracked.
 std::vector<Case> cases();

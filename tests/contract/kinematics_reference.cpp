@@ -30,6 +30,7 @@ std::optional<reference::Description> description_of(const PartValues& part) {
   if (values.has("n1")) description.n1 = values.number("n1");
   if (values.has("n2")) description.n2 = values.number("n2");
   if (values.has("weight")) description.weight = values.text("weight") == "kernel" ? reference::Weight::kernel : reference::Weight::volume;
+  if (values.has("force_state")) description.local_force = values.text("force_state") == "local";
   if (values.has("base")) {
     const auto base = description_of(values.part("base"));
     if (!base) return std::nullopt;

@@ -120,6 +120,10 @@ TEST_CASE("roots and rational powers") {
   compare(
       "x^(-1/3)", [](Pack a) { return rational_power<-1, 3>(a); }, [](long double a) { return 1 / std::cbrt(a); }, x);
   compare(
+      "reciprocal_cbrt", [](Pack a) { return reciprocal_cbrt(a); }, [](long double a) { return 1 / std::cbrt(a); }, between(1e-300, 1e300), 4.0);
+  compare(
+      "reciprocal_cbrt", [](Pack a) { return reciprocal_cbrt(a); }, [](long double a) { return 1 / std::cbrt(a); }, x, 4.0);
+  compare(
       "x^(5/3)", [](Pack a) { return rational_power<5, 3>(a); }, [](long double a) { return a * std::cbrt(a * a); }, x, 3.0);
   compare(
       "x^(-4/3)", [](Pack a) { return rational_power<-4, 3>(a); }, [](long double a) { return 1 / (a * std::cbrt(a)); }, x, 3.0);

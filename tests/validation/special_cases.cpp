@@ -95,3 +95,51 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
     CHECK_MESSAGE(worst <= 1e-11 * scale, "forces differ by ", worst, " of ", scale);
   }
 }
+
+TEST_CASE("selective leaves evaluation points alone whose owner has no gradient of its own") {
+  registry();
+  // A block with a spur one point wide: the families of its last four points lie on a line.
+  const auto spur = [](bool cloud, const std::string& kinematics) {
+    std::string text = contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 16}, kinematics);
+    const std::string section = "[body.lattice]\n", jitter = "jitter = 0.25";
+    text.insert(text.find(section) + section.size(), "inside = \"x < 8 || (y > 4 && y < 5)\"\n");
+    if (cloud) text.replace(text.find(jitter), jitter.size(), "jitter = 1e-13");
+    auto simulation = contract::build(text);
+    contract::deform(simulation->problem().body(), simulation->problem().displacement(), 61, 0.02);
+    return simulation;
+  };
+  for (const bool cloud : {false, true})
+    for (const char* base : {"baqp", "projection"}) {
+      INFO(base, cloud ? " cloud" : " lattice");
+      const auto plain = spur(cloud, fmt::format("type = \"{}\"", base)), mapped = spur(cloud, fmt::format("type = \"selective\"\nbase = \"{}\"", base));
+      BodyProblem& problem = mapped->problem();
+      const Body& body = problem.body();
+      REQUIRE(problem.model().report().singular_families == 4);
+      PointSamples a, b;
+      REQUIRE(plain->problem().model().sample(plain->problem().displacement(), a).ok());
+      REQUIRE(problem.model().sample(problem.displacement(), b).ok());
+      const Field condition = problem.model().shape_tensor_condition();
+      int same = 0, different = 0;
+      for (const std::int32_t p : body.internal()) {
+        const double before = a.strain_energy_density.data()[p], change = std::abs(b.strain_energy_density.data()[p] - before);
+        if (!std::isfinite(condition.data()[p])) CHECK_MESSAGE(change <= 1e-13 * before, "point on the spur: changed by ", change / before);
+        (change <= 1e-13 * before ? same : different) += 1;
+      }
+      CHECK(same == 4);
+      CHECK(different == static_cast<int>(body.points()) - 4);
+      // Still the derivative of the energy.
+      Field w = problem.make_field(2), f = problem.make_field(2), scratch = problem.make_field(2);
+      contract::Noise random(62);
+      contract::set_field(body, w, [&](const Point&) { return Point{random(), random(), 0}; });
+      REQUIRE(problem.evaluate_forces(problem.displacement(), f, nullptr).ok());
+      const auto energy = [&](double h) {
+        Field u = problem.make_field(2);
+        for (std::size_t k = 0; k < u.size(); ++k) u.data()[k] = problem.displacement().data[k] + h * w.data()[k];
+        double value = 0;
+        REQUIRE(problem.evaluate_forces(u, scratch, &value).ok());
+        return value;
+      };
+      const double h = 2e-3, slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
+      CHECK(std::abs(slope + contract::dot(body, f, w)) <= 1e-7 * contract::largest(body, f) * static_cast<double>(body.points()));
+    }
+}

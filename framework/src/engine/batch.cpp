@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "perikit/core/simd.hpp"
-#include "selective_map.hpp"
 
 namespace perikit {
 
@@ -17,68 +15,85 @@ void ScratchPool::prepare(const Laws& laws) {
   }
 }
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
-  const int d = dimension(laws_.space()), lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
-  const bool tangent = work_ == Work::tangent;
-  const SelectiveArrays map{s.Ht, s.Hbar, tangent ? s.dHt : nullptr, s.dHbar, s.scale};
-  if (selective_) {
-    for (int c = 0; c < d * d; ++c) {
-      std::memcpy(s.Ht + c * batch_points, s.H + c * batch_points, sizeof(double) * static_cast<std::size_t>(lanes));
-      if (tangent) std::memcpy(s.dHt + c * batch_points, s.dH + c * batch_points, sizeof(double) * static_cast<std::size_t>(lanes));
-    }
-    selective_map(laws_.space(), lanes, map, s.H, s.dH);
-  }
+int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept {
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
   batch.points = points;
   if (energy_ || work_ == Work::sample) batch.psi = s.psi;
-  if (tangent) {
-    batch.dH = s.dH;
-    batch.dP = P;
-    if (selective_) batch.P = s.other;
-  } else {
-    batch.P = P;
-  }
+  batch.P = P;
+  if (dP) batch.dH = s.dH;
+  batch.dP = dP;
   if (work_ == Work::sample) batch.lateral = s.lateral;
   if (LawHistory* history = laws_.history()) {
     batch.history = history->next(s.block, s.cursor, n);
     if (work_ != Work::force) batch.history.end = nullptr;
   }
-  const Status status = laws_.evaluate(batch, s.law);
-  if (!status.ok()) return status.inadmissible;
-  if (energy_) {
-    Pack sum_psi(0.0);
-    int l = 0;
-    for (; l + pack_width <= n; l += pack_width) sum_psi += Pack::load(weight + l) * Pack::load(s.psi + l);
-    double total = sum(sum_psi);
-    for (; l < n; ++l) total += weight[l] * s.psi[l];
-    *energy += total;
-  }
+  return laws_.evaluate(batch, s.law).inadmissible;
+}
+
+namespace {
+
+/// sum of W psi.
+double weighted_energy(int n, const double* weight, const double* psi) noexcept {
+  Pack sum_psi(0.0);
+  int l = 0;
+  for (; l + pack_width <= n; l += pack_width) sum_psi += Pack::load(weight + l) * Pack::load(psi + l);
+  double total = sum(sum_psi);
+  for (; l < n; ++l) total += weight[l] * psi[l];
+  return total;
+}
+
+}  // namespace
+
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
+  const int d = dimension(laws_.space());
+  const bool tangent = work_ == Work::tangent;
+  const int bad = evaluate_laws(n, s, points, tangent ? nullptr : P, tangent ? P : nullptr);
+  if (bad >= 0) return bad;
+  if (energy_) *energy += weighted_energy(n, weight, s.psi);
   if (work_ == Work::sample) return -1;
-  if (selective_) selective_pull_back(laws_.space(), lanes, map, tangent ? s.other : P, P, P, s.bar);
   const double sign = tangent ? -1.0 : 1.0;
   for (int l = 0; l < n; l += pack_width) {
     const Pack w = Pack::load(weight + l) * Pack(sign);
-    for (int c = 0; c < d * d; ++c) {
-      (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
-      if (selective_) (w * Pack::load(s.bar + c * batch_points + l)).store(s.bar + c * batch_points + l);
-    }
+    for (int c = 0; c < d * d; ++c) (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
   }
   return -1;
 }
 
+int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept {
+  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  const bool tangent = work_ == Work::tangent;
+  const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
+  selective_map(laws_.space(), batch, s.H, s.dH);
+  if (ends == 2 && !laws_.single()) std::copy_n(s.far, lanes, s.owner + lanes);
+  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, s.P, tangent ? s.other : nullptr);
+  if (bad >= 0) return bad % lanes;
+  if (energy_) {
+    *energy += weighted_energy(n, s.weight, s.psi);
+    if (ends == 2) *energy += weighted_energy(n, s.far_weight, s.psi + lanes);
+  }
+  if (work_ == Work::sample) return -1;
+  selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
+  return -1;
+}
+
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
+  if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
   if (!both_ends) return pass(n, s, owners, s.weight, s.P, energy);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
   bool differ = false;
-  for (int l = 0; l < n; ++l) {
-    if (laws_.single() || laws_.same(static_cast<std::size_t>(s.owner[l]), static_cast<std::size_t>(s.far[l]))) {
-      s.weight[l] += s.far_weight[l];
-      s.far_weight[l] = 0;
-    } else {
-      differ = true;
+  if (laws_.single()) {
+    for (int l = 0; l < n; ++l) s.weight[l] += s.far_weight[l];
+  } else {
+    for (int l = 0; l < n; ++l) {
+      if (laws_.same(static_cast<std::size_t>(s.owner[l]), static_cast<std::size_t>(s.far[l]))) {
+        s.weight[l] += s.far_weight[l];
+        s.far_weight[l] = 0;
+      } else {
+        differ = true;
+      }
     }
   }
   int bad = pass(n, s, owners, s.weight, s.P, energy);

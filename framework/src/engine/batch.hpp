@@ -9,6 +9,7 @@
 
 #include "perikit/core/parallel.hpp"
 #include "perikit/engine/laws.hpp"
+#include "selective_map.hpp"
 
 namespace perikit {
 
@@ -27,13 +28,17 @@ struct BatchScratch {
   alignas(64) double du[3 * batch_points];
   alignas(64) double dw[3 * batch_points];
   alignas(64) double t[3 * batch_points];
-  // Selective map: gradients before it, gradients of the owners (to be filled in by the engine), stress on them (result).
+  // Selective map: gradients before it, and where the volume changes of the owners are, by end (to be filled in by the engine),
+  // `volume` a place to gather them; weighted pressures on the owners by end (result).
   alignas(64) double Ht[9 * batch_points];
   alignas(64) double dHt[9 * batch_points];
-  alignas(64) double Hbar[9 * batch_points];
-  alignas(64) double dHbar[9 * batch_points];
-  alignas(64) double bar[9 * batch_points];
-  alignas(64) double scale[batch_points];
+  alignas(64) double volume[volume_components * batch_points];
+  OwnerVolumes owner_volumes;
+  std::int64_t volume_group[batch_points / padding];
+  alignas(64) double pressure[batch_points];
+  alignas(64) double pressure_rate[batch_points];
+  alignas(64) double inverse[batch_points];
+  alignas(64) double growth[batch_points];
   alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
   alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
   alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
@@ -80,13 +85,17 @@ class BatchWork {
   bool tangent() const noexcept { return work_ == Work::tangent; }
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
-  /// s.P <- sum of W P (force) or -W A:dH (tangent); with the selective map also s.bar, the stress on Hbar. Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
+  /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
  private:
   int pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept;
+  int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
+  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept;
 
   const Laws& laws_;
   Work work_;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "perikit/core/simd.hpp"
+#include "perikit/core/tensor.hpp"
 #include "perikit/engine/laws.hpp"
 
 namespace perikit {
@@ -67,7 +68,7 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
     Pack own_u[D], own_H[D * D];
     for (int c = 0; c < D; ++c) own_u[c] = Pack::load(u.component(c) + p + l);
-    for (int c = 0; c < D * D; ++c) own_H[c] = Pack::load(Hbar.component(c) + p + l);
+    for (int c = 0; c < D * D; ++c) own_H[c] = Pack(mean ? 0.5 : 1.0) * Pack::load(Hbar.component(c) + p + l);
     for (int k = 0; k < slots; ++k) {
       const std::int64_t far = p + shifts[k] + l;
       const int lane = k * static_cast<int>(padding) + l;
@@ -81,7 +82,7 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
         Pack z = Pack::load(u.component(c) + far) - own_u[c];
         for (int e = 0; e < D; ++e) {
           a[e] = own_H[c * D + e];
-          if constexpr (mean) a[e] = Pack(0.5) * (a[e] + Pack::load(Hbar.component(c * D + e) + far));
+          if constexpr (mean) a[e] += Pack(0.5) * Pack::load(Hbar.component(c * D + e) + far);
           z -= a[e] * xi[e];
         }
         for (int e = 0; e < D; ++e) (a[e] + z * g[e]).store(H + (c * D + e) * batch_points + lane);
@@ -90,15 +91,15 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
   }
 }
 
+/// Bits of the lanes l ... l + pack_width - 1 of a mask.
+inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
+  return static_cast<std::uint8_t>(mask >> l & ((1u << pack_width) - 1));
+}
+
 /// to[lanes of mask] += value; other cells are not touched.
-inline void add_to_cells(double* to, Pack value, unsigned mask) noexcept {
-  constexpr unsigned all = (1u << pack_width) - 1;
-  if (mask == all) {
-    (Pack::load(to) + value).store(to);
-    return;
-  }
-  for (int l = 0; l < pack_width; ++l)
-    if (mask >> l & 1) to[l] += value[l];
+inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
+  if (mask == pack_mask(0xff, 0)) (Pack::load(to) + value).store(to);
+  else subtract_at(to, mask, -value);
 }
 
 /// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the stress
@@ -108,34 +109,37 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
                           FieldView force, FieldView stress) noexcept {
   const Pack share(mean ? 0.5 : 1.0);
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
+    // Every loop over components is unrolled whole: sums of the owners stay in registers.
     Pack own_t[D], own_S[D * D];
     for (int k = 0; k < slots; ++k) {
-      const unsigned mask = masks[k] >> l & ((1u << pack_width) - 1);
+      const std::uint8_t mask = pack_mask(masks[k], l);
       if (mask == 0) continue;
       const std::int64_t far = p + shifts[k] + l;
       const int lane = k * static_cast<int>(padding) + l;
-      Pack xi[D], g[D];
-      for (int e = 0; e < D; ++e) {
-        xi[e] = bond_value<per_slot>(v.xi[e], lane);
-        g[e] = bond_value<per_slot>(v.g[e], lane);
-      }
-      for (int c = 0; c < D; ++c) {
-        Pack w[D], t(0.0);
-        for (int e = 0; e < D; ++e) {
-          w[e] = Pack::load(WP + (c * D + e) * batch_points + lane);
-          t += w[e] * g[e];
+      Pack t[D], S[D * D];
+      PERIKIT_UNROLL for (int c = 0; c < D; ++c) {
+        t[c] = Pack(0.0);
+        PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+          S[c * D + e] = Pack::load(WP + (c * D + e) * batch_points + lane);
+          t[c] += S[c * D + e] * bond_value<per_slot>(v.g[e], lane);
         }
-        own_t[c] += t;
-        add_to_cells(force.component(c) + far, -t, mask);
-        for (int e = 0; e < D; ++e) {
-          const Pack S = share * (w[e] - t * xi[e]);
-          own_S[c * D + e] += S;
-          if constexpr (mean) add_to_cells(stress.component(c * D + e) + far, S, mask);
+        own_t[c] += t[c];
+        PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+          S[c * D + e] = share * (S[c * D + e] - t[c] * bond_value<per_slot>(v.xi[e], lane));
+          own_S[c * D + e] += S[c * D + e];
         }
       }
+      const auto scatter = [&](auto&& add) {
+        PERIKIT_UNROLL for (int c = 0; c < D; ++c) add(force.component(c) + far, -t[c]);
+        if constexpr (mean) {
+          PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) add(stress.component(c) + far, S[c]);
+        }
+      };
+      if (mask == pack_mask(0xff, 0)) scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
+      else scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
     }
-    for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
-    for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
   }
 }
 

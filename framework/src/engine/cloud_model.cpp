@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
+#include "reproducing_kernel.hpp"
 #include "samples.hpp"
 #include "shape_tensor.hpp"
 
@@ -14,7 +16,7 @@ namespace perikit {
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && parts.skip && !laws_.history()),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.skip && !laws_.history()),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
@@ -32,7 +34,29 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
       upper_[p] = families_.lists.first[p] + (std::upper_bound(family.begin(), family.end(), static_cast<std::int32_t>(p)) - family.begin());
       scale_[p] = families_.normaliser[p] > 0 ? position_[p][3] / families_.normaliser[p] : 0.0;
     }
+    if (traits_.order > 1) store_stencils();
+    if (traits_.selective) {
+      volume_.resize(n);
+      pressure_.resize(n);
+      for (std::size_t p = 0; p < n; ++p) volume_[p][volume_regular] = std::isfinite(families_.condition.data()[p]) ? 1.0 : 0.0;
+    }
   }
+}
+
+template <int D>
+void CloudModel<D>::store_stencils() {
+  stencil_.assign(D * families_.bonds(), 0.0);
+  std::atomic<std::size_t> lower{0};
+  parallel_for(blocks(), [&](std::size_t b) {
+    FamilyArrays family;
+    std::vector<double> g;
+    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+      families_.load(p, family);
+      lower += reproducing_kernel(family, body_.horizon(), traits_.order, g) < traits_.order;
+      std::copy(g.begin(), g.end(), stencil_.begin() + D * families_.lists.first[p]);
+    }
+  });
+  fallbacks_ = lower;
 }
 
 template <int D>
@@ -69,9 +93,18 @@ void CloudModel<D>::gradient_lane(std::size_t p, const AlignedVector<Row>& u, do
 
 template <int D>
 void CloudModel<D>::gradient_rows(std::size_t p, const AlignedVector<Row>& u, AlignedVector<Row>& H) const noexcept {
-  Row S[D];
-  moments(p, u, S);
-  flux_row(p, S, &H[D * p]);
+  if (stencil_.empty()) {
+    Row S[D];
+    moments(p, u, S);
+    flux_row(p, S, &H[D * p]);
+    return;
+  }
+  Row h[D] = {};
+  for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+    const Row du = u[static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)])] - u[p];
+    for (int e = 0; e < D; ++e) h[e] += stencil_[static_cast<std::size_t>(k * D + e)] * du;
+  }
+  std::copy_n(h, D, &H[D * p]);
 }
 
 template <int D>
@@ -123,6 +156,8 @@ template <int D>
 int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy) {
   const bool sample = pass.work.work() == Work::sample, tangent = pass.work.tangent(), mean = traits_.base == BondBase::mean;
   const bool half = pairs_ && !pass.alone();
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
   double* xi = s.bond[0];
   double* g = s.bond[1];
   double* length = s.bond[2];
@@ -140,8 +175,8 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       }
     }
   };
-  for (std::int64_t begin = half ? upper_[p] : families_.lists.first[p]; begin < families_.lists.first[p + 1]; begin += batch_points) {
-    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, families_.lists.first[p + 1] - begin));
+  for (std::int64_t begin = half ? upper_[p] : families_.lists.first[p]; begin < families_.lists.first[p + 1]; begin += bonds_at_once()) {
+    const int n = static_cast<int>(std::min<std::int64_t>(bonds_at_once(), families_.lists.first[p + 1] - begin));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
     for (int l = 0; l < lanes; ++l) {
       const bool real = l < n;
@@ -167,18 +202,23 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
     }
     if (traits_.selective) {
-      for (int c = 0; c < D; ++c)
-        for (int e = 0; e < D; ++e)
-          for (int l = 0; l < lanes; ++l) {
-            s.Hbar[(c * D + e) * batch_points + l] = gradient_[D * p + static_cast<std::size_t>(e)][c];
-            if (tangent) s.dHbar[(c * D + e) * batch_points + l] = direction_[D * p + static_cast<std::size_t>(e)][c];
-          }
+      // One group for the owner, then those of the far ends.
+      constexpr int group = static_cast<int>(padding);
+      s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular == 0};
+      for (int l = 0; l < lanes; l += group) {
+        s.volume_group[l / group] = 0;
+        if (half) s.volume_group[(lanes + l) / group] = l + group;
+      }
+      for (int c = 0; c < volume_components; ++c) {
+        std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
+        for (int l = 0; l < lanes && half; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
+      }
     }
     const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &families_.inverse[6 * p], 0};
     kinematics_->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
-    bond_gradient<D, false>(lanes, vectors, s.A, s.du, s.H);
-    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, s.dH);
+    bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
+    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, dH);
     const int bad = pass.work.evaluate(n, s, half, energy);
     if (bad >= 0) return bad;
     if (sample) {
@@ -199,14 +239,61 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
         Row stress{};
         for (int c = 0; c < D; ++c) stress[c] = share * s.P[(c * D + e) * batch_points + l];
         own_stress[e] += stress;
-        for (int c = 0; c < D && traits_.selective; ++c) own_stress[e][c] += s.bar[(c * D + e) * batch_points + l];
         if (mean) flux_[D * j + static_cast<std::size_t>(e)] += stress;
+      }
+    }
+    if (traits_.selective) {
+      const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };
+      for (int l = 0; l < n; ++l) {
+        pressure_[p] += pressure(l);
+        if (half) pressure_[static_cast<std::size_t>(s.far[l])] += pressure(lanes + l);
       }
     }
     force_[p] += own;
     for (int e = 0; e < D; ++e) flux_[D * p + static_cast<std::size_t>(e)] += own_stress[e];
   }
   return -1;
+}
+
+/// Eight points at a time: rows of gradients to lanes.
+template <int D>
+static OwnerGradients gather_gradients(const AlignedVector<Row>& rows, std::size_t first, std::size_t n, double* H) noexcept {
+  for (int c = 0; c < D; ++c)
+    for (int e = 0; e < D; ++e)
+      for (std::size_t l = 0; l < padding; ++l) H[static_cast<std::size_t>(c * D + e) * padding + l] = l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
+  return {static_cast<int>(padding), padding, H, nullptr};
+}
+
+template <int D>
+void CloudModel<D>::volumes_block(std::size_t b, bool tangent) noexcept {
+  double H[9 * padding], dH[9 * padding], volume[volume_components * padding] = {};
+  const std::size_t end = std::min(body_.points(), (b + 1) * block_points);
+  for (std::size_t first = b * block_points; first < end; first += padding) {
+    const std::size_t n = std::min(padding, end - first);
+    OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
+    if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
+    owner_volume(laws_.space(), owners, volume, padding);
+    for (std::size_t l = 0; l < n; ++l)
+      for (const int c : {volume_jacobian, volume_root, volume_rate}) volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
+  }
+}
+
+template <int D>
+void CloudModel<D>::pressures_block(std::size_t b, bool tangent) noexcept {
+  double H[9 * padding], dH[9 * padding], pressure[2][padding] = {};
+  const std::size_t end = std::min(body_.points(), (b + 1) * block_points);
+  for (std::size_t first = b * block_points; first < end; first += padding) {
+    const std::size_t n = std::min(padding, end - first);
+    OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
+    if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
+    double stress[9 * padding] = {};
+    for (std::size_t l = 0; l < n; ++l)
+      for (int c = 0; c < 2; ++c) pressure[c][l] = pressure_[first + l][c];
+    add_owner_stress(laws_.space(), owners, pressure[0], pressure[1], stress, padding);
+    for (std::size_t l = 0; l < n; ++l)
+      for (int c = 0; c < D; ++c)
+        for (int e = 0; e < D; ++e) flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
+  }
 }
 
 template <int D>
@@ -221,6 +308,21 @@ void CloudModel<D>::bonds_block(std::size_t b, Pass& pass) {
     }
   }
   if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void CloudModel<D>::scatter_block(std::size_t b) noexcept {
+  for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
+    const Row* S = &flux_[D * p];
+    Row own{};
+    for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k) {
+      Row t{};
+      for (int e = 0; e < D; ++e) t += stencil_[static_cast<std::size_t>(k * D + e)] * S[e];
+      own += t;
+      force_[static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)])] -= t;
+    }
+    force_[p] += own;
+  }
 }
 
 template <int D>
@@ -258,13 +360,20 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
       if (pass.work.tangent()) gradient_rows(p, w_, direction_);
       force_[p] = Row{};
       for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
+      if (traits_.selective) pressure_[p] = Row{};
     });
+    if (traits_.selective) parallel_for(blocks(), [&](std::size_t b) { volumes_block(b, pass.work.tangent()); });
     if (alone) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
     else colouring_.for_each([&](std::size_t b) { bonds_block(b, pass); });
-    if (!alone) over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+    if (traits_.selective && !alone) parallel_for(blocks(), [&](std::size_t b) { pressures_block(b, pass.work.tangent()); });
+    if (stencil_.empty() && !alone) over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
+    else if (!alone) colouring_.for_each([&](std::size_t b) { scatter_block(b); });
   }
   if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
-  over_points([&](std::size_t p) { divergence(p, pass.out); });
+  over_points([&](std::size_t p) {
+    if (stencil_.empty()) return divergence(p, pass.out);
+    for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
+  });
   return {};
 }
 
@@ -304,10 +413,12 @@ ModelReport CloudModel<D>::report() const {
   report.bonds = families_.bonds();
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
+  report.fallbacks = fallbacks_;
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
-  report.bytes = families_.bytes() + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
-                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size()) * sizeof(Row) + scratch_.bytes() + (fracture_ ? fracture_->bytes() : 0);
+  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() + pressure_.size()) * sizeof(Row) +
+                 scratch_.bytes() + (fracture_ ? fracture_->bytes() : 0);
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {
     report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", report.bonds / 2, report.bonds)});

@@ -42,10 +42,17 @@ class CloudModel final : public AssemblingModel {
   void gradient_lane(std::size_t p, const AlignedVector<Row>& u, double* H, int lane) const noexcept;
   void points_block(std::size_t b, Pass& pass);
   void bonds_block(std::size_t b, Pass& pass);
+  void store_stencils();
   int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy);
+  /// selective: volume changes of the points of the block; its stress on their gradients, from the pressures.
+  void volumes_block(std::size_t b, bool tangent) noexcept;
+  void pressures_block(std::size_t b, bool tangent) noexcept;
+  /// force_ += G^T S for the block, S the stress on Hbar (stored stencils).
+  void scatter_block(std::size_t b) noexcept;
   /// Rows of Q = S K^-1 from rows of S.
   void flux_row(std::size_t p, const Row* S, Row* Q) const noexcept;
   void divergence(std::size_t p, FieldView out) const noexcept;
+  int bonds_at_once() const noexcept { return traits_.selective && pairs_ ? batch_points / 2 : batch_points; }
   std::size_t blocks() const noexcept { return (body_.points() + block_points - 1) / block_points; }
 
   const Body& body_;
@@ -57,12 +64,15 @@ class CloudModel final : public AssemblingModel {
   CloudFamilies families_;
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index (bonds)
   AlignedVector<double> scale_;                ///< V_i / N_i (bonds)
+  AlignedVector<double> stencil_;              ///< g[D * bond + e] of point gradients of order 2 and more
+  std::size_t fallbacks_ = 0;                  ///< points of a lower order than asked for
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                   ///< mirrors
   AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point
   AlignedVector<Row> flux_;                    ///< S, then Q; likewise
   AlignedVector<Row> force_;                   ///< scattered bond forces
   std::optional<Fracture> fracture_;
+  AlignedVector<Row> volume_, pressure_;       ///< selective: volume changes of points; pressures on them and their rates
   ScratchPool scratch_;
 };
 

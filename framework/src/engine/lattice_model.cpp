@@ -35,8 +35,9 @@ const LaneFactors& lane_factors() {
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip && !laws_.history()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && !traits_.selective && skip_ && !laws_.history()),
-      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)) {
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && skip_),
+      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)),
+      slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
   if (parts.damage) fracture_.emplace(body_, *parts.damage, bonds_.emplace(families_), skip_);
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
@@ -46,7 +47,14 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
       if (live != 0xff) partly_dead_.emplace_back(first, live);
     }
   if (traits_.at != EvaluationPoints::bonds) return;
+  if (traits_.order > 1) stencils_.emplace(families_, traits_.order);
   gradient_ = body_.make_field(D * D);
+  if (traits_.selective) {
+    volume_ = body_.make_field(volume_components);
+    pressure_ = body_.make_field(2);
+    for (const LatticeChunk& chunk : families_.chunks)
+      for (int l = 0; l < chunk_points; ++l) volume_.component(volume_regular)[chunk.first + l] = families_.pattern(chunk).singular >> l & 1 ? 0.0 : 1.0;
+  }
   scale_ = body_.make_field(1);
   for (const LatticeChunk& chunk : families_.chunks) {
     std::memcpy(scale_.data() + chunk.first, families_.pattern(chunk).scale, sizeof families_.whole.scale);
@@ -169,20 +177,62 @@ void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
+  const bool tangent = pass.work.tangent();
   if (!pass.alone()) {
     zero_rows(block, pass.out);
     zero_rows(block, flux_);
+    if (traits_.selective) zero_rows(block, pressure_);
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     if (!pass.gradient_wanted(families_.chunks[c].first)) {
       ++c;
       continue;
     }
-    const int n = pass.near ? 1 : run_length(families_.chunks, c, block.chunk_end, 4);
-    const std::int64_t p = families_.chunks[c].first;
-    operator_.gradient(&families_.chunks[c], n, pass.u, gradient_.data() + p, gradient_.stride());
-    if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, direction_.data() + p, direction_.stride());
+    const int n = stencils_ || pass.near ? 1 : run_length(families_.chunks, c, block.chunk_end, 4);
+    const LatticeChunk& chunk = families_.chunks[c];
+    if (stencils_) {
+      stencils_->gradient(chunk, pass.u, gradient_);
+      if (tangent) stencils_->gradient(chunk, pass.w, direction_);
+    } else {
+      operator_.gradient(&chunk, n, pass.u, gradient_.data() + chunk.first, gradient_.stride());
+      if (tangent) operator_.gradient(&chunk, n, pass.w, direction_.data() + chunk.first, direction_.stride());
+    }
     c += static_cast<std::size_t>(n);
+  }
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end && traits_.selective; ++c) {
+    if (!pass.gradient_wanted(families_.chunks[c].first)) continue;
+    owner_volume(laws_.space(), owner_gradients(families_.chunks[c], tangent), volume_.data() + families_.chunks[c].first, volume_.stride());
+  }
+}
+
+template <int D>
+OwnerGradients LatticeModel<D>::owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept {
+  return {chunk_points, gradient_.stride(), gradient_.data() + chunk.first, tangent ? direction_.data() + chunk.first : nullptr};
+}
+
+/// Volume changes of the owners, and those of the far ends after them.
+template <int D>
+void LatticeModel<D>::point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept {
+  s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, families_.singular == 0};
+  std::fill_n(s.volume_group, slots, chunk.first);
+  for (int k = 0; k < slots && pairs_; ++k) s.volume_group[slots + k] = chunk.first + families_.shifts[slot + static_cast<std::size_t>(k)];
+}
+
+template <int D>
+void LatticeModel<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  for (int c = 0; c < (tangent ? 2 : 1); ++c) {
+    const double* from = c == 0 ? s.pressure : s.pressure_rate;
+    double* to = pressure_.component(c) + chunk.first;
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack own = Pack::load(to + l);
+      for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
+      own.store(to + l);
+      for (int k = 0; k < slots && both_ends; ++k) {
+        const std::size_t at = slot + static_cast<std::size_t>(k);
+        add_to_cells(to + families_.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pack_mask(pattern.mask[at], l));
+      }
+    }
   }
 }
 
@@ -198,7 +248,7 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
   }
   if (static_cast<std::size_t>(chunk.pattern) < pattern_g_.size()) {
     vectors.per_slot = false;
-    const std::size_t first = slot / slots_at_once * D * batch_points;
+    const std::size_t first = slot / slots_at_once * D * batch_points + slot % slots_at_once * chunk_points;
     for (std::size_t c = 0; c < D; ++c) {
       vectors.xi[c] = lane_xi_.data() + first + c * batch_points;
       vectors.g[c] = pattern_g_[static_cast<std::size_t>(chunk.pattern)].data() + first + c * batch_points;
@@ -243,16 +293,11 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   const LatticePattern& pattern = families_.pattern(chunk);
   const LaneFactors& factors = lane_factors();
   const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
-  const bool half = pairs_ && !pass.alone();
+  const bool both_ends = pairs_ && !pass.alone();
   const std::int64_t p = chunk.first;
-  if (traits_.selective) {
-    for (int k = 0; k < slots; ++k) {
-      for (int c = 0; c < D * D; ++c) {
-        std::memcpy(s.Hbar + c * batch_points + k * chunk_points, gradient_.component(c) + p, sizeof(double) * chunk_points);
-        if (tangent) std::memcpy(s.dHbar + c * batch_points + k * chunk_points, direction_.component(c) + p, sizeof(double) * chunk_points);
-      }
-    }
-  }
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
+  if (traits_.selective) point_to_volumes(chunk, slot, slots, s);
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
@@ -269,8 +314,8 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
     if (vectors.per_slot) mean ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
     else mean ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
   };
-  choose(gradient, pass.u, ConstFieldView(gradient_), s.H);
-  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), s.dH);
+  choose(gradient, pass.u, ConstFieldView(gradient_), H);
+  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
   for (int k = 0; k < slots; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t shift = families_.shifts[at];
@@ -279,12 +324,12 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       const int lane = k * chunk_points + l;
       const Pack exists = Pack::load(factors.value[mask] + l) * Pack(slot_weight_[at]);
       (exists * Pack::load(pattern.scale + l)).store(s.weight + lane);
-      if (half) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
+      if (both_ends) (exists * Pack::load(scale_.data() + p + shift + l)).store(s.far_weight + lane);
       if (mask == 0xff) continue;
       const Pack keep = Pack::load(factors.value[mask] + l);
       for (int c = 0; c < D * D; ++c) {
-        (keep * Pack::load(s.H + c * batch_points + lane)).store(s.H + c * batch_points + lane);
-        if (tangent) (keep * Pack::load(s.dH + c * batch_points + lane)).store(s.dH + c * batch_points + lane);
+        (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
+        if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
       }
     }
     if (!laws_.single() || sample) {
@@ -294,7 +339,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
       }
     }
   }
-  const int bad = pass.work.evaluate(lanes, s, half, energy);
+  const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
   if (sample) {
     pass.work.add_samples(lanes, s, *pass.sums);
@@ -302,13 +347,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   }
   if (pass.only) return -1;
   choose(adjoint);
-  for (int c = 0; c < D * D && traits_.selective; ++c) {
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      Pack own = Pack::load(flux_.component(c) + p + l);
-      for (int k = 0; k < slots; ++k) own += Pack::load(s.bar + c * batch_points + k * chunk_points + l);
-      own.store(flux_.component(c) + p + l);
-    }
-  }
+  if (traits_.selective) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
 }
 
@@ -321,8 +360,8 @@ void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = families_.chunks[c];
     if (!pass.wanted(chunk.first)) continue;
-    for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
-      const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
+    for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
+      const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
       const int bad = bonds_of_chunk(chunk, slot, n, s, pass, &energy);
       if (bad >= 0) {
         pass.report(chunk.first + bad % chunk_points);
@@ -331,6 +370,41 @@ void LatticeModel<D>::bonds_block(std::size_t b, Pass& pass) {
     }
   }
   if (pass.energies) pass.energies[b] = energy;
+}
+
+/// What is left to do with the stress on Hbar once all bonds are in.
+template <int D>
+void LatticeModel<D>::finish_stress(std::size_t b, Pass& pass) {
+  for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
+    const LatticeChunk& chunk = families_.chunks[c];
+    double* const stress = flux_.data() + chunk.first;
+    if (traits_.selective) {
+      add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
+                       stress, flux_.stride());
+    }
+    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, pass.out);
+  }
+}
+
+/// Adds the adjoint of the point gradient: of Q, or of the stress on Hbar for stored stencils.
+template <int D>
+void LatticeModel<D>::divergence(Pass& pass) const {
+  const auto chunks_of = [&](std::size_t b, auto&& each) {
+    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) each(families_.chunks[c]);
+  };
+  if (stencils_) {
+    families_.colouring.for_each([&](std::size_t b) { chunks_of(b, [&](const LatticeChunk& chunk) { stencils_->adjoint(chunk, flux_, pass.out); }); });
+    return;
+  }
+  families_.colouring.for_each([&](std::size_t b) {
+    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
+  });
+  if (families_.broken == 0) return;
+  parallel_for(families_.blocks.size(), [&](std::size_t b) {
+    chunks_of(b, [&](const LatticeChunk& chunk) {
+      if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
+    });
+  });
 }
 
 template <int D>
@@ -354,26 +428,11 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
       families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
-      parallel_for(blocks, [&](std::size_t b) {
-        for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
-          const LatticeChunk& chunk = families_.chunks[c];
-          operator_.stress_to_flux(chunk, flux_.data() + chunk.first, flux_.stride(), flux_, pass.out);
-        }
-      });
+      parallel_for(blocks, [&](std::size_t b) { finish_stress(b, pass); });
     }
   }
   if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
-  families_.colouring.for_each([&](std::size_t b) {
-    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
-  });
-  if (families_.broken > 0) {
-    parallel_for(blocks, [&](std::size_t b) {
-      for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
-        const LatticeChunk& chunk = families_.chunks[c];
-        if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
-      }
-    });
-  }
+  divergence(pass);
   clean(pass.out);
   return {};
 }
@@ -429,8 +488,10 @@ ModelReport LatticeModel<D>::report() const {
   report.bonds = families_.bonds;
   report.broken_bonds = families_.broken - families_.failed;
   report.singular_families = families_.singular;
-  report.bytes = families_.bytes() + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + scratch_.bytes() +
-                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + (fracture_ ? fracture_->bytes() : 0);
+  report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() +
+                 volume_.bytes() + pressure_.bytes() + scratch_.bytes() + (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) +
+                 (fracture_ ? fracture_->bytes() : 0);
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);

@@ -7,6 +7,7 @@
 #include "bond_kernel.hpp"
 #include "lattice_bonds.hpp"
 #include "lattice_kernels.hpp"
+#include "lattice_stencils.hpp"
 #include "engine/assembly/assembly.hpp"
 
 namespace perikit {
@@ -14,6 +15,7 @@ namespace perikit {
 /// Any point or bond kinematics on a lattice. One evaluation runs through fixed blocks:
 ///   points: gradient -> law -> flux                              | divergence
 ///   bonds:  gradient of points | bonds by colour: law, scatter   | flux | divergence
+///   (order 2 and more: stored stencils take the places of the gradient, and of flux and divergence)
 template <int D>
 class LatticeModel final : public AssemblingModel {
  public:
@@ -43,6 +45,11 @@ class LatticeModel final : public AssemblingModel {
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
   void store_corrections();
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
+  void point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept;
+  void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
+  OwnerGradients owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept;
+  void finish_stress(std::size_t b, Pass& pass);
+  void divergence(Pass& pass) const;
 
   const Body& body_;
   const Laws& laws_;
@@ -51,10 +58,13 @@ class LatticeModel final : public AssemblingModel {
   bool skip_;
   bool pairs_;                       ///< each bond evaluated once for both ends
   LatticeFamilies families_;
-  LatticeOperator<D> operator_;
+  LatticeOperator<D> operator_;      ///< order 1
+  std::optional<LatticeStencils<D>> stencils_;   ///< higher orders
   Field flux_;                       ///< Q; for bonds also the stress on Hbar
   Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
   Field scale_;                      ///< V_i / N_i of bond weights
+  Field volume_, pressure_;          ///< selective: volume changes of points; pressures (and their rates) on them
+  int slots_at_once_;                ///< of a bond batch
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise

@@ -26,10 +26,6 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
 
 namespace {
 
-/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane or
-/// on a line, 30 times as long as thick): their gradients magnify noise as much.
-constexpr double poor_ratio = 1e-3;
-
 /// Inverse by cofactors; false where the eigenvalues of K spread by more than 1 / ratio. This runs per bond: eigenvalues are only
 /// computed where norms leave it open.
 template <int D>

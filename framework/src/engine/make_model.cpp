@@ -1,5 +1,6 @@
 #include "cloud_model.hpp"
 #include "lattice_model.hpp"
+#include "local_force_model.hpp"
 #include "pair_model.hpp"
 #include "stabilized_model.hpp"
 #include "weighted_model.hpp"
@@ -21,6 +22,7 @@ template <int D>
 std::unique_ptr<Model> make(const ModelParts& parts) {
   const KinematicsTraits traits = parts.kinematics->traits();
   if (traits.at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
+  if (traits.force_state == ForceState::local) return std::make_unique<LocalForceModel<D>>(parts, std::make_unique<WeightedModel<D>>(parts));
   // Point gradients of higher order are stencils like any other.
   if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) return std::make_unique<WeightedModel<D>>(parts);
   if (parts.body->lattice()) return make_local<D, LatticeModel<D>>(parts);

@@ -11,98 +11,188 @@ namespace perikit {
 namespace {
 
 template <class S>
-Tensor<Pack, S> load_in_space(const double* x, int lane) noexcept {
+Tensor<Pack, S> load_in_space(const double* x, std::size_t stride) noexcept {
   constexpr int d = S::dimension;
-  return Tensor<Pack, S>::map([&](int c) { return c < d * d ? Pack::load(x + c * batch_points + lane) : Pack(0.0); });
+  return Tensor<Pack, S>::map(
+      [&](int c) { return c < d * d ? Pack::load(x + static_cast<std::size_t>(c) * stride) : Pack(0.0); });
 }
 
 template <class S>
-void store_in_space(const Tensor<Pack, S>& t, double* x, int lane) noexcept {
-  constexpr int d = S::dimension;
-  for (int c = 0; c < d * d; ++c) t[c].store(x + c * batch_points + lane);
+Tensor<Pack, S> load(const double* x) noexcept {
+  return Tensor<Pack, S>::map([&](int c) { return Pack::load(x + c * batch_points); });
 }
 
 /// F^-T = cof F / det F.
 template <class S>
 Tensor<Pack, S> inverse_transpose(const Tensor<Pack, S>& H) noexcept {
-  const Tensor<Pack, S> F = add_diagonal(H, Pack(1.0));
-  return Pack(1.0) / (jacobian_minus_one(H) + Pack(1.0)) * cofactor(F);
+  return Pack(1.0) / (jacobian_minus_one(H) + Pack(1.0)) * cofactor(add_diagonal(H, Pack(1.0)));
 }
 
-/// a - 1 = cbrt(1 + r) - 1 = r / (a^2 + a + 1) with r = Jbar/Jt - 1: exactly 0 at rest, no digits lost near it. NaN where r < -1.
-template <class S>
-Pack scaling_minus_one(const Tensor<Pack, S>& Ht, const Tensor<Pack, S>& Hbar) noexcept {
-  const Pack jt = jacobian_minus_one(Ht), jbar = jacobian_minus_one(Hbar);
-  const Pack r = (jbar - jt) / (jt + Pack(1.0));
-  const Pack a = cbrt(r + Pack(1.0));
-  const Pack bad = select((jt > Pack(-1.0)) & (jbar > Pack(-1.0)), Pack(0.0), Pack(std::numeric_limits<double>::quiet_NaN()));
-  return r / (a * a + a + Pack(1.0)) + bad;
-}
-
-/// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = a phi.
-template <class S>
-Pack scaling_rate(const Tensor<Pack, S>& Ftm, const Tensor<Pack, S>& Fbm, const Tensor<Pack, S>& dFt, const Tensor<Pack, S>& dFbar) noexcept {
-  return (inner(Fbm, dFbar) - inner(Ftm, dFt)) * Pack(1.0 / 3.0);
+Pack positive_or_nan(Pack x) noexcept {
+  return select(x > Pack(0.0), x, Pack(std::numeric_limits<double>::quiet_NaN()));
 }
 
 template <class S>
-[[gnu::flatten]] void map(int lanes, const SelectiveArrays& in, double* H, double* dH) noexcept {
-  for (int l = 0; l < lanes; l += pack_width) {
-    const auto Ht = load_in_space<S>(in.Ht, l), Hbar = load_in_space<S>(in.Hbar, l);
-    const Pack grow = scaling_minus_one(Ht, Hbar);
-    grow.store(in.scale + l);
-    const auto Ft = add_diagonal(Ht, Pack(1.0));
-    const auto Hh = Ht + grow * Ft;
-    for (int c = 0; c < S::components; ++c) Hh[c].store(H + c * batch_points + l);
-    if (!in.dHt) continue;
-    const auto dFt = load_in_space<S>(in.dHt, l), dFbar = load_in_space<S>(in.dHbar, l);
-    const Pack phi = scaling_rate(inverse_transpose(Ht), inverse_transpose(Hbar), dFt, dFbar);
-    const auto dFh = (grow + Pack(1.0)) * (dFt + phi * Ft);
-    for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + l);
+[[gnu::flatten]] void volume_of(const OwnerGradients& in, double* volume, std::size_t stride) noexcept {
+  for (int l = 0; l < in.n; l += pack_width) {
+    const auto H = load_in_space<S>(in.H + l, in.stride);
+    const Pack j = jacobian_minus_one(H);
+    j.store(volume + volume_jacobian * stride + l);
+    cbrt(positive_or_nan(j + Pack(1.0))).store(volume + volume_root * stride + l);
+    if (in.dH) inner(inverse_transpose(H), load_in_space<S>(in.dH + l, in.stride)).store(volume + volume_rate * stride + l);
   }
 }
 
 template <class S>
-[[gnu::flatten]] void pull_back(int lanes, const SelectiveArrays& in, const double* P, const double* dP, double* S_own, double* S_bar) noexcept {
-  for (int l = 0; l < lanes; l += pack_width) {
-    const auto load = [&](const double* x) { return Tensor<Pack, S>::map([&](int c) { return Pack::load(x + c * batch_points + l); }); };
-    const auto Ht = load_in_space<S>(in.Ht, l), Hbar = load_in_space<S>(in.Hbar, l);
-    const auto Ph = load(P);
-    const Pack a = Pack::load(in.scale + l) + Pack(1.0);
-    const auto Fh = a * add_diagonal(Ht, Pack(1.0));
-    const auto Ftm = inverse_transpose(Ht), Fbm = inverse_transpose(Hbar);
-    const Pack p = inner(Ph, Fh), third(1.0 / 3.0);
-    if (!in.dHt) {
-      store_in_space(a * Ph - p * third * Ftm, S_own, l);
-      store_in_space(p * third * Fbm, S_bar, l);
-      continue;
+[[gnu::flatten]] void add_stress(const OwnerGradients& in, const double* pressure, const double* rate, double* out,
+                                 std::size_t stride) noexcept {
+  for (int l = 0; l < in.n; l += pack_width) {
+    const auto Fm = inverse_transpose(load_in_space<S>(in.H + l, in.stride));
+    const Pack p = Pack::load(pressure + l);
+    auto stress = p * Fm;
+    // d(p/3 F^-T) = dp/3 F^-T - p/3 F^-T dF^T F^-T
+    if (in.dH) stress = Pack::load(rate + l) * Fm - p * (Fm * transpose_times(load_in_space<S>(in.dH + l, in.stride), Fm));
+    for (int c = 0; c < S::dimension * S::dimension; ++c) {
+      double* to = out + static_cast<std::size_t>(c) * stride + l;
+      (Pack::load(to) + stress[c]).store(to);
     }
-    const auto dFt = load_in_space<S>(in.dHt, l), dFbar = load_in_space<S>(in.dHbar, l);
-    const auto dPh = load(dP);
-    const Pack phi = scaling_rate(Ftm, Fbm, dFt, dFbar);
-    const auto dFh = a * (dFt + phi * add_diagonal(Ht, Pack(1.0)));
-    const Pack dp = inner(dPh, Fh) + inner(Ph, dFh);
-    store_in_space(a * (dPh + phi * Ph) - dp * third * Ftm + p * third * (Ftm * transpose_times(dFt, Ftm)), S_own, l);
-    store_in_space(dp * third * Fbm - p * third * (Fbm * transpose_times(dFbar, Fbm)), S_bar, l);
+  }
+}
+
+Pack load_volume(const OwnerVolumes& owners, int component, int at) noexcept {
+  constexpr int group = static_cast<int>(padding);
+  return Pack::load(owners.data + static_cast<std::size_t>(component) * owners.stride + owners.group[at / group] + at % group);
+}
+
+/// x, or 0 for owners without a gradient.
+Pack regular(const OwnerVolumes& owners, int at, Pack x) noexcept {
+  return owners.all_regular ? x : load_volume(owners, volume_regular, at) * x;
+}
+
+/// a - 1 = cbrt(1 + r) - 1 = r / (a^2 + a + 1) with r = Jbar/Jt - 1: exactly 0 at rest, no digits lost near it.
+struct Growth {
+  Pack jt, inverse, root;  ///< Jt - 1, 1/Jt, Jt^(-1/3)
+  Pack operator()(const OwnerVolumes& owners, int at) const noexcept {
+    const Pack r = (load_volume(owners, volume_jacobian, at) - jt) * inverse, a = load_volume(owners, volume_root, at) * root;
+    return regular(owners, at, r * reciprocal(a * a + a + Pack(1.0)));
+  }
+};
+
+/// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = a phi.
+Pack growth_rate(const OwnerVolumes& owners, int at, Pack rate) noexcept {
+  return regular(owners, at, Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate));
+}
+
+template <class S, bool tangent>
+[[gnu::flatten]] void map(const SelectiveBatch& in, double* H, double* dH) noexcept {
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const auto Ht = load_in_space<S>(in.Ht + l, batch_points), Ft = add_diagonal(Ht, Pack(1.0));
+    const Pack jt = jacobian_minus_one(Ht), J = positive_or_nan(jt + Pack(1.0)), inverse = reciprocal(J);
+    inverse.store(in.inverse + l);
+    const Growth growth{jt, inverse, reciprocal_cbrt(J)};
+    for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
+      const Pack grow = growth(in.volume, at);
+      grow.store(in.growth + at);
+      PERIKIT_UNROLL for (int c = 0; c < S::components; ++c)(Ht[c] + grow * Ft[c]).store(H + c * batch_points + at);
+    }
+    if constexpr (tangent) {
+      const auto dFt = load_in_space<S>(in.dHt + l, batch_points);
+      const Pack rate = inverse * inner(cofactor(Ft), dFt);
+      for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
+        const auto dFh = (Pack::load(in.growth + at) + Pack(1.0)) * (dFt + growth_rate(in.volume, at, rate) * Ft);
+        PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + at);
+      }
+    }
+  }
+}
+
+/// What the pull-backs of forces and tangents share: W a and W p/3 of one end, the latter stored.
+struct EndOfBond {
+  Pack a, weight, share;
+  EndOfBond(const SelectiveBatch& in, const SelectiveStress& stress, int end, int l) noexcept
+      : a(Pack::load(in.growth + end * in.lanes + l) + Pack(1.0)),
+        weight(Pack(stress.sign) * Pack::load(stress.weight[end] + l)),
+        share(regular(in.volume, end * in.lanes + l, Pack(1.0 / 3.0) * weight * a)) {}
+};
+
+template <class S>
+void store_in_space(const Tensor<Pack, S>& t, double* x) noexcept {
+  PERIKIT_UNROLL for (int c = 0; c < S::dimension * S::dimension; ++c) t[c].store(x + c * batch_points);
+}
+
+template <class S>
+[[gnu::flatten]] void pull_back(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
+    auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
+    Pack sum_p(0.0);
+    for (int end = 0; end < in.ends; ++end) {
+      const EndOfBond bond(in, stress, end, l);
+      const auto P = load<S>(stress.P + end * in.lanes + l);
+      const Pack p = bond.share * inner(P, Ft);
+      p.store(stress.pressure + end * in.lanes + l);
+      sum_p += p;
+      sum = sum + (bond.weight * bond.a) * P;
+    }
+    store_in_space(sum - (sum_p * Pack::load(in.inverse + l)) * cofactor(Ft), stress.S + l);
+  }
+}
+
+/// d(a P - p/3 F^-T) = a (dP + phi P) - dp/3 F^-T + p/3 F^-T dF^T F^-T
+template <class S>
+[[gnu::flatten]] void pull_back_tangent(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0)),
+               dFt = load_in_space<S>(in.dHt + l, batch_points);
+    const auto Ftm = Pack::load(in.inverse + l) * cofactor(Ft);
+    auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
+    Pack sum_p(0.0), sum_dp(0.0);
+    for (int end = 0; end < in.ends; ++end) {
+      const int at = end * in.lanes + l;
+      const EndOfBond bond(in, stress, end, l);
+      const auto P = load<S>(stress.P + at), dP = load<S>(stress.dP + at);
+      const Pack phi = growth_rate(in.volume, at, inner(Ftm, dFt));
+      const Pack p = bond.share * inner(P, Ft), dp = bond.share * (inner(dP, Ft) + inner(P, dFt + phi * Ft));
+      p.store(stress.pressure + at);
+      dp.store(stress.pressure_rate + at);
+      sum_p += p;
+      sum_dp += dp;
+      sum = sum + (bond.weight * bond.a) * (dP + phi * P);
+    }
+    store_in_space(sum - sum_dp * Ftm + sum_p * (Ftm * transpose_times(dFt, Ftm)), stress.S + l);
+  }
+}
+
+/// f of the tensors of this space.
+template <class F>
+void in_space(Space space, const F& f) noexcept {
+  switch (dimension(space)) {
+    case 1:
+      return f(Line());
+    case 2:
+      return f(Plane());
+    default:
+      return f(Solid());
   }
 }
 
 }  // namespace
 
-void selective_map(Space space, int lanes, const SelectiveArrays& in, double* H, double* dH) noexcept {
-  switch (dimension(space)) {
-    case 1: return map<Line>(lanes, in, H, dH);
-    case 2: return map<Plane>(lanes, in, H, dH);
-    default: return map<Solid>(lanes, in, H, dH);
-  }
+void owner_volume(Space space, const OwnerGradients& in, double* volume, std::size_t stride) noexcept {
+  in_space(space, [&]<class S>(S) { volume_of<S>(in, volume, stride); });
 }
 
-void selective_pull_back(Space space, int lanes, const SelectiveArrays& in, const double* P, const double* dP, double* S_own, double* S_bar) noexcept {
-  switch (dimension(space)) {
-    case 1: return pull_back<Line>(lanes, in, P, dP, S_own, S_bar);
-    case 2: return pull_back<Plane>(lanes, in, P, dP, S_own, S_bar);
-    default: return pull_back<Solid>(lanes, in, P, dP, S_own, S_bar);
-  }
+void add_owner_stress(Space space, const OwnerGradients& in, const double* pressure, const double* pressure_rate, double* S,
+                      std::size_t stride) noexcept {
+  in_space(space, [&]<class T>(T) { add_stress<T>(in, pressure, pressure_rate, S, stride); });
+}
+
+void selective_map(Space space, const SelectiveBatch& in, double* H, double* dH) noexcept {
+  in_space(space, [&]<class S>(S) { in.dHt ? map<S, true>(in, H, dH) : map<S, false>(in, H, dH); });
+}
+
+void selective_pull_back(Space space, const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+  in_space(space, [&]<class S>(S) { in.dHt ? pull_back_tangent<S>(in, stress) : pull_back<S>(in, stress); });
 }
 
 }  // namespace perikit

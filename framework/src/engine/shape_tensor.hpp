@@ -16,6 +16,9 @@ constexpr int symmetric_index(int d, int a, int b) noexcept {
 
 /// K is singular when its eigenvalues spread by more than this: the family spans no volume up to rounding of the positions.
 inline constexpr double singular_ratio = 1e-8;
+/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane or
+/// on a line, 30 times as long as thick): their gradients magnify noise as much.
+inline constexpr double poor_ratio = 1e-3;
 
 template <int D>
 using Square = Eigen::Matrix<double, D, D>;

@@ -205,12 +205,15 @@ void WeightedModel<D>::scatter(const Group& g, const LocalStencil& stencil, cons
 }
 
 template <int D>
-void WeightedModel<D>::keep_owner_gradients(int points, BatchScratch& s, bool tangent) const noexcept {
-  for (int c = 0; c < D * D; ++c)
-    for (int l = 0; l < batch_points; ++l) {
-      s.Hbar[c * batch_points + l] = s.H[c * batch_points + l % points];
-      if (tangent) s.dHbar[c * batch_points + l] = s.dH[c * batch_points + l % points];
-    }
+void WeightedModel<D>::keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept {
+  for (std::size_t c = 0; c < D * D; ++c) {
+    std::copy_n(s.Ht + c * batch_points, 8, m.owner_H + c * 8);
+    if (tangent) std::copy_n(s.dHt + c * batch_points, 8, m.owner_dH + c * 8);
+  }
+  owner_volume(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, s.volume, batch_points);
+  for (int c = 0; c < volume_components && points == 1; ++c) std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
+  std::fill(std::begin(s.volume_group), std::end(s.volume_group), 0);
+  s.owner_volumes = {s.volume, batch_points, s.volume_group, true};   // an owner without a gradient has none at its evaluation points either
 }
 
 template <int D>
@@ -223,19 +226,21 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
   if (tangent) gather(g, stencil, pass.w, m, m.w);
   m.t.assign(static_cast<std::size_t>(stencil.bonds) * D * 8, 0.0);
   const int lanes_per_tile = g.whole ? 64 : 8, tiles_at_once = batch_points / lanes_per_tile, points = g.whole ? 8 : 1;
-  double bar[D * D][8] = {};   // stress on the owners' gradients (selective map)
+  double pressure[2][8] = {};   // on the owners' gradients (selective map), and its rate
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
   for (int tile = 0; tile < stencil.tiles; tile += tiles_at_once) {
     const int tiles = std::min(tiles_at_once, stencil.tiles - tile);
     for (int i = 0; i < tiles; ++i) {
       const int lane = i * lanes_per_tile;
       if (g.whole) {
-        tile_gradient<D>(stencil, tile + i, m.u.data(), s.H + lane);
-        if (tangent) tile_gradient<D>(stencil, tile + i, m.w.data(), s.dH + lane);
+        tile_gradient<D>(stencil, tile + i, m.u.data(), H + lane);
+        if (tangent) tile_gradient<D>(stencil, tile + i, m.w.data(), dH + lane);
       } else {
-        single_gradient<D>(stencil, tile + i, m.u.data(), s.H + lane);
-        if (tangent) single_gradient<D>(stencil, tile + i, m.w.data(), s.dH + lane);
+        single_gradient<D>(stencil, tile + i, m.u.data(), H + lane);
+        if (tangent) single_gradient<D>(stencil, tile + i, m.w.data(), dH + lane);
       }
-      if (traits_.selective && tile + i == 0) keep_owner_gradients(points, s, tangent);
+      if (traits_.selective && tile + i == 0) keep_owner_gradients(points, m, s, tangent);
       for (int l = 0; l < lanes_per_tile; ++l) {
         const int q = g.whole ? l / 8 : l, point = g.whole ? l % 8 : 0;
         s.owner[lane + l] = g.first + point;
@@ -249,8 +254,10 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
-    for (int c = 0; c < D * D && traits_.selective; ++c)
-      for (int l = 0; l < n; ++l) bar[c][l % points] += s.bar[c * batch_points + l];
+    for (int l = 0; l < n && traits_.selective; ++l) {
+      pressure[0][l % points] += s.pressure[l];
+      if (tangent) pressure[1][l % points] += s.pressure_rate[l];
+    }
     for (int i = 0; i < tiles; ++i) {
       if (g.whole) tile_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
       else single_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
@@ -259,8 +266,9 @@ int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pa
   if (sample) return -1;
   if (traits_.selective) {
     // The owner's gradient is evaluation point 0 of tile 0.
-    for (int c = 0; c < D * D; ++c)
-      for (int l = 0; l < lanes_per_tile; ++l) s.P[c * batch_points + l] = l < points ? bar[c][l] : 0.0;
+    for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, lanes_per_tile, 0.0);
+    add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+    for (int c = 0; c < D * D && !g.whole; ++c) std::fill_n(s.P + c * batch_points + 1, 7, 0.0);
     if (g.whole) tile_adjoint<D>(stencil, 0, s.P, m.t.data());
     else single_adjoint<D>(stencil, 0, s.P, m.t.data());
   }

@@ -40,6 +40,7 @@ class WeightedModel final : public AssemblingModel {
     FamilyArrays family;
     LocalStencil stencil;
     AlignedVector<double> weights, share, u, w, t;
+    double owner_H[72], owner_dH[72];   ///< of the owners, where the map is selective: [component][8]
     std::vector<std::int32_t> index;
   };
 
@@ -49,8 +50,8 @@ class WeightedModel final : public AssemblingModel {
   void load_family(const Group& group, Memory& m) const;
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
-  /// Copies Hbar of the points, evaluation point 0, to every lane of the batch.
-  void keep_owner_gradients(int points, BatchScratch& s, bool tangent) const noexcept;
+  /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
+  void keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
   int group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   void gather(const Group& g, const LocalStencil& stencil, ConstFieldView u, const Memory& m, AlignedVector<double>& out) const;
   void scatter(const Group& g, const LocalStencil& stencil, const Memory& m, FieldView out) const;

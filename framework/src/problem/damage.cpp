@@ -37,7 +37,7 @@ void BodyProblem::read_damage(bool quasi_static) {
   if (quasi_static) refuse(fmt::format("integrator \"{}\"", scene_.integrator->type), "integrators of dynamic runs, whose forces are not assembled");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
   if (scene_.stabilization) refuse("kinematics.stabilization", "kinematics without one");
-  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) {
+  if (traits.at == EvaluationPoints::weighted || traits.order > 1) {
     refuse(fmt::format("kinematics \"{}\", whose stencils are made once", scene_.kinematics->type), "pair laws, and kinematics over the point gradient of order 1");
   }
   damage_ = std::make_unique<BodyDamage>();

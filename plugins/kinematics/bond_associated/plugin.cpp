@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "perikit/core/simd.hpp"
+#include "perikit/sdk/kinematics_options.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -10,9 +11,9 @@ namespace {
 /// Each bond's own domain: the part of the family that is near the bond's far end.
 class BondAssociated final : public Kinematics {
  public:
-  BondAssociated(double ratio, BondWeight weight) : ratio_(ratio), weight_(weight) {}
+  BondAssociated(double ratio, BondWeight weight, ForceState force_state) : ratio_(ratio), weight_(weight), force_state_(force_state) {}
 
-  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::weighted, .weight = weight_}; }
+  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::weighted, .weight = weight_, .force_state = force_state_}; }
 
   /// omega where |xi_k - xi_q| <= bond horizon, else 0. Lattice points on the sphere count, whatever the rounding.
   void weights(const FamilyView& family, int q, double* omega) const noexcept override {
@@ -31,22 +32,25 @@ class BondAssociated final : public Kinematics {
  private:
   double ratio_;
   BondWeight weight_;
+  ForceState force_state_;
 };
 
 PartDescription description() {
   PartDescription part{.name = "bond_associated",
                        .summary = "a gradient for each bond from the part of the family that is near the bond's far end",
                        .parameters = {},
-                       .examples = {"", "bond_horizon_ratio = 1.2\nweight = \"kernel\""},
+                       .examples = {"", "bond_horizon_ratio = 1.2\nweight = \"kernel\"", "force_state = \"local\""},
                        .equations = "F_ij = (sum_k omega V_k y_ik (x) xi_ik) (sum_k omega V_k xi_ik (x) xi_ik)^-1,  k in H_i with |X_k - X_j| <= r delta\n"
-                                    "W_ij = V_i V_j / sum_j V_j  (weight = \"volume\"),  V_i omega V_j / sum_j omega V_j  (\"kernel\")",
+                                    "W_ij = V_i V_j / sum_j V_j  (weight = \"volume\"),  V_i omega V_j / sum_j omega V_j  (\"kernel\")\n"
+                                    "force_state = \"local\": T_ij = (sum of V over the domain / sum of V over H_i) omega P_ij K_ij^-1 xi_ij; not conservative",
                        .source = "Chen, Bond-associated deformation gradients for peridynamic correspondence model, Mech. Res. Commun. 90 (2018) 34-41; "
                                  "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 4.15-4.20; "
                                  "Scabbia et al. 2025, eqs. 12-14",
                        .limits = "work grows with the square of the family; domains without a gradient of their own (all of them with the "
                                  "nearest neighbours only) use the whole family"};
   part.parameters.number("bond_horizon_ratio", "-", "radius r of the ball around the far end, to the horizon").by_default("1.0").positive();
-  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  add_bond_weight(part.parameters, BondWeight::volume);
+  add_force_state(part.parameters);
   return part;
 }
 
@@ -54,6 +58,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"), values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"), bond_weight(values), force_state(values));
   });
 }

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "perikit/core/simd.hpp"
+#include "perikit/sdk/kinematics_options.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -66,7 +67,7 @@ PartDescription description() {
                                  "Hu et al., A unified framework of bond-associated correspondence models, eqs. 10-17, 32",
                        .limits = "lambda = 1 is `conventional` with its zero-energy modes; small lambda suppresses them weakly"};
   part.parameters.number("lambda", "-", "factor on the influence of the bond itself").by_default("10.0").at_least(1.0);
-  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  add_bond_weight(part.parameters, BondWeight::volume);
   return part;
 }
 
@@ -74,6 +75,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<BondAugmented>(values.number("lambda"), values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+    return std::make_unique<BondAugmented>(values.number("lambda"), bond_weight(values));
   });
 }

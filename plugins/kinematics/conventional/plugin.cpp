@@ -1,5 +1,6 @@
 #include <memory>
 
+#include "perikit/sdk/kinematics_options.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -25,7 +26,7 @@ PartDescription description() {
                                     "order n: g_k = omega V_k (M^-1 q(xi_k))_linear / delta, M = sum omega V q q^T, q: monomials of degree 1 ... n",
                        .source = "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.31-3.35; order n: 3.43-3.53",
                        .limits = "sawtooth displacements store no energy: add a stabilization wherever fields are not smooth"};
-  part.parameters.integer("order", "order of the point gradient: exact for polynomials up to this degree; families too small for it take a lower one").by_default("1").at_least(1).at_most(6);
+  add_gradient_order(part.parameters);
   return part;
 }
 
@@ -33,6 +34,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<Conventional>(static_cast<int>(values.integer("order")));
+    return std::make_unique<Conventional>(gradient_order(values));
   });
 }

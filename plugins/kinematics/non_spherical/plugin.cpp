@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "perikit/core/simd_math.hpp"
+#include "perikit/sdk/kinematics_options.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -61,7 +62,7 @@ PartDescription description() {
                                  "work grows with the square of the family; n1 = n2 = 0 has the zero-energy modes of `conventional`"};
   part.parameters.number("n1", "-", "how fast the influence falls with the difference in bond length").by_default("1.0").at_least(0.0);
   part.parameters.number("n2", "-", "how fast the influence falls with the angle between bonds").by_default("1.0").at_least(0.0);
-  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  add_bond_weight(part.parameters, BondWeight::volume);
   return part;
 }
 
@@ -70,6 +71,6 @@ PartDescription description() {
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
     return std::make_unique<NonSpherical>(values.number("n1"), values.number("n2"),
-                                          values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+                                          bond_weight(values));
   });
 }

@@ -48,11 +48,11 @@ struct ModelReport {
 class Model {
  public:
   virtual ~Model() = default;
-  /// force <- -dPi/du [N], fully overwritten; strain energy Pi -> *energy where wanted.
+  /// force <- -dPi/du [N] (conservative models), fully overwritten; strain energy Pi -> *energy where wanted.
   virtual EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy) = 0;
-  /// Kw <- d2Pi/du2 w [N], fully overwritten.
+  /// Kw <- -d(force)/du w [N], fully overwritten.
   virtual EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
-  /// K <- d2Pi/du2 [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
+  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
   /// from this model and stays as it is. Values are overwritten; undefined after a failure.
   virtual EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K) = 0;
   /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
@@ -61,6 +61,8 @@ class Model {
   virtual EvaluationStatus sample(ConstFieldView u, PointSamples& samples) = 0;
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   virtual bool has_gradients() const noexcept { return true; }
+  /// Whether forces are -dE/du, so that the tangent is symmetric.
+  virtual bool conservative() const noexcept { return true; }
   /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).
   virtual Field shape_tensor_condition() = 0;
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).

@@ -78,11 +78,12 @@ struct DilatationBatch {
 enum class EvaluationPoints { points, bonds, weighted, pairs };
 enum class BondBase { own, mean };          ///< A_b of the bond shape
 enum class BondWeight { volume, kernel };   ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
+enum class ForceState { variational, local };   ///< forces: -dE/du, or each bond's own force state alone
 enum class PartWeight { equal, volume };    ///< W_q of the admissible parts of point i: the same share of V_i, or shares as their volumes
 
 struct KinematicsTraits {
   EvaluationPoints at = EvaluationPoints::points;
-  int order = 1;                            ///< of the point gradient (point shape; 1 for the others)
+  int order = 1;                            ///< of the point gradient (point and bond shapes)
   BondBase base = BondBase::own;            ///< bond shape
   BondWeight weight = BondWeight::volume;   ///< evaluation points that belong to bonds
   PartWeight part_weight = PartWeight::equal;   ///< evaluation points that belong to parts of the family
@@ -93,6 +94,9 @@ struct KinematicsTraits {
   /// The volume change of every evaluation point is that of its owner: F_q <- (Jbar_i / J_q)^(1/3) F_q. Not in plane or uniaxial
   /// stress, and not with evaluation points at points.
   bool selective = false;
+  /// local (weighted shape by bond only, for comparison): T_ij = (sum of V over the domain / sum of V over H_i) omega P_ij K_ij^-1 xi_ij.
+  /// Not conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
+  ForceState force_state = ForceState::variational;
   bool dilatation = false;                  ///< pairs: phi is not zero
   bool influence = true;                    ///< pairs: w or theta depends on omega
   bool constant_moduli = false;             ///< pairs: c_i depends on the material alone, not on the family

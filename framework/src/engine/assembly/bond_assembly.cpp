@@ -34,6 +34,7 @@ void BondAssembly<D>::read_bonds(const ModelParts& parts) {
   const std::size_t rows = families().rows();
   bond_.resize(families().bonds());
   own_gradient_.assign(D * rows, 0.0);
+  regular_.assign(rows, 0);
   struct Scratch {
     FamilyArrays family;
     AlignedVector<double> share, correction;
@@ -48,6 +49,7 @@ void BondAssembly<D>::read_bonds(const ModelParts& parts) {
     s.correction.assign(D * s.family.size, 0.0);
     parts.kinematics->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
     point_gradient(s.family, families().body().horizon(), traits_.order, s.gradient);
+    regular_[i] = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
     const auto neighbours = families().neighbours(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Bond& bond = bond_[families().first(i) + k];
@@ -94,8 +96,8 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const Bond& bond = bond_[k];
   const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
   const std::size_t p = families().point(i), q = families().point(j);
-  const int lane =
-      m.batch.add(static_cast<std::int32_t>(p), bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0));
+  const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
+  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, regular_[i] != 0);
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
   const double* own = Hbar_.data() + entries * i;

@@ -29,7 +29,8 @@ void selective_tangent(const SelectiveLane& x, double* own, double* mixed, doubl
   using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
   using T = Tensor<double, S>;
   constexpr int n = D * D;
-  const T t = inverse_transpose<S>(x.Ht), b = inverse_transpose<S>(x.Hbar);
+  const T none = T::map([](int) { return 0.0; });   // a does not change for an owner without a gradient
+  const T t = x.regular ? inverse_transpose<S>(x.Ht) : none, b = x.regular ? inverse_transpose<S>(x.Hbar) : none;
   const T P = T::map([&](int c) { return x.P[c * batch_points]; });
   const T F = x.a * add_diagonal(T::map([&](int c) { return c < n ? x.Ht[c * batch_points] : 0.0; }), 1.0);
   T B{};

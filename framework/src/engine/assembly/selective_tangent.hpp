@@ -11,6 +11,7 @@ struct SelectiveLane {
   const double* A;     ///< likewise
   double a;
   double weight;  ///< W: factor of the results
+  bool regular;   ///< whether the owner has a gradient; a = 1 without
 };
 
 /// own, mixed, bar <- W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar over in-space components, D^2 x D^2 row-major.

@@ -14,16 +14,20 @@ TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), s
   if (!selective) return;
   P_.assign(9 * batch_points, 0.0);
   mapped_.assign(9 * batch_points, 0.0);
-  scale_.assign(batch_points, 0.0);
+  growth_.assign(batch_points, 0.0);
+  inverse_.assign(batch_points, 0.0);
+  volume_.assign(volume_components * batch_points, 0.0);
+  for (std::size_t first = 0; first < batch_points; first += padding) volume_group_.push_back(static_cast<std::int64_t>(first));
 }
 
 template <int D>
-int TangentBatch<D>::add(std::int32_t owner, double weight) {
+int TangentBatch<D>::add(std::int32_t owner, double weight, bool owner_has_gradient) {
   const int lane = lanes_++;
   if (static_cast<std::size_t>(lane) == owner_.size()) {
     const std::size_t size = owner_.size() + batch_points;
     owner_.resize(size);
     weight_.resize(size);
+    regular_.resize(size);
     H_.resize(size * stored, 0.0);
     own_.resize(size * entries);
     if (selective_) {
@@ -34,6 +38,7 @@ int TangentBatch<D>::add(std::int32_t owner, double weight) {
   }
   owner_[static_cast<std::size_t>(lane)] = owner;
   weight_[static_cast<std::size_t>(lane)] = weight;
+  regular_[static_cast<std::size_t>(lane)] = owner_has_gradient ? 1.0 : 0.0;
   return lane;
 }
 
@@ -76,8 +81,11 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
 
 template <int D>
 int TangentBatch<D>::evaluate_selective(int first, int n) {
-  const SelectiveArrays map{&H(first, 0), &owner_H(first, 0), nullptr, nullptr, scale_.data()};
-  selective_map(laws_.space(), static_cast<int>(padded(static_cast<std::size_t>(n))), map, mapped_.data(), nullptr);
+  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  owner_volume(laws_.space(), {lanes, batch_points, &owner_H(first, 0), nullptr}, volume_.data(), batch_points);
+  std::copy_n(regular_.data() + first, lanes, volume_.data() + volume_regular * batch_points);
+  const OwnerVolumes owners{volume_.data(), batch_points, volume_group_.data(), false};
+  selective_map(laws_.space(), {lanes, 1, &H(first, 0), nullptr, owners, inverse_.data(), growth_.data()}, mapped_.data(), nullptr);
   LawBatch batch;
   batch.n = n;
   batch.H = mapped_.data();
@@ -87,10 +95,10 @@ int TangentBatch<D>::evaluate_selective(int first, int n) {
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
   for (int l = 0; l < n; ++l) {
-    const std::size_t lane = static_cast<std::size_t>(first + l) * entries;
-    selective_tangent<D>({map.Ht + l, map.Hbar + l, P_.data() + l, A_.data() + l, scale_[static_cast<std::size_t>(l)] + 1,
-                          weight_[static_cast<std::size_t>(first + l)]},
-                         own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
+    const auto at = static_cast<std::size_t>(first + l), lane = at * entries;
+    const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)] + 1,
+                           weight_[at], regular_[at] != 0};
+    selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
   }
   return -1;
 }
