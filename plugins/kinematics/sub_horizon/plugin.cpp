@@ -30,27 +30,33 @@ class SubHorizon final : public Kinematics {
                                       (dimension == 1 ? "2 or 4" : std::to_string(orthants)) + " parts");
   }
 
-  void weights(const FamilyView& family, int q, double* omega) const noexcept override {
-    if (family.dimension == 1 && options_.has("parts") && options_.integer("parts") == 4) return quarters(family, q, omega);
+  void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
+    if (family.dimension == 1 && options_.has("parts") && options_.integer("parts") == 4) return quarters(family, omega, stride);
     for (int k = 0; k < family.bonds; k += pack_width) {
       const Pack length = Pack::load(family.length + k);
-      Pack value = Pack::load(family.omega + k);
+      Pack share[8] = {Pack::load(family.omega + k)};
       for (int a = 0; a < family.dimension; ++a) {
-        const Pack xi = Pack::load(family.xi[a] + k);
-        value *= side((q >> a & 1) != 0 ? -xi : xi, length);
+        const Pack xi = Pack::load(family.xi[a] + k), front = side(xi, length), back = side(-xi, length);
+        for (int q = 0; q < 1 << a; ++q) {
+          share[q + (1 << a)] = share[q] * back;
+          share[q] *= front;
+        }
       }
-      value.store(omega + k);
+      for (std::size_t q = 0; q < std::size_t{1} << family.dimension; ++q) share[q].store(omega + q * stride + k);
     }
   }
 
  private:
   /// The line cut at -delta/2, 0 and delta/2.
-  static void quarters(const FamilyView& family, int q, double* omega) noexcept {
+  static void quarters(const FamilyView& family, double* omega, std::size_t stride) noexcept {
     const Pack half(0.5 * family.horizon);
-    const bool outer = q == 0 || q == 3;
     for (int k = 0; k < family.bonds; k += pack_width) {
-      const Pack length = Pack::load(family.length + k), xi = Pack::load(family.xi[0] + k), along = q < 2 ? -xi : xi;
-      (Pack::load(family.omega + k) * side(along, length) * side(outer ? along - half : half - along, half)).store(omega + k);
+      const Pack length = Pack::load(family.length + k), xi = Pack::load(family.xi[0] + k);
+      for (std::size_t q = 0; q < 4; ++q) {
+        const bool outer = q == 0 || q == 3;
+        const Pack along = q < 2 ? -xi : xi;
+        (Pack::load(family.omega + k) * side(along, length) * side(outer ? along - half : half - along, half)).store(omega + q * stride + k);
+      }
     }
   }
 

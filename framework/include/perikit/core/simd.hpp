@@ -142,11 +142,40 @@ inline void subtract_at(double* p, std::uint8_t bits, Pack a) noexcept {
     if (bits >> i & 1) p[i] -= a.v[i];
 #endif
 }
+/// Lane i: p[at[i]].
+inline Pack gather(const double* p, const std::int32_t* at) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  const __m256i index = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at));
+  return {reinterpret_cast<detail::Lanes>(_mm512_mask_i32gather_pd(_mm512_setzero_pd(), 0xff, index, p, 8))};
+#else
+  Pack r;
+  for (int i = 0; i < pack_width; ++i) r.v[i] = p[at[i]];
+  return r;
+#endif
+}
 inline Pack abs(Pack a) noexcept {
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & std::int64_t{0x7fffffffffffffff})};
 }
 inline Pack min(Pack a, Pack b) noexcept { return select(a < b, a, b); }
 inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
+
+/// rows[i][j] <-> rows[j][i]: for step 1, 2, 4 the blocks of that size off the diagonal change places.
+inline void transpose(Pack (&rows)[pack_width]) noexcept {
+  for (int step = 1; step < pack_width; step *= 2) {
+    detail::Bits low, high;
+    for (int j = 0; j < pack_width; ++j) {
+      const bool second = (j & step) != 0;
+      low[j] = second ? pack_width + j - step : j;
+      high[j] = second ? pack_width + j : j + step;
+    }
+    for (int i = 0; i < pack_width; ++i) {
+      if ((i & step) != 0) continue;
+      const detail::Lanes a = rows[i].v, b = rows[i + step].v;
+      rows[i].v = __builtin_shuffle(a, b, low);
+      rows[i + step].v = __builtin_shuffle(a, b, high);
+    }
+  }
+}
 
 /// Sum of the lanes, always in the same order.
 inline double sum(Pack a) noexcept {
