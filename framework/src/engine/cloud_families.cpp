@@ -6,6 +6,7 @@
 
 #include "cloud_rows.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/simd.hpp"
 #include "shape_tensor.hpp"
 
 namespace perikit {
@@ -93,19 +94,19 @@ void CloudFamilies::compact() {
 
 void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
   const std::span<const std::int32_t> family = neighbours(p);
-  const Point x = body.position(p);
+  const Row* position = reinterpret_cast<const Row*>(body.rows().data());
+  const Row own = position[p];
   out.resize(body.dimension(), static_cast<int>(family.size()));
   for (std::size_t k = 0; k < family.size(); ++k) {
-    const auto j = static_cast<std::size_t>(family[k]);
-    const Point y = body.position(j);
-    double r2 = 0;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(out.dimension); ++c) {
-      out.xi[c][k] = y[c] - x[c];
-      r2 += out.xi[c][k] * out.xi[c][k];
-    }
-    out.length[k] = std::sqrt(r2);
-    out.omega[k] = omega[static_cast<std::size_t>(lists.first[p]) + k];
-    out.volume[k] = body.volume(j);
+    const Row far = position[family[k]], xi = far - own;
+    for (int c = 0; c < out.dimension; ++c) out.xi[c][k] = xi[c];
+    out.volume[k] = far[3];
+  }
+  std::copy_n(omega.data() + lists.first[p], family.size(), out.omega.data());
+  for (std::size_t k = 0; k < out.size; k += pack_width) {
+    Pack square(0.0);
+    for (int c = 0; c < out.dimension; ++c) square += Pack::load(out.xi[c].data() + k) * Pack::load(out.xi[c].data() + k);
+    sqrt(square).store(out.length.data() + k);
   }
   std::copy_n(&inverse[6 * p], 6, out.inverse_shape);
 }

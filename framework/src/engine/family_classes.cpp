@@ -1,5 +1,6 @@
 #include "family_classes.hpp"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -11,6 +12,8 @@ FamilyClasses::FamilyClasses(const LatticeFamilies& f) : of_point(f.body.stride(
     std::vector<std::uint16_t> slots = f.intact_slots(pattern, lane);
     const auto [entry, fresh] = known.try_emplace({slots, pattern.scale[lane]}, static_cast<std::int32_t>(classes.size()));
     if (fresh) {
+      // By the step along rows first: bonds whose far ends are next to each other in memory do not follow each other.
+      std::stable_sort(slots.begin(), slots.end(), [&](std::uint16_t a, std::uint16_t b) { return f.offsets[a][0] < f.offsets[b][0]; });
       FamilyClass& added = classes.emplace_back();
       for (const std::uint16_t s : slots) added.shifts.push_back(static_cast<std::int32_t>(f.shifts[s]));
       added.slots = std::move(slots);

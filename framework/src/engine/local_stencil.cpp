@@ -12,10 +12,14 @@ void FamilyArrays::resize(int d, int n) {
   dimension = d;
   bonds = n;
   size = padded(static_cast<std::size_t>(n));
-  for (int c = 0; c < d; ++c) xi[c].assign(size, 1.0);
-  length.assign(size, 1.0);
-  volume.assign(size, 0.0);
-  omega.assign(size, 0.0);
+  const auto pad = [&](AlignedVector<double>& v, double rest) {
+    v.resize(size);
+    std::fill(v.begin() + n, v.end(), rest);
+  };
+  for (int c = 0; c < d; ++c) pad(xi[c], 1.0);
+  pad(length, 1.0);
+  pad(volume, 0.0);
+  pad(omega, 0.0);
 }
 
 FamilyView FamilyArrays::view(double horizon) const noexcept {
@@ -75,10 +79,10 @@ void adjoint_tile(const double* weight, std::size_t row, int points, const doubl
     }
 }
 
-/// Inverse of symmetric K by cofactors. False in lanes where this may be inaccurate or the eigenvalues may spread by more than
-/// 1 / ratio: |K| |K^-1| is an upper bound of their spread.
+/// Inverse of symmetric K by cofactors; `regular` and `poor` where it is sure that the eigenvalues spread by less, or more, than
+/// 1 / poor_ratio: the product of the norms of K and K^-1 is at least their spread, and at most D times as much.
 template <int D>
-PackMask invert_lanes(const Pack* K, double ratio, Pack* inverse) noexcept {
+void invert_lanes(const Pack* K, Pack* inverse, PackMask& regular, PackMask& poor) noexcept {
   Pack square(0.0), m[6];
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) square += K[symmetric_index(D, a, b)] * K[symmetric_index(D, a, b)];
@@ -106,9 +110,11 @@ PackMask invert_lanes(const Pack* K, double ratio, Pack* inverse) noexcept {
   Pack norm(0.0);
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) norm += cofactor[symmetric_index(D, a, b)] * cofactor[symmetric_index(D, a, b)];
+  const Pack bound = sqrt(norm) * poor_ratio;
+  regular = (det > Pack(1e-12)) & (bound < det);
+  poor = !(det > Pack(1e-12)) | (det * Pack(D) < bound);   // K has norm 1: such a determinant means a spread above 1e5
   const Pack by = scale / det;
-  for (int c = 0; c < symmetric_components(D); ++c) inverse[c] = cofactor[c] * by;
-  return (det > Pack(1e-12)) & (sqrt(norm) * ratio < det);
+  for (int c = 0; c < symmetric_components(D); ++c) inverse[c] = select(regular, cofactor[c] * by, Pack(0.0));
 }
 
 }  // namespace
@@ -129,23 +135,29 @@ void LocalStencil<D>::multiply(int begin, int end) noexcept {
 }
 
 template <int D>
-void LocalStencil<D>::fill_columns(const FamilyArrays& family, int fields, const double* const (*u)[D]) {
-  constexpr int entries = symmetric_components(D);
+template <int Fields>
+void LocalStencil<D>::fill_columns(const FamilyArrays& family, const double* const (*u)[D]) {
+  constexpr int entries = symmetric_components(D), used = entries + Fields * D * D;
+  constexpr std::size_t width = static_cast<std::size_t>(used + pack_width - 1) / pack_width * pack_width;
+  width_ = width;
+  columns_.resize(row_ * width);
   for (std::size_t k = 0; k < row_; k += pack_width) {
-    Pack b[D], column[entries + 2 * D * D + pack_width];   // the rest of the last pack: zero
-    for (int e = 0; e < D; ++e) b[e] = Pack::load(lever_.data() + static_cast<std::size_t>(e) * row_ + k);
-    for (int e = 0; e < D; ++e)
-      for (int a = 0; a <= e; ++a) column[symmetric_index(D, a, e)] = b[a] * Pack::load(family.xi[e].data() + k);
-    for (int f = 0; f < fields; ++f)
+    Pack b[D], column[width];   // the rest of the last pack: zero
+    for (std::size_t e = 0; e < D; ++e) b[e] = Pack::load(lever_.data() + e * row_ + k);
+    for (int e = 0; e < D; ++e) {
+      const Pack xi = Pack::load(family.xi[e].data() + k);
+      for (int a = 0; a <= e; ++a) column[symmetric_index(D, a, e)] = b[a] * xi;
+    }
+    for (int f = 0; f < Fields; ++f)
       for (int c = 0; c < D; ++c) {
         const Pack v = Pack::load(u[f][c] + k);
         for (int e = 0; e < D; ++e) column[entries + (f * D + c) * D + e] = v * b[e];
       }
-    for (std::size_t first = 0; first < width_; first += pack_width) {
+    for (std::size_t first = 0; first < width; first += pack_width) {
       Pack rows[pack_width];
       for (std::size_t i = 0; i < pack_width; ++i) rows[i] = column[first + i];
       transpose(rows);
-      for (std::size_t i = 0; i < pack_width; ++i) rows[i].store(columns_.data() + (k + i) * width_ + first);
+      for (std::size_t i = 0; i < pack_width; ++i) rows[i].store(columns_.data() + (k + i) * width + first);
     }
   }
 }
@@ -161,17 +173,20 @@ void LocalStencil<D>::invert_one(int q, double ratio) {
 }
 
 template <int D>
-void LocalStencil<D>::invert(double ratio) {
+void LocalStencil<D>::invert_all() {
   constexpr int entries = symmetric_components(D);
   for (std::size_t q = 0; q < lanes_; q += pack_width) {
     Pack K[entries], inverse[entries];
+    PackMask regular, poor;
     for (std::size_t c = 0; c < entries; ++c) K[c] = Pack::load(moments_.data() + c * lanes_ + q);
-    const PackMask sure = invert_lanes<D>(K, ratio, inverse);
+    invert_lanes<D>(K, inverse, regular, poor);
     for (std::size_t c = 0; c < entries; ++c) inverse[c].store(inverse_.data() + c * lanes_ + q);
-    for (int i = 0; i < pack_width; ++i) regular_[q + static_cast<std::size_t>(i)] = sure[i];
+    for (int i = 0; i < pack_width; ++i) {
+      const std::size_t at = q + static_cast<std::size_t>(i);
+      regular_[at] = regular[i];
+      if (!regular[i] && !poor[i]) invert_one(static_cast<int>(at), poor_ratio);
+    }
   }
-  for (int q = 0; q < points_; ++q)
-    if (!regular_[static_cast<std::size_t>(q)]) invert_one(q, ratio);
 }
 
 template <int D>
@@ -202,10 +217,10 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   const bool by_bond = parts == 0;
   points_ = first + (by_bond ? bonds_ : parts);
   lanes_ = padded(static_cast<std::size_t>(points_));
-  constexpr std::size_t pack = pack_width;
-  width_ = (entries + static_cast<std::size_t>(fields * D * D) + pack - 1) / pack * pack;
+  if (fields == 0) fill_columns<0>(family, u);
+  else if (fields == 1) fill_columns<1>(family, u);
+  else fill_columns<2>(family, u);
   omega_.resize(lanes_ * row_);
-  columns_.resize(row_ * width_);
   moments_.resize(width_ * lanes_);
   inverse_.resize(entries * lanes_);
   regular_.resize(lanes_);
@@ -213,7 +228,6 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   share_.assign(lanes_, 0.0);
   const auto row = [&](int q) { return omega_.data() + static_cast<std::size_t>(q) * row_; };
   std::fill(row(points_), omega_.data() + omega_.size(), 0.0);
-  fill_columns(family, fields, u);
   if (rules.at_points()) {
     std::fill_n(row(0), row_, 1.0);
     multiply(0, 1);
@@ -230,7 +244,7 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   rules.kinematics->weights(family.view(rules.horizon), row(first), row_);
   if (first == 1) std::copy_n(family.omega.data(), row_, row(0));
   multiply(0, points_);
-  invert(poor_ratio);
+  invert_all();
   if (first == 1 && !regular_[0]) invert_one(0, singular_ratio);
   double total = 0;
   for (int q = first; q < points_; ++q) {

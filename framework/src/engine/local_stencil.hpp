@@ -36,7 +36,7 @@ struct StencilRules {
 template <int D>
 class LocalStencil {
  public:
-  /// For families that carry `fields` displacements: u[f][c]: component c of field f relative to the owner, by bond, `family.size`
+  /// For families that carry up to two `fields` of displacements: u[f][c]: component c of field f relative to the owner, by bond, `family.size`
   /// long. bond_share: w_ij of each bond, used where evaluation points belong to bonds.
   /// `lever`: b_k of a point gradient of higher order where it is known, [c * family.size + k]; else null.
   void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever, int fields, const double* const (*u)[D]);
@@ -59,12 +59,13 @@ class LocalStencil {
 
  private:
   void set_lever(const StencilRules& rules, const FamilyArrays& family, const double* lever);
-  void fill_columns(const FamilyArrays& family, int fields, const double* const (*u)[D]);
+  template <int Fields>
+  void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
   /// Sums of the tiles that hold rows [begin, end): moments_ = omega_ columns_.
   void multiply(int begin, int end) noexcept;
-  /// K_q^-1 of row q, or of all rows, and whether they are regular.
+  /// K_q^-1 of row q, or of all rows, and whether they are regular: the eigenvalues of K spread by less than 1 / ratio.
   void invert_one(int q, double ratio);
-  void invert(double ratio);
+  void invert_all();
 
   int bonds_ = 0, points_ = 0, fallbacks_ = 0, dropped_ = 0;
   std::size_t row_ = 0;                      ///< padded(bonds)

@@ -71,21 +71,25 @@ void gather_coefficients(const MirrorBasis& basis, const LanePoints& points, Con
   }
 }
 
-/// out_own += sum t, out_far -= t.
+/// out_own += sum t, out_far -= t. t: memory like `that`, by bond.
 template <int D>
-void scatter_coefficients(const MirrorBasis& basis, const LanePoints& points, const double* that, FieldView out) noexcept {
-  for (int c = 0; c < D; ++c) {
-    double* component = out.component(c);
-    for (int l = 0; l < 8; l += pack_width) {
-      Pack sum(0.0);
-      for (const MirrorBasis::Orbit& orbit : basis.orbits)
+void scatter_coefficients(const MirrorBasis& basis, const LanePoints& points, const double* that, double* t, FieldView out) noexcept {
+  for (const MirrorBasis::Orbit& orbit : basis.orbits)
+    for (int c = 0; c < D; ++c)
+      for (int l = 0; l < 8; l += pack_width)
         transform_orbit(orbit.size, [&](int i) { return Pack::load(that + (orbit.position[i] * D + c) * 8 + l); },
-                        [&](int i, Pack t) {
-                          sum += t;
-                          points.subtract(component, points.shift[orbit.element[i]], l, t);
-                        });
-      points.subtract(component, 0, l, -sum);
-    }
+                        [&](int i, Pack v) { v.store(t + (orbit.element[i] * D + c) * 8 + l); });
+  // Bonds are sorted along the rows of the lattice: a sum is not read again while part of it is still on its way to memory.
+  const int bonds = basis.first[8];
+  for (int l = 0; l < 8; l += pack_width) {
+    Pack sum[D];
+    for (int k = 0; k < bonds; ++k)
+      for (int c = 0; c < D; ++c) {
+        const Pack v = Pack::load(t + (k * D + c) * 8 + l);
+        sum[c] += v;
+        points.subtract(out.component(c), points.shift[k], l, v);
+      }
+    for (int c = 0; c < D; ++c) points.subtract(out.component(c), 0, l, -sum[c]);
   }
 }
 

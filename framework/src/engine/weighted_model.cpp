@@ -20,6 +20,7 @@ WeightedModel<D>::WeightedModel(const ModelParts& parts)
       condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
   if (body_.lattice()) prepare_lattice(*parts.influence);
   else prepare_cloud(*parts.influence);
+  singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
 }
 
 template <int D>
@@ -173,11 +174,14 @@ void WeightedModel<D>::build(Memory& m, int fields, const double* const (*u)[D])
 }
 
 template <int D>
-void WeightedModel<D>::load_differences(std::int32_t point, ConstFieldView u, Memory& m, AlignedVector<double>& out) const {
-  out.assign(D * m.family.size, 0.0);
-  for (std::size_t c = 0; c < D; ++c) {
-    const double* value = u.component(static_cast<int>(c));
-    for (std::size_t k = 0; k < m.index.size(); ++k) out[c * m.family.size + k] = value[m.index[k]] - value[point];
+void WeightedModel<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m, AlignedVector<double>& out) const {
+  const std::size_t size = m.family.size, bonds = m.index.size();
+  out.resize(D * size);
+  for (std::size_t c = 0; c < D; ++c) std::fill_n(out.data() + c * size + bonds, size - bonds, 0.0);
+  const Row own = rows[static_cast<std::size_t>(point)];
+  for (std::size_t k = 0; k < bonds; ++k) {
+    const Row difference = rows[static_cast<std::size_t>(m.index[k])] - own;
+    for (std::size_t c = 0; c < D; ++c) out[c * size + k] = difference[c];
   }
 }
 
@@ -209,8 +213,8 @@ std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s
     m.index.assign(family.begin(), family.end());
   }
   const std::size_t size = m.family.size;
-  load_differences(p, pass.u, m, m.u);
-  if (tangent) load_differences(p, pass.w, m, m.w);
+  load_differences(p, u_rows_, m, m.u);
+  if (tangent) load_differences(p, w_rows_, m, m.w);
   const double* fields[2][D];
   for (std::size_t c = 0; c < D; ++c) {
     fields[0][c] = m.u.data() + c * size;
@@ -243,15 +247,14 @@ std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s
   double* t[D];
   for (std::size_t c = 0; c < D; ++c) t[c] = m.t.data() + c * size;
   stencil.adjoint(t);
-  for (int c = 0; c < D; ++c) {
-    double* f = pass.out.component(c);
-    double sum = 0;
-    for (std::size_t k = 0; k < m.index.size(); ++k) {
-      sum += t[c][k];
-      f[m.index[k]] -= t[c][k];
-    }
-    f[p] += sum;
+  Row sum{};
+  for (std::size_t k = 0; k < m.index.size(); ++k) {
+    Row force{};
+    for (std::size_t c = 0; c < D; ++c) force[c] = t[c][k];
+    sum += force;
+    out_rows_[static_cast<std::size_t>(m.index[k])] -= force;
   }
+  out_rows_[static_cast<std::size_t>(p)] += sum;
   return -1;
 }
 
@@ -303,7 +306,7 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
   }
   m.t.assign(bonds * D * 8, 0.0);
   stencil.adjoint(m.m.data(), m.t.data());
-  scatter_coefficients<D>(stencil.bond_basis(), points, m.t.data(), pass.out);
+  scatter_coefficients<D>(stencil.bond_basis(), points, m.t.data(), m.u.data(), pass.out);
   return -1;
 }
 
@@ -327,12 +330,24 @@ template <int D>
 EvaluationStatus WeightedModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   while (memory_.size() < static_cast<std::size_t>(thread_count())) memory_.push_back(std::make_unique<Memory>());
+  const std::size_t stride = body_.stride();
+  if (singles_) {
+    mirror_rows(pass.u, stride, u_rows_);
+    if (pass.work.tangent()) mirror_rows(pass.w, stride, w_rows_);
+  }
   if (pass.work.work() == Work::sample) {
     parallel_for(block_first_.size() - 1, [&](std::size_t b) { block(b, pass); });
     return status_at(body_, pass.bad);
   }
   for (int c = 0; c < D; ++c) std::memset(pass.out.component(c), 0, pass.out.stride * sizeof(double));
+  if (singles_) out_rows_.assign(stride, Row{});
   (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) { block(b, pass); });
+  if (singles_) {
+    parallel_for(cloud_blocks(stride), [&](std::size_t b) {
+      for (std::size_t p = b * cloud_block_points; p < std::min(stride, (b + 1) * cloud_block_points); ++p)
+        for (int c = 0; c < D; ++c) pass.out.component(c)[p] += out_rows_[p][c];
+    });
+  }
   return status_at(body_, pass.bad);
 }
 
@@ -364,7 +379,7 @@ ModelReport WeightedModel<D>::report() const {
   report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
   for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
-  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) + members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) + condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) + members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) + (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() + scratch_.bytes();
   if (lattice_) {
     const auto points = static_cast<double>(body_.points());
     std::size_t together = 0;

@@ -6,6 +6,7 @@
 #include "batch.hpp"
 #include "blocks.hpp"
 #include "cloud_families.hpp"
+#include "cloud_rows.hpp"
 #include "family_classes.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
@@ -62,7 +63,7 @@ class WeightedModel final : public AssemblingModel {
   /// Stencil of the family in m, with the moments of these fields.
   void build(Memory& m, int fields, const double* const (*u)[D]) const;
   /// u of the far ends relative to the owner, [c * size + k].
-  void load_differences(std::int32_t point, ConstFieldView u, Memory& m, AlignedVector<double>& out) const;
+  void load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m, AlignedVector<double>& out) const;
 
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
@@ -93,6 +94,8 @@ class WeightedModel final : public AssemblingModel {
   Colouring cloud_colouring_;
   Field condition_, damage_;
   std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
+  bool singles_ = false;                                    ///< some points are evaluated one by one: they use rows
+  AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #if defined(__SSE2__)
 #include <immintrin.h>
@@ -159,22 +160,27 @@ inline Pack abs(Pack a) noexcept {
 inline Pack min(Pack a, Pack b) noexcept { return select(a < b, a, b); }
 inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
 
-/// rows[i][j] <-> rows[j][i]: for step 1, 2, 4 the blocks of that size off the diagonal change places.
-inline void transpose(Pack (&rows)[pack_width]) noexcept {
-  for (int step = 1; step < pack_width; step *= 2) {
-    detail::Bits low, high;
-    for (int j = 0; j < pack_width; ++j) {
-      const bool second = (j & step) != 0;
-      low[j] = second ? pack_width + j - step : j;
-      high[j] = second ? pack_width + j : j + step;
-    }
-    for (int i = 0; i < pack_width; ++i) {
-      if ((i & step) != 0) continue;
-      const detail::Lanes a = rows[i].v, b = rows[i + step].v;
-      rows[i].v = __builtin_shuffle(a, b, low);
-      rows[i + step].v = __builtin_shuffle(a, b, high);
-    }
+namespace detail {
+/// Rows i and i + Step change places of their blocks of Step lanes off the diagonal.
+template <int Step, std::size_t... J>
+inline void transpose_blocks(Pack (&rows)[pack_width], std::index_sequence<J...>) noexcept {
+  constexpr Bits low = {((J & Step) != 0 ? pack_width + static_cast<int>(J) - Step : static_cast<int>(J))...};
+  constexpr Bits high = {((J & Step) != 0 ? pack_width + static_cast<int>(J) : static_cast<int>(J) + Step)...};
+  for (int i = 0; i < pack_width; ++i) {
+    if ((i & Step) != 0) continue;
+    const Lanes a = rows[i].v, b = rows[i + Step].v;
+    rows[i].v = __builtin_shuffle(a, b, low);
+    rows[i + Step].v = __builtin_shuffle(a, b, high);
   }
+}
+}  // namespace detail
+
+/// rows[i][j] <-> rows[j][i]
+inline void transpose(Pack (&rows)[pack_width]) noexcept {
+  constexpr auto lanes = std::make_index_sequence<pack_width>();
+  detail::transpose_blocks<1>(rows, lanes);
+  if constexpr (pack_width > 2) detail::transpose_blocks<2>(rows, lanes);
+  if constexpr (pack_width > 4) detail::transpose_blocks<4>(rows, lanes);
 }
 
 /// Sum of the lanes, always in the same order.
