@@ -13,21 +13,29 @@ namespace perikit {
 
 namespace {
 
-constexpr double cut_bond = -1;   ///< in place of the influence, until the lists are compacted
+constexpr double cut_bond = -1;  ///< in place of the influence, until the lists are compacted
 
 }  // namespace
 
 CloudFamilies::CloudFamilies(const Body& b, const InfluenceFunction& influence, BondWeight kind)
-    : body(b), lists(find_families(b.rows(), b.points(), b.dimension(), b.horizon())), condition(b.make_field(1)), damage(b.make_field(1)) {
+    : body(b),
+      lists(find_families(b.rows(), b.points(), b.dimension(), b.horizon())),
+      condition(b.make_field(1)),
+      damage(b.make_field(1)) {
   const std::size_t n = body.points();
   omega.resize(bonds());
   inverse.assign(6 * n, 0.0);
   weight.assign(n, 0.0);
   normaliser.assign(n, 0.0);
   switch (body.dimension()) {
-    case 1: measure<1>(influence, kind); break;
-    case 2: measure<2>(influence, kind); break;
-    default: measure<3>(influence, kind);
+    case 1:
+      measure<1>(influence, kind);
+      break;
+    case 2:
+      measure<2>(influence, kind);
+      break;
+    default:
+      measure<3>(influence, kind);
   }
   if (broken > 0) compact();
 }
@@ -48,7 +56,8 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
         r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body.horizon()));
       }
       influence.evaluate(r, {value, family.size()});
-      const bool near_crack = std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
+      const bool near_crack =
+          std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
       double K[6] = {}, whole = 0, intact = 0;
       for (std::size_t k = 0; k < family.size(); ++k) {
         const std::int32_t j = family[k];
@@ -113,7 +122,8 @@ void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
 
 std::size_t CloudFamilies::bytes() const noexcept {
   return lists.neighbour.size() * sizeof(std::int32_t) + lists.first.size() * sizeof(std::int64_t) +
-         (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes();
+         (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() +
+         damage.bytes();
 }
 
 }  // namespace perikit

@@ -23,14 +23,21 @@ void FamilyArrays::resize(int d, int n) {
 }
 
 FamilyView FamilyArrays::view(double horizon) const noexcept {
-  return {dimension, bonds, horizon, {xi[0].data(), dimension > 1 ? xi[1].data() : nullptr, dimension > 2 ? xi[2].data() : nullptr},
-          length.data(), volume.data(), omega.data(), inverse_shape, 0};
+  return {dimension,
+          bonds,
+          horizon,
+          {xi[0].data(), dimension > 1 ? xi[1].data() : nullptr, dimension > 2 ? xi[2].data() : nullptr},
+          length.data(),
+          volume.data(),
+          omega.data(),
+          inverse_shape,
+          0};
 }
 
 namespace {
 
-/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane or
-/// on a line, 30 times as long as thick): their gradients magnify noise as much.
+/// Parts and domains of bonds are ill conditioned when the eigenvalues of K spread by more than this (they lie almost in a plane
+/// or on a line, 30 times as long as thick): their gradients magnify noise as much.
 constexpr double poor_ratio = 1e-3;
 
 /// Rows of the influence that are multiplied at a time; a multiple of every pack width.
@@ -39,7 +46,8 @@ constexpr int tile = 8;
 /// out[column * stride + q] = sum_k weight[q * row + k] columns[k * width + column] for a tile of q and P packs of columns. The
 /// sums stay in registers; they come out with q along the lanes.
 template <int P>
-void multiply_tile(const double* weight, std::size_t row, int bonds, const double* columns, std::size_t width, double* out, std::size_t stride) noexcept {
+void multiply_tile(const double* weight, std::size_t row, int bonds, const double* columns, std::size_t width, double* out,
+                   std::size_t stride) noexcept {
   Pack sums[tile][P];
   for (std::size_t k = 0; k < static_cast<std::size_t>(bonds); ++k) {
     Pack x[P];
@@ -54,13 +62,15 @@ void multiply_tile(const double* weight, std::size_t row, int bonds, const doubl
       Pack rows[pack_width];
       for (int i = 0; i < pack_width; ++i) rows[i] = sums[q + i][p];
       transpose(rows);
-      for (int i = 0; i < pack_width; ++i) rows[i].store(out + static_cast<std::size_t>(p * pack_width + i) * stride + static_cast<std::size_t>(q));
+      for (int i = 0; i < pack_width; ++i)
+        rows[i].store(out + static_cast<std::size_t>(p * pack_width + i) * stride + static_cast<std::size_t>(q));
     }
 }
 
 /// t[c] at bonds k ... += b_k . sum_q S_q(c, :) omega_q(k), C packs of bonds at a time.
 template <int D, int C>
-void adjoint_tile(const double* weight, std::size_t row, int points, const double* stress, std::size_t lanes, const double* lever, double* const (&t)[D], std::size_t k) noexcept {
+void adjoint_tile(const double* weight, std::size_t row, int points, const double* stress, std::size_t lanes, const double* lever,
+                  double* const (&t)[D], std::size_t k) noexcept {
   Pack sums[D * D][C];
   for (std::size_t q = 0; q < static_cast<std::size_t>(points); ++q) {
     Pack w[C];
@@ -112,7 +122,7 @@ void invert_lanes(const Pack* K, Pack* inverse, PackMask& regular, PackMask& poo
     for (int b = 0; b < D; ++b) norm += cofactor[symmetric_index(D, a, b)] * cofactor[symmetric_index(D, a, b)];
   const Pack bound = sqrt(norm) * poor_ratio;
   regular = (det > Pack(1e-12)) & (bound < det);
-  poor = !(det > Pack(1e-12)) | (det * Pack(D) < bound);   // K has norm 1: such a determinant means a spread above 1e5
+  poor = !(det > Pack(1e-12)) | (det * Pack(D) < bound);  // K has norm 1: such a determinant means a spread above 1e5
   const Pack by = scale / det;
   for (int c = 0; c < symmetric_components(D); ++c) inverse[c] = select(regular, cofactor[c] * by, Pack(0.0));
 }
@@ -128,7 +138,9 @@ void LocalStencil<D>::multiply(int begin, int end) noexcept {
       const auto first = static_cast<std::size_t>(p * pack_width);
       double* out = moments_.data() + first * lanes_ + static_cast<std::size_t>(q);
       const int left = packs - p, take = left == 3 ? 3 : std::min(left, 2);
-      (take == 3 ? multiply_tile<3> : take == 2 ? multiply_tile<2> : multiply_tile<1>)(weight, row_, bonds_, columns_.data() + first, width_, out, lanes_);
+      (take == 3   ? multiply_tile<3>
+       : take == 2 ? multiply_tile<2>
+                   : multiply_tile<1>)(weight, row_, bonds_, columns_.data() + first, width_, out, lanes_);
       p += take;
     }
   }
@@ -142,7 +154,7 @@ void LocalStencil<D>::fill_columns(const FamilyArrays& family, const double* con
   width_ = width;
   columns_.resize(row_ * width);
   for (std::size_t k = 0; k < row_; k += pack_width) {
-    Pack b[D], column[width];   // the rest of the last pack: zero
+    Pack b[D], column[width];  // the rest of the last pack: zero
     for (std::size_t e = 0; e < D; ++e) b[e] = Pack::load(lever_.data() + e * row_ + k);
     for (int e = 0; e < D; ++e) {
       const Pack xi = Pack::load(family.xi[e].data() + k);
@@ -207,7 +219,8 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
 }
 
 template <int D>
-void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever, int fields, const double* const (*u)[D]) {
+void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever,
+                            int fields, const double* const (*u)[D]) {
   bonds_ = family.bonds;
   row_ = family.size;
   fallbacks_ = dropped_ = 0;
@@ -217,9 +230,12 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   const bool by_bond = parts == 0;
   points_ = first + (by_bond ? bonds_ : parts);
   lanes_ = padded(static_cast<std::size_t>(points_));
-  if (fields == 0) fill_columns<0>(family, u);
-  else if (fields == 1) fill_columns<1>(family, u);
-  else fill_columns<2>(family, u);
+  if (fields == 0)
+    fill_columns<0>(family, u);
+  else if (fields == 1)
+    fill_columns<1>(family, u);
+  else
+    fill_columns<2>(family, u);
   omega_.resize(lanes_ * row_);
   moments_.resize(width_ * lanes_);
   inverse_.resize(entries * lanes_);
@@ -284,7 +300,8 @@ void LocalStencil<D>::gradient(int field, int first, int n, double* H, std::size
       for (int e = 0; e < D; ++e) {
         Pack sum(0.0);
         for (int a = 0; a < D; ++a)
-          sum += Pack::load(moment + (c * D + static_cast<std::size_t>(a)) * lanes_ + l) * Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
+          sum += Pack::load(moment + (c * D + static_cast<std::size_t>(a)) * lanes_ + l) *
+                 Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
         sum.store(H + (c * D + static_cast<std::size_t>(e)) * stride + l);
       }
 }
@@ -299,7 +316,8 @@ void LocalStencil<D>::add_stress(int first, int n, const double* P, std::size_t 
         double* at = stress + (c * D + static_cast<std::size_t>(a)) * lanes_ + l;
         Pack sum = Pack::load(at);
         for (int e = 0; e < D; ++e)
-          sum += Pack::load(P + (c * D + static_cast<std::size_t>(e)) * stride + l) * Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
+          sum += Pack::load(P + (c * D + static_cast<std::size_t>(e)) * stride + l) *
+                 Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
         sum.store(at);
       }
 }
@@ -308,7 +326,8 @@ template <int D>
 void LocalStencil<D>::adjoint(double* const (&t)[D]) noexcept {
   constexpr std::size_t pack = pack_width;
   std::size_t k = 0;
-  for (; k + 2 * pack <= row_; k += 2 * pack) adjoint_tile<D, 2>(omega_.data(), row_, points_, stress_.data(), lanes_, lever_.data(), t, k);
+  for (; k + 2 * pack <= row_; k += 2 * pack)
+    adjoint_tile<D, 2>(omega_.data(), row_, points_, stress_.data(), lanes_, lever_.data(), t, k);
   for (; k < row_; k += pack) adjoint_tile<D, 1>(omega_.data(), row_, points_, stress_.data(), lanes_, lever_.data(), t, k);
 }
 
@@ -321,7 +340,8 @@ void LocalStencil<D>::expand(std::vector<double>& g) const {
       for (std::size_t e = 0; e < D; ++e) {
         double sum = 0;
         for (std::size_t a = 0; a < D; ++a)
-          sum += inverse_[static_cast<std::size_t>(symmetric_index(D, static_cast<int>(a), static_cast<int>(e))) * lanes_ + q] * lever_[a * row_ + k];
+          sum += inverse_[static_cast<std::size_t>(symmetric_index(D, static_cast<int>(a), static_cast<int>(e))) * lanes_ + q] *
+                 lever_[a * row_ + k];
         g[(q * bonds + k) * D + e] = omega_[q * row_ + k] * sum;
       }
 }

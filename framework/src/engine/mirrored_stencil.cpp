@@ -17,7 +17,9 @@ constexpr double symmetric_to = 1e-12;
 
 constexpr int tile_rows = 8;
 
-double sign(std::size_t character, std::size_t element) { return std::popcount(character & element) % 2 == 0 ? 1.0 : -1.0; }
+double sign(std::size_t character, std::size_t element) {
+  return std::popcount(character & element) % 2 == 0 ? 1.0 : -1.0;
+}
 
 template <int D, int R>
 void gradient_tile(const StencilTile& tile, const double* g, const double* uhat, double* m) noexcept {
@@ -69,13 +71,14 @@ constexpr std::array<TileKernel, sizeof...(R)> adjoint_tiles(std::index_sequence
 bool MirrorBasis::build(int elements, const std::array<std::vector<std::int32_t>, 3>& images) {
   orbits.clear();
   std::vector<bool> seen(static_cast<std::size_t>(elements), false);
-  std::array<std::vector<std::int32_t*>, 8> coefficients;   // by character
+  std::array<std::vector<std::int32_t*>, 8> coefficients;  // by character
   std::vector<std::vector<int>> movers;
   for (std::int32_t x = 0; x < elements; ++x) {
     if (seen[static_cast<std::size_t>(x)]) continue;
     std::vector<int>& moves = movers.emplace_back();
     for (int e = 0; e < 3; ++e)
-      if (!images[static_cast<std::size_t>(e)].empty() && images[static_cast<std::size_t>(e)][static_cast<std::size_t>(x)] != x) moves.push_back(e);
+      if (!images[static_cast<std::size_t>(e)].empty() && images[static_cast<std::size_t>(e)][static_cast<std::size_t>(x)] != x)
+        moves.push_back(e);
     Orbit& orbit = orbits.emplace_back();
     orbit.size = 1 << moves.size();
     for (std::size_t b = 0; b < static_cast<std::size_t>(orbit.size); ++b) {
@@ -103,7 +106,8 @@ bool MirrorBasis::build(int elements, const std::array<std::vector<std::int32_t>
 }
 
 template <int D>
-MirroredStencil<D>::MirroredStencil(const FamilyArrays& family, const LocalStencil<D>& stencil, int owners, bool by_bond) : bonds_(family.bonds) {
+MirroredStencil<D>::MirroredStencil(const FamilyArrays& family, const LocalStencil<D>& stencil, int owners, bool by_bond)
+    : bonds_(family.bonds) {
   std::vector<double> g;
   stencil.expand(g);
   std::vector<std::int32_t> kept;
@@ -117,7 +121,8 @@ MirroredStencil<D>::MirroredStencil(const FamilyArrays& family, const LocalStenc
 }
 
 template <int D>
-void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vector<double>& g, const std::vector<std::int32_t>& kept, int owners, bool by_bond) {
+void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vector<double>& g,
+                                      const std::vector<std::int32_t>& kept, int owners, bool by_bond) {
   const auto bonds = static_cast<std::size_t>(bonds_), points = kept.size();
   double largest = 0;
   for (const double value : g) largest = std::max(largest, std::abs(value));
@@ -128,7 +133,7 @@ void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vec
     return xi;
   };
   for (std::size_t k = 0; k < bonds; ++k) bond_at[vector(k)] = static_cast<std::int32_t>(k);
-  std::vector<std::int32_t> index_of(bonds + static_cast<std::size_t>(owners), -1);   // of kept evaluation points
+  std::vector<std::int32_t> index_of(bonds + static_cast<std::size_t>(owners), -1);  // of kept evaluation points
   for (std::size_t q = 0; q < points; ++q)
     if (by_bond) index_of[static_cast<std::size_t>(kept[q])] = static_cast<std::int32_t>(q);
   std::array<std::vector<std::int32_t>, 3> bond_images, point_images;
@@ -143,10 +148,13 @@ void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vec
     }
     if (image.size() < bonds) continue;
     const auto mirrored = [&](std::size_t q, std::size_t other) {
-      const double *row = &g[static_cast<std::size_t>(kept[q]) * bonds * D], *far = &g[static_cast<std::size_t>(kept[other]) * bonds * D];
+      const double *row = &g[static_cast<std::size_t>(kept[q]) * bonds * D],
+                   *far = &g[static_cast<std::size_t>(kept[other]) * bonds * D];
       for (std::size_t k = 0; k < bonds; ++k)
         for (std::size_t c = 0; c < D; ++c)
-          if (!(std::abs((c == e ? -1.0 : 1.0) * row[k * D + c] - far[static_cast<std::size_t>(image[k]) * D + c]) <= symmetric_to * largest)) return false;
+          if (!(std::abs((c == e ? -1.0 : 1.0) * row[k * D + c] - far[static_cast<std::size_t>(image[k]) * D + c]) <=
+                symmetric_to * largest))
+            return false;
       return true;
     };
     // The owner's gradient is its own image, a bond's is that of its mirror image, a part's the only one that fits.
@@ -183,7 +191,8 @@ void MirroredStencil<D>::make_tiles(const std::vector<double>& g, const std::vec
   const auto coefficients = [](const MirrorBasis& basis) {
     std::vector<std::pair<const MirrorBasis::Orbit*, std::size_t>> all(static_cast<std::size_t>(basis.first[8]));
     for (const MirrorBasis::Orbit& orbit : basis.orbits)
-      for (std::size_t b = 0; b < static_cast<std::size_t>(orbit.size); ++b) all[static_cast<std::size_t>(orbit.position[b])] = {&orbit, b};
+      for (std::size_t b = 0; b < static_cast<std::size_t>(orbit.size); ++b)
+        all[static_cast<std::size_t>(orbit.position[b])] = {&orbit, b};
     return all;
   };
   const auto columns = coefficients(bond_basis_), rows = coefficients(point_basis_);
@@ -203,7 +212,8 @@ void MirroredStencil<D>::make_tiles(const std::vector<double>& g, const std::vec
     for (std::size_t t = 0; t < tiles; ++t) {
       const std::size_t begin = block.size() * t / tiles, end = block.size() * (t + 1) / tiles;
       StencilTile& tile = tiles_.emplace_back(StencilTile{static_cast<std::int32_t>(end - begin), first, count, g_.size(), {}});
-      for (std::size_t r = begin; r < end; ++r) tile.target[r - begin] = (block[r].position * D + static_cast<std::int32_t>(block[r].e)) * D * 8;
+      for (std::size_t r = begin; r < end; ++r)
+        tile.target[r - begin] = (block[r].position * D + static_cast<std::int32_t>(block[r].e)) * D * 8;
       for (std::int32_t k = first; k < first + count; ++k) {
         const auto& [orbit, signs] = columns[static_cast<std::size_t>(k)];
         for (std::size_t r = begin; r < end; ++r) {

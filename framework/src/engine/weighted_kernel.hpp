@@ -1,6 +1,6 @@
 #pragma once
-/// Eight points with one mirrored stencil, one a lane: from displacements to coefficients, from coefficients to batches of evaluation
-/// points, and the way back.
+/// Eight points with one mirrored stencil, one a lane: from displacements to coefficients, from coefficients to batches of
+/// evaluation points, and the way back.
 
 #include "mirrored_stencil.hpp"
 #include "perikit/core/simd.hpp"
@@ -11,8 +11,8 @@ namespace perikit {
 /// Eight points (the last ones may repeat the first) and the far ends of their bonds: `shift[k]` further on in memory.
 struct LanePoints {
   const std::int32_t* point;
-  int count;               ///< different ones
-  bool contiguous;         ///< eight in a row
+  int count;        ///< different ones
+  bool contiguous;  ///< eight in a row
   const std::int32_t* shift;
 
   Pack load(const double* component, std::int32_t by, int l) const noexcept {
@@ -40,7 +40,8 @@ void walsh_hadamard(Pack* v) noexcept {
     }
 }
 
-/// For each orbit of 1, 2, 4 or 8 elements: read each, transform, write each; indices are known to the compiler but for the memory.
+/// For each orbit of 1, 2, 4 or 8 elements: read each, transform, write each; indices are known to the compiler but for the
+/// memory.
 template <class Read, class Write>
 void transform_orbit(int size, const Read& read, const Write& write) noexcept {
   const auto run = [&]<int N>() {
@@ -50,10 +51,14 @@ void transform_orbit(int size, const Read& read, const Write& write) noexcept {
     for (int i = 0; i < N; ++i) write(i, v[i]);
   };
   switch (size) {
-    case 1: return run.template operator()<1>();
-    case 2: return run.template operator()<2>();
-    case 4: return run.template operator()<4>();
-    default: return run.template operator()<8>();
+    case 1:
+      return run.template operator()<1>();
+    case 2:
+      return run.template operator()<2>();
+    case 4:
+      return run.template operator()<4>();
+    default:
+      return run.template operator()<8>();
   }
 }
 
@@ -65,20 +70,23 @@ void gather_coefficients(const MirrorBasis& basis, const LanePoints& points, Con
     for (int l = 0; l < 8; l += pack_width) {
       const Pack own = points.load(component, 0, l);
       for (const MirrorBasis::Orbit& orbit : basis.orbits)
-        transform_orbit(orbit.size, [&](int i) { return points.load(component, points.shift[orbit.element[i]], l) - own; },
-                        [&](int i, Pack v) { v.store(uhat + (orbit.position[i] * D + c) * 8 + l); });
+        transform_orbit(
+            orbit.size, [&](int i) { return points.load(component, points.shift[orbit.element[i]], l) - own; },
+            [&](int i, Pack v) { v.store(uhat + (orbit.position[i] * D + c) * 8 + l); });
     }
   }
 }
 
 /// out_own += sum t, out_far -= t. t: memory like `that`, by bond.
 template <int D>
-void scatter_coefficients(const MirrorBasis& basis, const LanePoints& points, const double* that, double* t, FieldView out) noexcept {
+void scatter_coefficients(const MirrorBasis& basis, const LanePoints& points, const double* that, double* t,
+                          FieldView out) noexcept {
   for (const MirrorBasis::Orbit& orbit : basis.orbits)
     for (int c = 0; c < D; ++c)
       for (int l = 0; l < 8; l += pack_width)
-        transform_orbit(orbit.size, [&](int i) { return Pack::load(that + (orbit.position[i] * D + c) * 8 + l); },
-                        [&](int i, Pack v) { v.store(t + (orbit.element[i] * D + c) * 8 + l); });
+        transform_orbit(
+            orbit.size, [&](int i) { return Pack::load(that + (orbit.position[i] * D + c) * 8 + l); },
+            [&](int i, Pack v) { v.store(t + (orbit.element[i] * D + c) * 8 + l); });
   // Bonds are sorted along the rows of the lattice: a sum is not read again while part of it is still on its way to memory.
   const int bonds = basis.first[8];
   for (int l = 0; l < 8; l += pack_width) {
@@ -99,8 +107,9 @@ void orbit_gradients(const MirrorBasis::Orbit& orbit, const double* m, int slot,
   for (int c = 0; c < D; ++c)
     for (int e = 0; e < D; ++e)
       for (int l = 0; l < 8; l += pack_width)
-        transform_orbit(orbit.size, [&](int i) { return Pack::load(m + ((orbit.position[i] * D + e) * D + c) * 8 + l); },
-                        [&](int i, Pack v) { v.store(H + (c * D + e) * batch_points + (slot + i) * 8 + l); });
+        transform_orbit(
+            orbit.size, [&](int i) { return Pack::load(m + ((orbit.position[i] * D + e) * D + c) * 8 + l); },
+            [&](int i, Pack v) { v.store(H + (c * D + e) * batch_points + (slot + i) * 8 + l); });
 }
 
 /// The transpose: stress of one orbit to coefficients.
@@ -109,8 +118,9 @@ void orbit_stresses(const MirrorBasis::Orbit& orbit, const double* P, int slot, 
   for (int c = 0; c < D; ++c)
     for (int e = 0; e < D; ++e)
       for (int l = 0; l < 8; l += pack_width)
-        transform_orbit(orbit.size, [&](int i) { return Pack::load(P + (c * D + e) * batch_points + (slot + i) * 8 + l); },
-                        [&](int i, Pack v) { v.store(m + ((orbit.position[i] * D + e) * D + c) * 8 + l); });
+        transform_orbit(
+            orbit.size, [&](int i) { return Pack::load(P + (c * D + e) * batch_points + (slot + i) * 8 + l); },
+            [&](int i, Pack v) { v.store(m + ((orbit.position[i] * D + e) * D + c) * 8 + l); });
 }
 
 }  // namespace perikit

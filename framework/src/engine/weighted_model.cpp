@@ -15,11 +15,21 @@ namespace perikit {
 
 template <int D>
 WeightedModel<D>::WeightedModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), rules_{kinematics_.get(), traits_, body_.horizon()},
-      skip_(parts.skip), owners_(traits_.selective ? 1 : 0), parts_(rules_.at_points() ? 1 : kinematics_->parts(D)),
-      condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
-  if (body_.lattice()) prepare_lattice(*parts.influence);
-  else prepare_cloud(*parts.influence);
+    : AssemblingModel(parts),
+      body_(*parts.body),
+      laws_(*parts.laws),
+      kinematics_(parts.kinematics),
+      traits_(kinematics_->traits()),
+      rules_{kinematics_.get(), traits_, body_.horizon()},
+      skip_(parts.skip),
+      owners_(traits_.selective ? 1 : 0),
+      parts_(rules_.at_points() ? 1 : kinematics_->parts(D)),
+      condition_(body_.make_field(1)),
+      damage_(body_.make_field(1)) {
+  if (body_.lattice())
+    prepare_lattice(*parts.influence);
+  else
+    prepare_cloud(*parts.influence);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
 }
 
@@ -34,7 +44,7 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
   const std::vector<std::int32_t> stencil_of = store_stencils();
   for (const LatticeBlock& block : f.blocks) {
     block_first_.push_back(groups_.size());
-    std::map<std::int32_t, std::vector<std::int32_t>> members;   // by class
+    std::map<std::int32_t, std::vector<std::int32_t>> members;  // by class
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
       const LatticeChunk& chunk = f.chunks[c];
       for (int l = 0; l < chunk_points; ++l) {
@@ -54,7 +64,8 @@ std::vector<std::int32_t> WeightedModel<D>::store_stencils() {
   std::vector<std::int32_t> stencil_of(classes_.size(), -1);
   std::vector<std::size_t> order(classes_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return classes_[a].members > classes_[b].members; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return classes_[a].members > classes_[b].members; });
   std::size_t bytes = 0;
   Memory m;
   for (const std::size_t k : order) {
@@ -75,7 +86,8 @@ template <int D>
 void WeightedModel<D>::group_points(std::span<const std::int32_t> points, std::int32_t family, std::int32_t stencil) {
   if (classes_[static_cast<std::size_t>(family)].slots.empty()) return;
   const auto add = [&](std::span<const std::int32_t> group, bool contiguous) {
-    groups_.push_back({static_cast<std::uint32_t>(members_.size()), family, stencil, static_cast<std::uint8_t>(group.size()), contiguous});
+    groups_.push_back(
+        {static_cast<std::uint32_t>(members_.size()), family, stencil, static_cast<std::uint8_t>(group.size()), contiguous});
     members_.insert(members_.end(), group.begin(), group.end());
     if (stencil >= 0) members_.insert(members_.end(), 8 - group.size(), group[0]);
   };
@@ -96,8 +108,10 @@ void WeightedModel<D>::group_points(std::span<const std::int32_t> points, std::i
   }
   for (std::size_t i = 0; i < rest.size(); i += 8) {
     const std::span<const std::int32_t> some = std::span(rest).subspan(i, std::min<std::size_t>(8, rest.size() - i));
-    if (parts_ == 0 && some.size() < fewest_together) add_singly(some);
-    else add(some, false);
+    if (parts_ == 0 && some.size() < fewest_together)
+      add_singly(some);
+    else
+      add(some, false);
   }
 }
 
@@ -140,7 +154,8 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   for (std::size_t b = 0; b < blocks; ++b) {
     touches[b].push_back(static_cast<std::int32_t>(b));
     for (std::size_t p = b * cloud_block; p < std::min((b + 1) * cloud_block, body_.points()); ++p)
-      for (const std::int32_t j : f.neighbours(p)) touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
+      for (const std::int32_t j : f.neighbours(p))
+        touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
     std::sort(touches[b].begin(), touches[b].end());
     touches[b].erase(std::unique(touches[b].begin(), touches[b].end()), touches[b].end());
   }
@@ -152,7 +167,8 @@ void WeightedModel<D>::load_class(std::int32_t family, Memory& m) const {
   const FamilyClass& own = classes_[static_cast<std::size_t>(family)];
   lattice_->load(own.slots, m.family);
   m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < own.slots.size(); ++k) m.share[k] = own.scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
+  for (std::size_t k = 0; k < own.slots.size(); ++k)
+    m.share[k] = own.scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
 }
 
 template <int D>
@@ -160,7 +176,8 @@ void WeightedModel<D>::load_cloud_family(std::size_t p, Memory& m) const {
   cloud_->load(p, m.family);
   const auto bonds = static_cast<std::size_t>(m.family.bonds);
   m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < bonds; ++k) m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / cloud_->normaliser[p];
+  for (std::size_t k = 0; k < bonds; ++k)
+    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / cloud_->normaliser[p];
   m.lever.assign(levers_.empty() ? 0 : D * m.family.size, 0.0);
   if (levers_.empty()) return;
   const double* lever = levers_.data() + D * static_cast<std::size_t>(cloud_->lists.first[p]);
@@ -174,7 +191,8 @@ void WeightedModel<D>::build(Memory& m, int fields, const double* const (*u)[D])
 }
 
 template <int D>
-void WeightedModel<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m, AlignedVector<double>& out) const {
+void WeightedModel<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m,
+                                        AlignedVector<double>& out) const {
   const std::size_t size = m.family.size, bonds = m.index.size();
   out.resize(D * size);
   for (std::size_t c = 0; c < D; ++c) std::fill_n(out.data() + c * size + bonds, size - bonds, 0.0);
@@ -222,7 +240,7 @@ std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s
   }
   build(m, tangent ? 2 : 1, fields);
   LocalStencil<D>& stencil = m.stencil;
-  double bar[D * D][8] = {};   // stress on the owner's gradient (selective map)
+  double bar[D * D][8] = {};  // stress on the owner's gradient (selective map)
   for (int first = 0; first < stencil.points(); first += batch_points) {
     const int n = std::min(batch_points, stencil.points() - first);
     stencil.gradient(0, first, n, s.H, batch_points);
@@ -273,7 +291,7 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
   };
   coefficients(pass.u, m.u, m.m);
   if (tangent) coefficients(pass.w, m.w, m.dm);
-  double lane_weight[8], bar[D * D][8] = {};   // bar: stress on the owners' gradients (selective map)
+  double lane_weight[8], bar[D * D][8] = {};  // bar: stress on the owners' gradients (selective map)
   for (int l = 0; l < 8; ++l) lane_weight[l] = l < g.count ? weight(members[l], 1.0) : 0.0;
   const std::vector<MirrorBasis::Orbit>& orbits = stencil.point_basis().orbits;
   for (auto begin = orbits.begin(); begin != orbits.end();) {
@@ -379,17 +397,25 @@ ModelReport WeightedModel<D>::report() const {
   report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
   for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
-  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) + members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) + (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) +
+                 members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) +
+                 (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() +
+                 scratch_.bytes();
   if (lattice_) {
     const auto points = static_cast<double>(body_.points());
     std::size_t together = 0;
     for (const Group& group : groups_) together += group.stencil >= 0 ? group.count : 0;
     if (!stencils_.empty()) {
-      const double whole = 8.0 * D * static_cast<double>(lattice_->offsets.size()) * (parts_ > 0 ? parts_ : static_cast<double>(lattice_->offsets.size()));
-      report.skips.push_back({"stencils of equal families", fmt::format("{} stored for {} of {} points, by characters of their mirrors", stencils_.size(), together, body_.points()),
-                              fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6, whole * points / 1e6)});
+      const double whole = 8.0 * D * static_cast<double>(lattice_->offsets.size()) *
+                           (parts_ > 0 ? parts_ : static_cast<double>(lattice_->offsets.size()));
+      report.skips.push_back(
+          {"stencils of equal families",
+           fmt::format("{} stored for {} of {} points, by characters of their mirrors", stencils_.size(), together,
+                       body_.points()),
+           fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6, whole * points / 1e6)});
     }
-    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", fmt::format("{:.3g} MB", static_cast<double>(bonds_) * (4 + 8 * (D + 1)) / 1e6)});
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
+                            fmt::format("{:.3g} MB", static_cast<double>(bonds_) * (4 + 8 * (D + 1)) / 1e6)});
   }
   return report;
 }

@@ -7,17 +7,17 @@
 #include "blocks.hpp"
 #include "cloud_families.hpp"
 #include "cloud_rows.hpp"
+#include "engine/assembly/assembly.hpp"
 #include "family_classes.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
 #include "mirrored_stencil.hpp"
-#include "engine/assembly/assembly.hpp"
 
 namespace perikit {
 
-/// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its mirrors,
-/// and up to eight of them are evaluated at a time. Points of a cloud, of rare classes, and of classes beyond a cap in bytes
-/// make their stencil when they need it.
+/// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its
+/// mirrors, and up to eight of them are evaluated at a time. Points of a cloud, of rare classes, and of classes beyond a cap in
+/// bytes make their stencil when they need it.
 template <int D>
 class WeightedModel final : public AssemblingModel {
  public:
@@ -32,18 +32,18 @@ class WeightedModel final : public AssemblingModel {
 
  private:
   static constexpr std::size_t cloud_block = 64;
-  static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;   ///< cap for stored stencils
+  static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;  ///< cap for stored stencils
 
   /// Fewer points with an evaluation point at every bond are faster one by one.
   static constexpr std::size_t fewest_together = 3;
 
   /// Up to eight points with one stored stencil, or a single point that makes its own.
   struct Group {
-    std::uint32_t first;       ///< into members_: eight entries where there is a stencil, the last ones may repeat the first
-    std::int32_t family;       ///< class (lattices)
-    std::int32_t stencil;      ///< index of the stored one, or -1
+    std::uint32_t first;   ///< into members_: eight entries where there is a stencil, the last ones may repeat the first
+    std::int32_t family;   ///< class (lattices)
+    std::int32_t stencil;  ///< index of the stored one, or -1
     std::uint8_t count;
-    bool contiguous;           ///< eight points in a row
+    bool contiguous;  ///< eight points in a row
   };
   struct Memory {
     FamilyArrays family;
@@ -81,20 +81,20 @@ class WeightedModel final : public AssemblingModel {
   KinematicsTraits traits_;
   StencilRules rules_;
   bool skip_;
-  int owners_;                                              ///< evaluation points without a share, for the selective map
-  int parts_;                                               ///< evaluation points per point; 0: one per bond
+  int owners_;  ///< evaluation points without a share, for the selective map
+  int parts_;   ///< evaluation points per point; 0: one per bond
   std::optional<LatticeFamilies> lattice_;
   std::vector<FamilyClass> classes_;
   std::vector<MirroredStencil<D>> stencils_;
   std::vector<std::int32_t> members_;
   std::optional<CloudFamilies> cloud_;
-  AlignedVector<double> levers_;                            ///< clouds, point gradients of higher order: g by bond, rows of D
+  AlignedVector<double> levers_;  ///< clouds, point gradients of higher order: g by bond, rows of D
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;
   Colouring cloud_colouring_;
   Field condition_, damage_;
   std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
-  bool singles_ = false;                                    ///< some points are evaluated one by one: they use rows
+  bool singles_ = false;  ///< some points are evaluated one by one: they use rows
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;

@@ -1,7 +1,8 @@
+#include "perikit/sdk/plugin.hpp"
+
 #include <memory>
 
 #include "perikit/core/simd.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 
@@ -36,19 +37,26 @@ class BondAssociated final : public Kinematics {
 };
 
 PartDescription description() {
-  PartDescription part{.name = "bond_associated",
-                       .summary = "a gradient for each bond from the part of the family that is near the bond's far end",
-                       .parameters = {},
-                       .examples = {"", "bond_horizon_ratio = 1.2\nweight = \"kernel\""},
-                       .equations = "F_ij = (sum_k omega V_k y_ik (x) xi_ik) (sum_k omega V_k xi_ik (x) xi_ik)^-1,  k in H_i with |X_k - X_j| <= r delta\n"
-                                    "W_ij = V_i V_j / sum_j V_j  (weight = \"volume\"),  V_i omega V_j / sum_j omega V_j  (\"kernel\")",
-                       .source = "Chen, Bond-associated deformation gradients for peridynamic correspondence model, Mech. Res. Commun. 90 (2018) 34-41; "
-                                 "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 4.15-4.20; "
-                                 "Scabbia et al. 2025, eqs. 12-14",
-                       .limits = "work grows with the square of the family; domains without a gradient of their own (all of them with the "
-                                 "nearest neighbours only) use the whole family"};
-  part.parameters.number("bond_horizon_ratio", "-", "radius r of the ball around the far end, to the horizon").by_default("1.0").positive();
-  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V").by_default("\"volume\"");
+  PartDescription part{
+      .name = "bond_associated",
+      .summary = "a gradient for each bond from the part of the family that is near the bond's far end",
+      .parameters = {},
+      .examples = {"", "bond_horizon_ratio = 1.2\nweight = \"kernel\""},
+      .equations =
+          "F_ij = (sum_k omega V_k y_ik (x) xi_ik) (sum_k omega V_k xi_ik (x) xi_ik)^-1,  k in H_i with |X_k - X_j| <= r delta\n"
+          "W_ij = V_i V_j / sum_j V_j  (weight = \"volume\"),  V_i omega V_j / sum_j omega V_j  (\"kernel\")",
+      .source =
+          "Chen, Bond-associated deformation gradients for peridynamic correspondence model, Mech. Res. Commun. 90 (2018) 34-41; "
+          "Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 4.15-4.20; "
+          "Scabbia et al. 2025, eqs. 12-14",
+      .limits =
+          "work grows with the square of the family; domains without a gradient of their own (all of them with the "
+          "nearest neighbours only) use the whole family"};
+  part.parameters.number("bond_horizon_ratio", "-", "radius r of the ball around the far end, to the horizon")
+      .by_default("1.0")
+      .positive();
+  part.parameters.choice("weight", {"volume", "kernel"}, "share of a bond in its point's volume: by V or by omega V")
+      .by_default("\"volume\"");
   return part;
 }
 
@@ -56,6 +64,7 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"), values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
+    return std::make_unique<BondAssociated>(values.number("bond_horizon_ratio"),
+                                            values.text("weight") == "kernel" ? BondWeight::kernel : BondWeight::volume);
   });
 }
