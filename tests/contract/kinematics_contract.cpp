@@ -318,5 +318,13 @@ TEST_CASE("kinematics: bitwise the same for one and two threads, and to rounding
     for (const std::int32_t p : problem.body().internal())
       for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(one.component(a)[p] - full.component(a)[p]));
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
+    const Field w = random_direction(problem, 52);
+    Field Kw = poisoned(problem), expected = poisoned(problem);
+    REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
+    REQUIRE(plain->problem().tangent_action(problem.displacement(), w, expected).ok());
+    worst = 0;
+    for (const std::int32_t p : problem.body().internal())
+      for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(Kw.component(a)[p] - expected.component(a)[p]));
+    CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), Kw), "savings change the tangent by ", worst / largest(problem.body(), Kw));
   }
 }

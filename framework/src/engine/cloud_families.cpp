@@ -6,27 +6,36 @@
 
 #include "cloud_rows.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/simd.hpp"
 #include "shape_tensor.hpp"
 
 namespace perikit {
 
 namespace {
 
-constexpr double cut_bond = -1;   ///< in place of the influence, until the lists are compacted
+constexpr double cut_bond = -1;  ///< in place of the influence, until the lists are compacted
 
 }  // namespace
 
 CloudFamilies::CloudFamilies(const Body& b, const InfluenceFunction& influence, BondWeight kind)
-    : body(b), lists(find_families(b.rows(), b.points(), b.dimension(), b.horizon())), condition(b.make_field(1)), damage(b.make_field(1)) {
+    : body(b),
+      lists(find_families(b.rows(), b.points(), b.dimension(), b.horizon())),
+      condition(b.make_field(1)),
+      damage(b.make_field(1)) {
   const std::size_t n = body.points();
   omega.resize(bonds());
   inverse.assign(6 * n, 0.0);
   weight.assign(n, 0.0);
   normaliser.assign(n, 0.0);
   switch (body.dimension()) {
-    case 1: measure<1>(influence, kind); break;
-    case 2: measure<2>(influence, kind); break;
-    default: measure<3>(influence, kind);
+    case 1:
+      measure<1>(influence, kind);
+      break;
+    case 2:
+      measure<2>(influence, kind);
+      break;
+    default:
+      measure<3>(influence, kind);
   }
   if (broken > 0) compact();
 }
@@ -47,7 +56,8 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
         r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body.horizon()));
       }
       influence.evaluate(r, {value, family.size()});
-      const bool near_crack = std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
+      const bool near_crack =
+          std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
       double K[6] = {}, whole = 0, intact = 0;
       for (std::size_t k = 0; k < family.size(); ++k) {
         const std::int32_t j = family[k];
@@ -138,19 +148,19 @@ void CloudFamilies::changed(std::span<const std::int32_t> points) {
 
 void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
   const std::span<const std::int32_t> family = neighbours(p);
-  const Point x = body.position(p);
+  const Row* position = reinterpret_cast<const Row*>(body.rows().data());
+  const Row own = position[p];
   out.resize(body.dimension(), static_cast<int>(family.size()));
   for (std::size_t k = 0; k < family.size(); ++k) {
-    const auto j = static_cast<std::size_t>(family[k]);
-    const Point y = body.position(j);
-    double r2 = 0;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(out.dimension); ++c) {
-      out.xi[c][k] = y[c] - x[c];
-      r2 += out.xi[c][k] * out.xi[c][k];
-    }
-    out.length[k] = std::sqrt(r2);
-    out.omega[k] = omega[static_cast<std::size_t>(lists.first[p]) + k];
-    out.volume[k] = body.volume(j);
+    const Row far = position[family[k]], xi = far - own;
+    for (int c = 0; c < out.dimension; ++c) out.xi[c][k] = xi[c];
+    out.volume[k] = far[3];
+  }
+  std::copy_n(omega.data() + lists.first[p], family.size(), out.omega.data());
+  for (std::size_t k = 0; k < out.size; k += pack_width) {
+    Pack square(0.0);
+    for (int c = 0; c < out.dimension; ++c) square += Pack::load(out.xi[c].data() + k) * Pack::load(out.xi[c].data() + k);
+    sqrt(square).store(out.length.data() + k);
   }
   std::copy_n(&inverse[6 * p], 6, out.inverse_shape);
 }

@@ -36,15 +36,16 @@ void LocalForcePoint<D>::build(const Kinematics& kinematics, const PointFamilies
   const FamilyView view = family.view(families.body().horizon());
   domain.assign(bonds * bonds * D, 0.0);
   scale.assign(bonds, 0.0);
-  omega_.resize(family.size);
+  omega_.resize(bonds * family.size);
+  kinematics.weights(view, omega_.data(), family.size);
   for (std::size_t q = 0; q < bonds; ++q) {
-    kinematics.weights(view, static_cast<int>(q), omega_.data());
+    const double* const omega = omega_.data() + q * family.size;
     double* const g = domain.data() + q * bonds * D;
-    const bool regular = stencil<D>(family, omega_.data(), g);
+    const bool regular = stencil<D>(family, omega, g);
     if (!regular) std::copy(own.begin(), own.end(), g);
     double volume = 0;
     for (std::size_t k = 0; k < bonds; ++k) {
-      if (family.omega[k] > 0) volume += (regular ? omega_[k] / family.omega[k] : 1.0) * family.volume[k];
+      if (family.omega[k] > 0) volume += (regular ? omega[k] / family.omega[k] : 1.0) * family.volume[k];
     }
     scale[q] = share[q] > 0 ? volume / family_volume / share[q] : 0.0;
   }

@@ -1,6 +1,10 @@
 #pragma once
-/// The gradient stencil of one family for the weighted shape (with the selective map, the owner's own gradient comes first, with no share): H_q = sum_k u_k (x) g_qk, g_qk = omega_q(k) V_k K_q^-1 xi_k, for all
-/// evaluation points q of one point.
+/// The stencil of one family for the weighted shape, in factors:
+///
+///   H_q = sum_k u_k (x) g_qk,   g_qk = omega_q(k) K_q^-1 b_k,   b_k = V_k xi_k,   K_q = sum_k omega_q(k) b_k (x) xi_k.
+///
+/// One number is kept for a pair (q, k), not one vector, and the sums over k for all q are one matrix product: the influence
+/// times the columns (b_k (x) xi_k, u_k (x) b_k). The adjoint is the transposed product with the columns P_q K_q^-1.
 
 #include <cstdint>
 #include <vector>
@@ -15,26 +19,67 @@ struct FamilyArrays {
   void resize(int dimension, int bonds);
   FamilyView view(double horizon) const noexcept;
   int dimension = 3, bonds = 0;
-  std::size_t size = 0;                      ///< padded(bonds)
+  std::size_t size = 0;  ///< padded(bonds)
   AlignedVector<double> xi[3], length, volume, omega;
   double inverse_shape[6] = {};
 };
 
-/// g[e][tile][k][8]: component e of g for evaluation points 8 tile ... 8 tile + 7 and bond k. Padding is zero.
-struct LocalStencil {
-  int bonds = 0, points = 0, tiles = 0;
-  AlignedVector<double> g;
-  AlignedVector<double> share;               ///< w_q, padded; their sum is 1
-  int fallbacks = 0;                         ///< evaluation points that use the whole family
-  int dropped = 0;                           ///< parts without a gradient of their own
-  const double* row(int e, int tile) const noexcept {
-    return g.data() + (static_cast<std::size_t>(e) * tiles + tile) * static_cast<std::size_t>(bonds) * 8;
-  }
-  std::size_t bytes() const noexcept { return (g.size() + share.size()) * sizeof(double); }
+/// What the stencil of any family needs to know.
+struct StencilRules {
+  const Kinematics* kinematics;
+  KinematicsTraits traits;
+  double horizon;
+  bool at_points() const noexcept { return traits.at == EvaluationPoints::points; }  ///< a point gradient of higher order
 };
 
-/// bond_share: w_ij of each bond (used where evaluation points belong to bonds). scratch: padded(bonds) doubles.
-void build_stencil(const Kinematics& kinematics, const KinematicsTraits& traits, const FamilyArrays& family, double horizon,
-                   const double* bond_share, LocalStencil& out, AlignedVector<double>& scratch);
+/// Evaluation points of one point. With the selective map, the owner's own gradient comes first, with no share.
+template <int D>
+class LocalStencil {
+ public:
+  /// For families that carry up to two `fields` of displacements: u[f][c]: component c of field f relative to the owner, by bond,
+  /// `family.size` long. bond_share: w_ij of each bond, used where evaluation points belong to bonds. `lever`: b_k of a point
+  /// gradient of higher order where it is known, [c * family.size + k]; else null.
+  void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever, int fields,
+             const double* const (*u)[D]);
+
+  int bonds() const noexcept { return bonds_; }
+  int points() const noexcept { return points_; }
+  double share(int q) const noexcept { return share_[static_cast<std::size_t>(q)]; }  ///< w_q; their sum is 1
+  int fallbacks() const noexcept { return fallbacks_; }  ///< evaluation points that use the whole family
+  int dropped() const noexcept { return dropped_; }      ///< parts without a gradient of their own
+
+  /// H of evaluation points first ... first + n - 1 of a field, H[component * stride + lane]; first is a multiple of 8, and so
+  /// many lanes are written.
+  void gradient(int field, int first, int n, double* H, std::size_t stride) const noexcept;
+  /// Adds to the stress of these points: columns P_q K_q^-1, zero at first.
+  void add_stress(int first, int n, const double* P, std::size_t stride) noexcept;
+  /// t_k = sum_q P_q g_qk by bond, t[c][k], from all stresses.
+  void adjoint(double* const (&t)[D]) noexcept;
+  /// g_qk, all of them: g[(q * bonds + k) * D + e].
+  void expand(std::vector<double>& g) const;
+
+ private:
+  void set_lever(const StencilRules& rules, const FamilyArrays& family, const double* lever);
+  template <int Fields>
+  void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
+  /// Sums of the tiles that hold rows [begin, end): moments_ = omega_ columns_.
+  void multiply(int begin, int end) noexcept;
+  /// K_q^-1 of row q, or of all rows, and whether they are regular: the eigenvalues of K spread by less than 1 / ratio.
+  void invert_one(int q, double ratio);
+  void invert_all();
+
+  int bonds_ = 0, points_ = 0, fallbacks_ = 0, dropped_ = 0;
+  std::size_t row_ = 0;            ///< padded(bonds)
+  std::size_t lanes_ = 0;          ///< padded(points)
+  std::size_t width_ = 0;          ///< columns, padded to packs
+  AlignedVector<double> omega_;    ///< [q * row_ + k]
+  AlignedVector<double> lever_;    ///< b: [c * row_ + k]
+  AlignedVector<double> columns_;  ///< [k * width_ + column]: K, then the fields
+  AlignedVector<double> moments_;  ///< [q * width_ + column]
+  AlignedVector<double> inverse_;  ///< K_q^-1: [entry * lanes_ + q]; 0 where q is dropped
+  AlignedVector<double> stress_;   ///< P_q K_q^-1: [component * lanes_ + q]
+  AlignedVector<double> share_;
+  std::vector<std::uint8_t> regular_;
+};
 
 }  // namespace perikit

@@ -6,20 +6,31 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numeric>
 
 #include "samples.hpp"
-#include "shape_tensor.hpp"
 #include "weighted_kernel.hpp"
 
 namespace perikit {
 
 template <int D>
 WeightedModel<D>::WeightedModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), parts_(traits_.at == EvaluationPoints::points ? 1 : kinematics_->parts(D)),
-      condition_(body_.make_field(1)), damage_(body_.make_field(1)) {
-  normaliser_.assign(body_.stride(), 0.0);
-  if (body_.lattice()) prepare_lattice(*parts.influence);
-  else prepare_cloud(*parts.influence);
+    : AssemblingModel(parts),
+      body_(*parts.body),
+      laws_(*parts.laws),
+      kinematics_(parts.kinematics),
+      traits_(kinematics_->traits()),
+      rules_{kinematics_.get(), traits_, body_.horizon()},
+      skip_(parts.skip),
+      owners_(traits_.selective ? 1 : 0),
+      parts_(rules_.at_points() ? 1 : kinematics_->parts(D)),
+      condition_(body_.make_field(1)),
+      damage_(body_.make_field(1)) {
+  if (body_.lattice())
+    prepare_lattice(*parts.influence);
+  else
+    prepare_cloud(*parts.influence);
+  singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
 }
 
 template <int D>
@@ -28,74 +39,80 @@ void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
   bonds_ = f.bonds;
   broken_ = f.broken;
   singular_ = f.singular;
-  const std::size_t slots = f.offsets.size();
-  // A class is a set of intact slots together with its normaliser; class 0 is the whole family.
-  std::map<std::pair<std::vector<std::uint16_t>, double>, std::int32_t> classes;
-  std::vector<std::uint16_t> all(slots);
-  for (std::size_t s = 0; s < slots; ++s) all[s] = static_cast<std::uint16_t>(s);
-  lattice_bonds_.push_back(all);
-  classes[{all, f.whole.scale[0]}] = 0;
-  std::vector<std::vector<std::int32_t>> lane_class(f.patterns.size());
-  for (std::size_t k = 0; k < f.patterns.size(); ++k) {
-    const LatticePattern& pattern = f.patterns[k];
-    for (int l = 0; l < chunk_points; ++l) {
-      if (!(pattern.live >> l & 1)) {
-        lane_class[k].push_back(-1);
-        continue;
-      }
-      std::vector<std::uint16_t> bonds = f.intact_slots(pattern, l);
-      const auto [entry, fresh] = classes.try_emplace({bonds, pattern.scale[l]}, static_cast<std::int32_t>(lattice_bonds_.size()));
-      if (fresh) lattice_bonds_.push_back(std::move(bonds));
-      lane_class[k].push_back(entry->second);
-    }
-  }
+  FamilyClasses found(f);
+  classes_ = std::move(found.classes);
+  const std::vector<std::int32_t> stencil_of = store_stencils();
   for (const LatticeBlock& block : f.blocks) {
     block_first_.push_back(groups_.size());
+    std::map<std::int32_t, std::vector<std::int32_t>> members;  // by class
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
       const LatticeChunk& chunk = f.chunks[c];
-      const LatticePattern& pattern = f.pattern(chunk);
       for (int l = 0; l < chunk_points; ++l) {
-        normaliser_[static_cast<std::size_t>(chunk.first + l)] = pattern.scale[l] > 0 ? f.volume / pattern.scale[l] : 0.0;
-        condition_.data()[chunk.first + l] = pattern.condition[l];
-        damage_.data()[chunk.first + l] = pattern.damage[l];
-      }
-      if (chunk.pattern < 0) {
-        groups_.push_back({chunk.first, 0, 0, true});
-        continue;
-      }
-      for (int l = 0; l < chunk_points; ++l) {
-        const std::int32_t family = lane_class[static_cast<std::size_t>(chunk.pattern)][static_cast<std::size_t>(l)];
-        if (family >= 0) groups_.push_back({chunk.first + l, family, family, false});
+        condition_.data()[chunk.first + l] = f.pattern(chunk).condition[l];
+        damage_.data()[chunk.first + l] = f.pattern(chunk).damage[l];
+        const std::int32_t family = found.of_point[static_cast<std::size_t>(chunk.first + l)];
+        if (family >= 0) members[family].push_back(chunk.first + l);
       }
     }
+    for (const auto& [family, points] : members) group_points(points, family, stencil_of[static_cast<std::size_t>(family)]);
   }
   block_first_.push_back(groups_.size());
-  // Stencils of the classes, the most common ones first, kept up to the cap.
-  std::vector<std::size_t> members(lattice_bonds_.size(), 0);
-  std::vector<std::int32_t> example(lattice_bonds_.size(), -1);
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const auto family = static_cast<std::size_t>(groups_[g].family);
-    members[family] += groups_[g].whole ? chunk_points : 1;
-    example[family] = static_cast<std::int32_t>(g);
-  }
-  std::vector<std::int32_t> order(lattice_bonds_.size()), stored(lattice_bonds_.size(), -1);
-  for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<std::int32_t>(k);
-  std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return members[static_cast<std::size_t>(a)] > members[static_cast<std::size_t>(b)]; });
+}
+
+template <int D>
+std::vector<std::int32_t> WeightedModel<D>::store_stencils() {
+  std::vector<std::int32_t> stencil_of(classes_.size(), -1);
+  std::vector<std::size_t> order(classes_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return classes_[a].members > classes_[b].members; });
   std::size_t bytes = 0;
   Memory m;
-  for (const std::int32_t k : order) {
-    const auto family = static_cast<std::size_t>(k);
-    if (members[family] == 0) break;
-    Group group = groups_[static_cast<std::size_t>(example[family])];
-    group.family = -1;
-    load_family(group, m);
-    count(m.stencil, members[family]);
-    if (bytes > stencil_bytes) continue;
-    bytes += m.stencil.bytes();
-    stored[family] = static_cast<std::int32_t>(stencils_.size());
-    stencils_.push_back(m.stencil);
+  for (const std::size_t k : order) {
+    const FamilyClass& family = classes_[k];
+    if (family.members == 0 || family.slots.empty()) continue;
+    load_class(static_cast<std::int32_t>(k), m);
+    build(m, 0, nullptr);
+    fallbacks_ += static_cast<std::size_t>(m.stencil.fallbacks()) * family.members;
+    dropped_ += static_cast<std::size_t>(m.stencil.dropped()) * family.members;
+    if (!skip_ || bytes > stencil_bytes || (parts_ == 0 && family.members < fewest_together)) continue;
+    stencil_of[k] = static_cast<std::int32_t>(stencils_.size());
+    bytes += stencils_.emplace_back(m.family, m.stencil, owners_, parts_ == 0).bytes();
   }
-  for (Group& group : groups_) group.family = stored[static_cast<std::size_t>(group.family)];
+  return stencil_of;
+}
+
+template <int D>
+void WeightedModel<D>::group_points(std::span<const std::int32_t> points, std::int32_t family, std::int32_t stencil) {
+  if (classes_[static_cast<std::size_t>(family)].slots.empty()) return;
+  const auto add = [&](std::span<const std::int32_t> group, bool contiguous) {
+    groups_.push_back(
+        {static_cast<std::uint32_t>(members_.size()), family, stencil, static_cast<std::uint8_t>(group.size()), contiguous});
+    members_.insert(members_.end(), group.begin(), group.end());
+    if (stencil >= 0) members_.insert(members_.end(), 8 - group.size(), group[0]);
+  };
+  const auto add_singly = [&](std::span<const std::int32_t> rest) {
+    stencil = -1;
+    for (const std::int32_t& p : rest) add({&p, 1}, false);
+  };
+  if (stencil < 0) return add_singly(points);
+  // Eight in a row need no gathers; the others of the block are put together as they come.
+  std::vector<std::int32_t> rest;
+  for (std::size_t i = 0; i < points.size();) {
+    if (i + 8 <= points.size() && points[i + 7] == points[i] + 7) {
+      add(points.subspan(i, 8), true);
+      i += 8;
+    } else {
+      rest.push_back(points[i++]);
+    }
+  }
+  for (std::size_t i = 0; i < rest.size(); i += 8) {
+    const std::span<const std::int32_t> some = std::span(rest).subspan(i, std::min<std::size_t>(8, rest.size() - i));
+    if (parts_ == 0 && some.size() < fewest_together)
+      add_singly(some);
+    else
+      add(some, false);
+  }
 }
 
 template <int D>
@@ -107,22 +124,38 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   condition_ = f.condition;
   damage_ = f.damage;
   for (std::size_t p = 0; p < body_.points(); ++p) {
-    normaliser_[p] = f.normaliser[p];
-    groups_.push_back({static_cast<std::int32_t>(p), -1, -1, false});
+    if (p % cloud_block == 0) block_first_.push_back(groups_.size());
+    if (f.neighbours(p).empty()) continue;
+    groups_.push_back({static_cast<std::uint32_t>(members_.size()), -1, -1, 1, false});
+    members_.push_back(static_cast<std::int32_t>(p));
   }
-  for (std::size_t p = 0; p < body_.points(); p += cloud_block) block_first_.push_back(p);
-  block_first_.push_back(body_.points());
-  Memory m;
-  for (const Group& group : groups_) {
-    load_family(group, m);
-    count(m.stencil, 1);
-  }
+  block_first_.push_back(groups_.size());
   const std::size_t blocks = block_first_.size() - 1;
+  std::vector<std::size_t> fallbacks(blocks, 0), dropped(blocks, 0);
+  AlignedVector<double> levers(rules_.at_points() ? bonds_ * D : 0);
+  parallel_for(blocks, [&](std::size_t b) {
+    Memory m;
+    for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
+      const auto p = static_cast<std::size_t>(members_[groups_[g].first]);
+      load_cloud_family(p, m);
+      build(m, 0, nullptr);
+      fallbacks[b] += static_cast<std::size_t>(m.stencil.fallbacks());
+      dropped[b] += static_cast<std::size_t>(m.stencil.dropped());
+      if (!rules_.at_points()) continue;
+      std::vector<double> gradient;
+      m.stencil.expand(gradient);
+      std::copy(gradient.begin(), gradient.end(), levers.begin() + D * f.lists.first[p]);
+    }
+  });
+  levers_ = std::move(levers);
+  fallbacks_ = std::accumulate(fallbacks.begin(), fallbacks.end(), std::size_t{0});
+  dropped_ = std::accumulate(dropped.begin(), dropped.end(), std::size_t{0});
   std::vector<std::vector<std::int32_t>> touches(blocks);
   for (std::size_t b = 0; b < blocks; ++b) {
     touches[b].push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = block_first_[b]; p < block_first_[b + 1]; ++p)
-      for (const std::int32_t j : f.neighbours(p)) touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
+    for (std::size_t p = b * cloud_block; p < std::min((b + 1) * cloud_block, body_.points()); ++p)
+      for (const std::int32_t j : f.neighbours(p))
+        touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
     std::sort(touches[b].begin(), touches[b].end());
     touches[b].erase(std::unique(touches[b].begin(), touches[b].end()), touches[b].end());
   }
@@ -130,78 +163,49 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
 }
 
 template <int D>
-void WeightedModel<D>::load_family(const Group& group, Memory& m) const {
-  const auto p = static_cast<std::size_t>(group.first);
-  m.index.clear();
-  if (lattice_) {
-    for (const std::uint16_t s : lattice_bonds_[static_cast<std::size_t>(group.bonds)]) m.index.push_back(static_cast<std::int32_t>(group.first + lattice_->shifts[s]));
-  } else {
-    const auto family = cloud_->neighbours(p);
-    m.index.assign(family.begin(), family.end());
-  }
-  if (group.family >= 0) return;
-  if (lattice_) {
-    lattice_->load(lattice_bonds_[static_cast<std::size_t>(group.bonds)], m.family);
-  } else {
-    cloud_->load(p, m.family);
-  }
+void WeightedModel<D>::load_class(std::int32_t family, Memory& m) const {
+  const FamilyClass& own = classes_[static_cast<std::size_t>(family)];
+  lattice_->load(own.slots, m.family);
   m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < m.index.size(); ++k) {
-    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / normaliser_[p];
-  }
-  build_stencil(*kinematics_, traits_, m.family, body_.horizon(), m.share.data(), m.stencil, m.weights);
-  if (parts_ > 0) {
-    for (double& share : m.stencil.share) share *= 1 - damage_.data()[p];
-  }
+  for (std::size_t k = 0; k < own.slots.size(); ++k)
+    m.share[k] = own.scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
 }
 
 template <int D>
-void WeightedModel<D>::count(const LocalStencil& stencil, std::size_t points) {
-  fallbacks_ += static_cast<std::size_t>(stencil.fallbacks) * points;
-  dropped_ += static_cast<std::size_t>(stencil.dropped) * points;
+void WeightedModel<D>::load_cloud_family(std::size_t p, Memory& m) const {
+  cloud_->load(p, m.family);
+  const auto bonds = static_cast<std::size_t>(m.family.bonds);
+  m.share.assign(m.family.size, 0.0);
+  for (std::size_t k = 0; k < bonds; ++k)
+    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / cloud_->normaliser[p];
+  m.lever.assign(levers_.empty() ? 0 : D * m.family.size, 0.0);
+  if (levers_.empty()) return;
+  const double* lever = levers_.data() + D * static_cast<std::size_t>(cloud_->lists.first[p]);
+  for (std::size_t k = 0; k < bonds; ++k)
+    for (std::size_t c = 0; c < D; ++c) m.lever[c * m.family.size + k] = lever[k * D + c];
 }
 
 template <int D>
-void WeightedModel<D>::gather(const Group& g, const LocalStencil& stencil, ConstFieldView u, const Memory& m, AlignedVector<double>& out) const {
-  const auto bonds = static_cast<std::size_t>(stencil.bonds);
-  out.resize(bonds * D * 8);
+void WeightedModel<D>::build(Memory& m, int fields, const double* const (*u)[D]) const {
+  m.stencil.build(rules_, m.family, m.share.data(), m.lever.empty() ? nullptr : m.lever.data(), fields, u);
+}
+
+template <int D>
+void WeightedModel<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m,
+                                        AlignedVector<double>& out) const {
+  const std::size_t size = m.family.size, bonds = m.index.size();
+  out.resize(D * size);
+  for (std::size_t c = 0; c < D; ++c) std::fill_n(out.data() + c * size + bonds, size - bonds, 0.0);
+  const Row own = rows[static_cast<std::size_t>(point)];
   for (std::size_t k = 0; k < bonds; ++k) {
-    for (std::size_t c = 0; c < D; ++c) {
-      const double* value = u.component(static_cast<int>(c));
-      if (!g.whole) {
-        out[k * D + c] = value[m.index[k]] - value[g.first];
-        continue;
-      }
-      for (int l = 0; l < 8; l += pack_width) (Pack::load(value + m.index[k] + l) - Pack::load(value + g.first + l)).store(out.data() + (k * D + c) * 8 + static_cast<std::size_t>(l));
-    }
+    const Row difference = rows[static_cast<std::size_t>(m.index[k])] - own;
+    for (std::size_t c = 0; c < D; ++c) out[c * size + k] = difference[c];
   }
 }
 
 template <int D>
-void WeightedModel<D>::scatter(const Group& g, const LocalStencil& stencil, const Memory& m, FieldView out) const {
-  for (int c = 0; c < D; ++c) {
-    double* f = out.component(c);
-    for (int l = 0; l < 8; l += pack_width) {
-      Pack own(0.0);
-      double single = 0;
-      for (int k = 0; k < stencil.bonds; ++k) {
-        const double* t = m.t.data() + (k * D + c) * 8;
-        if (g.whole) {
-          const Pack v = Pack::load(t + l);
-          own += v;
-          double* far = f + m.index[static_cast<std::size_t>(k)] + l;
-          (Pack::load(far) - v).store(far);
-        } else if (l == 0) {
-          double v = 0;
-          for (int i = 0; i < 8; ++i) v += t[i];
-          single += v;
-          f[m.index[static_cast<std::size_t>(k)]] -= v;
-        }
-      }
-      if (g.whole) (Pack::load(f + g.first + l) + own).store(f + g.first + l);
-      else if (l == 0) f[g.first] += single;
-    }
-  }
+double WeightedModel<D>::weight(std::int32_t p, double share) const noexcept {
+  return body_.volume(static_cast<std::size_t>(p)) * share * (parts_ > 0 ? 1 - damage_.data()[p] : 1.0);
 }
 
 template <int D>
@@ -217,62 +221,127 @@ void WeightedModel<D>::keep_owner_gradients(int points, Memory& m, BatchScratch&
 }
 
 template <int D>
-int WeightedModel<D>::group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
-  load_family(g, m);
-  if (m.index.empty()) return -1;
-  const LocalStencil& stencil = g.family >= 0 ? stencils_[static_cast<std::size_t>(g.family)] : m.stencil;
+std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
+  const std::int32_t p = members_[g.first];
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
-  gather(g, stencil, pass.u, m, m.u);
-  if (tangent) gather(g, stencil, pass.w, m, m.w);
-  m.t.assign(static_cast<std::size_t>(stencil.bonds) * D * 8, 0.0);
-  const int lanes_per_tile = g.whole ? 64 : 8, tiles_at_once = batch_points / lanes_per_tile, points = g.whole ? 8 : 1;
-  double pressure[2][8] = {};   // on the owners' gradients (selective map), and its rate
+  m.index.clear();
+  if (lattice_) {
+    load_class(g.family, m);
+    for (const std::int32_t shift : classes_[static_cast<std::size_t>(g.family)].shifts) m.index.push_back(p + shift);
+  } else {
+    load_cloud_family(static_cast<std::size_t>(p), m);
+    const auto family = cloud_->neighbours(static_cast<std::size_t>(p));
+    m.index.assign(family.begin(), family.end());
+  }
+  const std::size_t size = m.family.size;
+  load_differences(p, u_rows_, m, m.u);
+  if (tangent) load_differences(p, w_rows_, m, m.w);
+  const double* fields[2][D];
+  for (std::size_t c = 0; c < D; ++c) {
+    fields[0][c] = m.u.data() + c * size;
+    fields[1][c] = m.w.data() + (tangent ? c * size : 0);
+  }
+  build(m, tangent ? 2 : 1, fields);
+  LocalStencil<D>& stencil = m.stencil;
+  double pressure[2][8] = {};  // on the owner's gradient (selective map), and its rate
   double* const H = traits_.selective ? s.Ht : s.H;
   double* const dH = traits_.selective ? s.dHt : s.dH;
-  for (int tile = 0; tile < stencil.tiles; tile += tiles_at_once) {
-    const int tiles = std::min(tiles_at_once, stencil.tiles - tile);
-    for (int i = 0; i < tiles; ++i) {
-      const int lane = i * lanes_per_tile;
-      if (g.whole) {
-        tile_gradient<D>(stencil, tile + i, m.u.data(), H + lane);
-        if (tangent) tile_gradient<D>(stencil, tile + i, m.w.data(), dH + lane);
-      } else {
-        single_gradient<D>(stencil, tile + i, m.u.data(), H + lane);
-        if (tangent) single_gradient<D>(stencil, tile + i, m.w.data(), dH + lane);
-      }
-      if (traits_.selective && tile + i == 0) keep_owner_gradients(points, m, s, tangent);
-      for (int l = 0; l < lanes_per_tile; ++l) {
-        const int q = g.whole ? l / 8 : l, point = g.whole ? l % 8 : 0;
-        s.owner[lane + l] = g.first + point;
-        s.weight[lane + l] = body_.volume(static_cast<std::size_t>(g.first)) * stencil.share[static_cast<std::size_t>((tile + i) * 8 + q)];
-      }
+  for (int first = 0; first < stencil.points(); first += batch_points) {
+    const int n = std::min(batch_points, stencil.points() - first);
+    stencil.gradient(0, first, n, H, batch_points);
+    if (tangent) stencil.gradient(1, first, n, dH, batch_points);
+    if (traits_.selective && first == 0) keep_owner_gradients(1, m, s, tangent);
+    for (int l = 0; l < n; ++l) {
+      s.owner[l] = p;
+      s.weight[l] = weight(p, stencil.share(first + l));
     }
-    const int n = tiles * lanes_per_tile;
-    const int bad = pass.work.evaluate(n, s, false, energy);
-    if (bad >= 0) return g.whole ? bad % 8 : 0;
+    if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
     if (sample) {
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
     for (int l = 0; l < n && traits_.selective; ++l) {
-      pressure[0][l % points] += s.pressure[l];
-      if (tangent) pressure[1][l % points] += s.pressure_rate[l];
+      pressure[0][0] += s.pressure[l];
+      if (tangent) pressure[1][0] += s.pressure_rate[l];
     }
-    for (int i = 0; i < tiles; ++i) {
-      if (g.whole) tile_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
-      else single_adjoint<D>(stencil, tile + i, s.P + i * lanes_per_tile, m.t.data());
-    }
+    stencil.add_stress(first, n, s.P, batch_points);
   }
   if (sample) return -1;
   if (traits_.selective) {
-    // The owner's gradient is evaluation point 0 of tile 0.
-    for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, lanes_per_tile, 0.0);
-    add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
-    for (int c = 0; c < D * D && !g.whole; ++c) std::fill_n(s.P + c * batch_points + 1, 7, 0.0);
-    if (g.whole) tile_adjoint<D>(stencil, 0, s.P, m.t.data());
-    else single_adjoint<D>(stencil, 0, s.P, m.t.data());
+    double stress[D * D][8] = {};
+    add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], stress[0], 8);
+    for (auto& component : stress) std::fill_n(component + 1, 7, 0.0);
+    stencil.add_stress(0, 1, stress[0], 8);
   }
-  scatter(g, stencil, m, pass.out);
+  m.t.resize(D * size);
+  double* t[D];
+  for (std::size_t c = 0; c < D; ++c) t[c] = m.t.data() + c * size;
+  stencil.adjoint(t);
+  Row sum{};
+  for (std::size_t k = 0; k < m.index.size(); ++k) {
+    Row force{};
+    for (std::size_t c = 0; c < D; ++c) force[c] = t[c][k];
+    sum += force;
+    out_rows_[static_cast<std::size_t>(m.index[k])] -= force;
+  }
+  out_rows_[static_cast<std::size_t>(p)] += sum;
+  return -1;
+}
+
+template <int D>
+std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
+  const MirroredStencil<D>& stencil = stencils_[static_cast<std::size_t>(g.stencil)];
+  const std::int32_t* members = members_.data() + g.first;
+  const LanePoints points{members, g.count, g.contiguous, classes_[static_cast<std::size_t>(g.family)].shifts.data()};
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const auto bonds = static_cast<std::size_t>(stencil.bonds()), evaluated = static_cast<std::size_t>(stencil.points());
+  const auto coefficients = [&](ConstFieldView field, AlignedVector<double>& hat, AlignedVector<double>& out) {
+    hat.resize(bonds * D * 8);
+    out.resize(evaluated * D * D * 8);
+    gather_coefficients<D>(stencil.bond_basis(), points, field, hat.data());
+    stencil.gradient(hat.data(), out.data());
+  };
+  coefficients(pass.u, m.u, m.m);
+  if (tangent) coefficients(pass.w, m.w, m.dm);
+  double lane_weight[8], pressure[2][8] = {};  // pressure: on the owners' gradients (selective map), and its rate
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
+  for (int l = 0; l < 8; ++l) lane_weight[l] = l < g.count ? weight(members[l], 1.0) : 0.0;
+  const std::vector<MirrorBasis::Orbit>& orbits = stencil.point_basis().orbits;
+  for (auto begin = orbits.begin(); begin != orbits.end();) {
+    // As many orbits as a batch holds.
+    auto end = begin;
+    int slots = 0;
+    for (; end != orbits.end() && (slots + end->size) * 8 <= batch_points; slots += end++->size) {
+      orbit_gradients<D>(*end, m.m.data(), slots, H);
+      if (tangent) orbit_gradients<D>(*end, m.dm.data(), slots, dH);
+      for (int i = 0; i < end->size; ++i)
+        for (int l = 0; l < 8; ++l) {
+          s.owner[(slots + i) * 8 + l] = members[l];
+          s.weight[(slots + i) * 8 + l] = lane_weight[l] * stencil.share(end->element[i]);
+        }
+    }
+    if (traits_.selective && begin == orbits.begin()) keep_owner_gradients(8, m, s, tangent);
+    const int bad = pass.work.evaluate(slots * 8, s, false, energy);
+    if (bad >= 0) return members[bad % 8];
+    if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
+    for (int l = 0; l < slots * 8 && traits_.selective && !sample; ++l) {
+      pressure[0][l % 8] += s.pressure[l];
+      if (tangent) pressure[1][l % 8] += s.pressure_rate[l];
+    }
+    slots = 0;
+    for (; begin != end; slots += begin++->size)
+      if (!sample) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
+  }
+  if (sample) return -1;
+  if (traits_.selective) {
+    for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
+    add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+    orbit_stresses<D>(orbits.front(), s.P, 0, m.m.data());
+  }
+  m.t.assign(bonds * D * 8, 0.0);
+  stencil.adjoint(m.m.data(), m.t.data());
+  scatter_coefficients<D>(stencil.bond_basis(), points, m.t.data(), m.u.data(), pass.out);
   return -1;
 }
 
@@ -282,9 +351,10 @@ void WeightedModel<D>::block(std::size_t b, Pass& pass) {
   Memory& m = *memory_[static_cast<std::size_t>(thread_index())];
   double energy = 0;
   for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
-    const int bad = group(groups_[g], m, s, pass, &energy);
+    const Group& group = groups_[g];
+    const std::int32_t bad = group.stencil >= 0 ? together(group, m, s, pass, &energy) : single(group, m, s, pass, &energy);
     if (bad >= 0) {
-      pass.report(groups_[g].first + bad);
+      pass.report(bad);
       return;
     }
   }
@@ -295,12 +365,24 @@ template <int D>
 EvaluationStatus WeightedModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   while (memory_.size() < static_cast<std::size_t>(thread_count())) memory_.push_back(std::make_unique<Memory>());
+  const std::size_t stride = body_.stride();
+  if (singles_) {
+    mirror_rows(pass.u, stride, u_rows_);
+    if (pass.work.tangent()) mirror_rows(pass.w, stride, w_rows_);
+  }
   if (pass.work.work() == Work::sample) {
     parallel_for(block_first_.size() - 1, [&](std::size_t b) { block(b, pass); });
     return status_at(body_, pass.bad);
   }
   for (int c = 0; c < D; ++c) std::memset(pass.out.component(c), 0, pass.out.stride * sizeof(double));
+  if (singles_) out_rows_.assign(stride, Row{});
   (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) { block(b, pass); });
+  if (singles_) {
+    parallel_for(cloud_blocks(stride), [&](std::size_t b) {
+      for (std::size_t p = b * cloud_block_points; p < std::min(stride, (b + 1) * cloud_block_points); ++p)
+        for (int c = 0; c < D; ++c) pass.out.component(c)[p] += out_rows_[p][c];
+    });
+  }
   return status_at(body_, pass.bad);
 }
 
@@ -331,13 +413,26 @@ ModelReport WeightedModel<D>::report() const {
   report.dropped_parts = dropped_;
   report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
-  for (const LocalStencil& s : stencils_) stencils += s.bytes();
-  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) + normaliser_.size() * 8 + condition_.bytes() + damage_.bytes() + scratch_.bytes();
+  for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
+  report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) +
+                 members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) +
+                 (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() +
+                 scratch_.bytes();
   if (lattice_) {
-    report.skips.push_back({"stencils of equal families", fmt::format("{} stored for {} points", stencils_.size(), body_.points()),
-                            fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6,
-                                        static_cast<double>(stencils_.empty() ? 0 : stencils_.front().bytes()) * static_cast<double>(body_.points()) / 1e6)});
-    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", fmt::format("{:.3g} MB", static_cast<double>(bonds_) * (4 + 8 * (D + 1)) / 1e6)});
+    const auto points = static_cast<double>(body_.points());
+    std::size_t together = 0;
+    for (const Group& group : groups_) together += group.stencil >= 0 ? group.count : 0;
+    if (!stencils_.empty()) {
+      const double whole = 8.0 * D * static_cast<double>(lattice_->offsets.size()) *
+                           (parts_ > 0 ? parts_ : static_cast<double>(lattice_->offsets.size()));
+      report.skips.push_back(
+          {"stencils of equal families",
+           fmt::format("{} stored for {} of {} points, by characters of their mirrors", stencils_.size(), together,
+                       body_.points()),
+           fmt::format("{:.3g} MB stored instead of {:.3g} MB", static_cast<double>(stencils) / 1e6, whole * points / 1e6)});
+    }
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
+                            fmt::format("{:.3g} MB", static_cast<double>(bonds_) * (4 + 8 * (D + 1)) / 1e6)});
   }
   return report;
 }

@@ -1,18 +1,23 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "batch.hpp"
 #include "blocks.hpp"
 #include "cloud_families.hpp"
+#include "cloud_rows.hpp"
+#include "engine/assembly/assembly.hpp"
+#include "family_classes.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
-#include "engine/assembly/assembly.hpp"
+#include "mirrored_stencil.hpp"
 
 namespace perikit {
 
-/// Any weighted kinematics. On a lattice, points with the same family share one stencil (a class), and eight neighbours in a row
-/// are one small matrix product; classes beyond a cap in bytes, and clouds, build their stencil when they need it.
+/// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its
+/// mirrors, and up to eight of them are evaluated at a time. Points of a cloud, of rare classes, and of classes beyond a cap in
+/// bytes make their stencil when they need it.
 template <int D>
 class WeightedModel final : public AssemblingModel {
  public:
@@ -27,50 +32,71 @@ class WeightedModel final : public AssemblingModel {
 
  private:
   static constexpr std::size_t cloud_block = 64;
-  static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;   ///< cap for stored stencils
+  static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;  ///< cap for stored stencils
 
-  /// Points first ... first + lanes with one stencil: 8 whole lattice points, or a single point.
+  /// Fewer points with an evaluation point at every bond are faster one by one.
+  static constexpr std::size_t fewest_together = 3;
+
+  /// Up to eight points with one stored stencil, or a single point that makes its own.
   struct Group {
-    std::int32_t first;
-    std::int32_t family;       ///< stored stencil, or -1: built on the fly
-    std::int32_t bonds;        ///< row of lattice_bonds_ (lattices)
-    bool whole;
+    std::uint32_t first;   ///< into members_: eight entries where there is a stencil, the last ones may repeat the first
+    std::int32_t family;   ///< class (lattices)
+    std::int32_t stencil;  ///< index of the stored one, or -1
+    std::uint8_t count;
+    bool contiguous;  ///< eight points in a row
   };
   struct Memory {
     FamilyArrays family;
-    LocalStencil stencil;
-    AlignedVector<double> weights, share, u, w, t;
-    double owner_H[72], owner_dH[72];   ///< of the owners, where the map is selective: [component][8]
+    LocalStencil<D> stencil;
+    AlignedVector<double> share, lever, u, w, t, m, dm;
+    double owner_H[72], owner_dH[72];  ///< of the owners, where the map is selective: [component][8]
     std::vector<std::int32_t> index;
   };
 
   void prepare_lattice(const InfluenceFunction& influence);
+  /// Stencils of the classes, the most common ones first, up to the cap; by class: index of the stencil or -1.
+  std::vector<std::int32_t> store_stencils();
+  void group_points(std::span<const std::int32_t> points, std::int32_t family, std::int32_t stencil);
   void prepare_cloud(const InfluenceFunction& influence);
-  void count(const LocalStencil& stencil, std::size_t points);
-  void load_family(const Group& group, Memory& m) const;
+  /// Bonds of a point as arrays with their shares; on a cloud with b_k where it is stored.
+  void load_cloud_family(std::size_t p, Memory& m) const;
+  void load_class(std::int32_t family, Memory& m) const;
+  /// Stencil of the family in m, with the moments of these fields.
+  void build(Memory& m, int fields, const double* const (*u)[D]) const;
+  /// u of the far ends relative to the owner, [c * size + k].
+  void load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m, AlignedVector<double>& out) const;
+
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
+  /// Evaluate a group; -1, or an inadmissible one of its points.
+  std::int32_t single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  std::int32_t together(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  /// W of evaluation point q of point p.
+  double weight(std::int32_t p, double share) const noexcept;
   /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
   void keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
-  int group(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
-  void gather(const Group& g, const LocalStencil& stencil, ConstFieldView u, const Memory& m, AlignedVector<double>& out) const;
-  void scatter(const Group& g, const LocalStencil& stencil, const Memory& m, FieldView out) const;
 
   const Body& body_;
   const Laws& laws_;
   std::shared_ptr<const Kinematics> kinematics_;
   KinematicsTraits traits_;
-  int parts_;                                               ///< evaluation points per point; 0: one per bond
+  StencilRules rules_;
+  bool skip_;
+  int owners_;  ///< evaluation points without a share, for the selective map
+  int parts_;   ///< evaluation points per point; 0: one per bond
   std::optional<LatticeFamilies> lattice_;
-  std::vector<std::vector<std::uint16_t>> lattice_bonds_;   ///< slots of each class of family
-  std::vector<LocalStencil> stencils_;
+  std::vector<FamilyClass> classes_;
+  std::vector<MirroredStencil<D>> stencils_;
+  std::vector<std::int32_t> members_;
   std::optional<CloudFamilies> cloud_;
-  AlignedVector<double> normaliser_;                        ///< N_i of bond weights, by point
+  AlignedVector<double> levers_;  ///< clouds, point gradients of higher order: g by bond, rows of D
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;
   Colouring cloud_colouring_;
   Field condition_, damage_;
   std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
+  bool singles_ = false;  ///< some points are evaluated one by one: they use rows
+  AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;
 };

@@ -16,16 +16,18 @@ class BondAssociated final : public Kinematics {
   KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::weighted, .weight = weight_, .force_state = force_state_}; }
 
   /// omega where |xi_k - xi_q| <= bond horizon, else 0. Lattice points on the sphere count, whatever the rounding.
-  void weights(const FamilyView& family, int q, double* omega) const noexcept override {
+  void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
     const double radius = ratio_ * family.horizon * (1 + 1e-10);
     const Pack reach(radius * radius);
-    for (int k = 0; k < family.bonds; k += pack_width) {
-      Pack square(0.0);
-      for (int a = 0; a < family.dimension; ++a) {
-        const Pack difference = Pack::load(family.xi[a] + k) - Pack(family.xi[a][q]);
-        square += difference * difference;
+    for (int q = 0; q < family.bonds; ++q, omega += stride) {
+      for (int k = 0; k < family.bonds; k += pack_width) {
+        Pack square(0.0);
+        for (int a = 0; a < family.dimension; ++a) {
+          const Pack difference = Pack::load(family.xi[a] + k) - Pack(family.xi[a][q]);
+          square += difference * difference;
+        }
+        select(square <= reach, Pack::load(family.omega + k), Pack(0.0)).store(omega + k);
       }
-      select(square <= reach, Pack::load(family.omega + k), Pack(0.0)).store(omega + k);
     }
   }
 

@@ -17,7 +17,7 @@ class Selective final : public Kinematics {
   }
   int parts(int dimension) const override { return base_->parts(dimension); }
   void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override { base_->correction(family, g, stride); }
-  void weights(const FamilyView& family, int q, double* omega) const noexcept override { base_->weights(family, q, omega); }
+  void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override { base_->weights(family, omega, stride); }
 
  private:
   std::unique_ptr<Kinematics> base_;

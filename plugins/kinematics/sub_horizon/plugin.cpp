@@ -1,8 +1,9 @@
+#include "perikit/sdk/plugin.hpp"
+
 #include <memory>
 #include <string>
 
 #include "perikit/core/simd.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 
@@ -19,38 +20,47 @@ class SubHorizon final : public Kinematics {
   explicit SubHorizon(const ParameterValues& options) : options_(options) {}
 
   KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::weighted, .part_weight = options_.text("weights") == "volume" ? PartWeight::volume : PartWeight::equal};
+    return {.at = EvaluationPoints::weighted,
+            .part_weight = options_.text("weights") == "volume" ? PartWeight::volume : PartWeight::equal};
   }
 
   int parts(int dimension) const override {
     const int orthants = 1 << dimension;
     if (!options_.has("parts") || options_.integer("parts") == orthants) return orthants;
     if (dimension == 1 && options_.integer("parts") == 4) return 4;
-    throw options_.error("parts", std::to_string(options_.integer("parts")) + "; a body of dimension " + std::to_string(dimension) + " has " +
+    throw options_.error("parts", std::to_string(options_.integer("parts")) + "; a body of dimension " +
+                                      std::to_string(dimension) + " has " +
                                       (dimension == 1 ? "2 or 4" : std::to_string(orthants)) + " parts");
   }
 
-  void weights(const FamilyView& family, int q, double* omega) const noexcept override {
-    if (family.dimension == 1 && options_.has("parts") && options_.integer("parts") == 4) return quarters(family, q, omega);
+  void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
+    if (family.dimension == 1 && options_.has("parts") && options_.integer("parts") == 4) return quarters(family, omega, stride);
     for (int k = 0; k < family.bonds; k += pack_width) {
       const Pack length = Pack::load(family.length + k);
-      Pack value = Pack::load(family.omega + k);
+      Pack share[8] = {Pack::load(family.omega + k)};
       for (int a = 0; a < family.dimension; ++a) {
-        const Pack xi = Pack::load(family.xi[a] + k);
-        value *= side((q >> a & 1) != 0 ? -xi : xi, length);
+        const Pack xi = Pack::load(family.xi[a] + k), front = side(xi, length), back = side(-xi, length);
+        for (int q = 0; q < 1 << a; ++q) {
+          share[q + (1 << a)] = share[q] * back;
+          share[q] *= front;
+        }
       }
-      value.store(omega + k);
+      for (std::size_t q = 0; q < std::size_t{1} << family.dimension; ++q) share[q].store(omega + q * stride + k);
     }
   }
 
  private:
   /// The line cut at -delta/2, 0 and delta/2.
-  static void quarters(const FamilyView& family, int q, double* omega) noexcept {
+  static void quarters(const FamilyView& family, double* omega, std::size_t stride) noexcept {
     const Pack half(0.5 * family.horizon);
-    const bool outer = q == 0 || q == 3;
     for (int k = 0; k < family.bonds; k += pack_width) {
-      const Pack length = Pack::load(family.length + k), xi = Pack::load(family.xi[0] + k), along = q < 2 ? -xi : xi;
-      (Pack::load(family.omega + k) * side(along, length) * side(outer ? along - half : half - along, half)).store(omega + k);
+      const Pack length = Pack::load(family.length + k), xi = Pack::load(family.xi[0] + k);
+      for (std::size_t q = 0; q < 4; ++q) {
+        const bool outer = q == 0 || q == 3;
+        const Pack along = q < 2 ? -xi : xi;
+        (Pack::load(family.omega + k) * side(along, length) * side(outer ? along - half : half - along, half))
+            .store(omega + q * stride + k);
+      }
     }
   }
 
@@ -58,21 +68,27 @@ class SubHorizon final : public Kinematics {
 };
 
 PartDescription description() {
-  PartDescription part{.name = "sub_horizon",
-                       .summary = "a gradient for each half, quadrant or octant of the family; no zero-energy modes",
-                       .parameters = {},
-                       .examples = {"", "weights = \"volume\""},
-                       .equations = "F_a = (sum_j s_a omega V_j y_ij (x) xi_ij) (sum_j s_a omega V_j xi_ij (x) xi_ij)^-1,  a = 1 ... 2^dimension\n"
-                                    "s_a: share of the bond in part a, 1 inside, halved by every dividing plane that it lies on\n"
-                                    "W_a = V_i / (number of admissible parts)  (weights = \"equal\"),  V_i V_a / sum_b V_b  (\"volume\")",
-                       .source = "Roy Chowdhury, Roy, Roy and Reddy, A simple alteration of the peridynamics correspondence principle to "
-                                 "eliminate zero-energy deformation, eqs. 19-31",
-                       .limits = "parts without a gradient of their own (surfaces, cracks) are dropped; the result depends on how the "
-                                 "axes lie in the body"};
-  part.parameters.integer("parts", "number of parts: 2 (1D), 4 (2D) or 8 (3D) unless given; 1D also has 4, cut at half the horizon")
+  PartDescription part{
+      .name = "sub_horizon",
+      .summary = "a gradient for each half, quadrant or octant of the family; no zero-energy modes",
+      .parameters = {},
+      .examples = {"", "weights = \"volume\""},
+      .equations =
+          "F_a = (sum_j s_a omega V_j y_ij (x) xi_ij) (sum_j s_a omega V_j xi_ij (x) xi_ij)^-1,  a = 1 ... 2^dimension\n"
+          "s_a: share of the bond in part a, 1 inside, halved by every dividing plane that it lies on\n"
+          "W_a = V_i / (number of admissible parts)  (weights = \"equal\"),  V_i V_a / sum_b V_b  (\"volume\")",
+      .source =
+          "Roy Chowdhury, Roy, Roy and Reddy, A simple alteration of the peridynamics correspondence principle to "
+          "eliminate zero-energy deformation, eqs. 19-31",
+      .limits =
+          "parts without a gradient of their own (surfaces, cracks) are dropped; the result depends on how the "
+          "axes lie in the body"};
+  part.parameters
+      .integer("parts", "number of parts: 2 (1D), 4 (2D) or 8 (3D) unless given; 1D also has 4, cut at half the horizon")
       .at_least(2)
       .at_most(8);
-  part.parameters.choice("weights", {"equal", "volume"}, "share of a part in its point's volume: all the same, or by the part's volume")
+  part.parameters
+      .choice("weights", {"equal", "volume"}, "share of a part in its point's volume: all the same, or by the part's volume")
       .by_default("\"equal\"");
   return part;
 }
@@ -80,5 +96,6 @@ PartDescription description() {
 }  // namespace
 
 PERIKIT_PLUGIN(registrar) {
-  registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) { return std::make_unique<SubHorizon>(values); });
+  registrar.kinematics(description(),
+                       [](const ParameterValues& values, const PartFactory&) { return std::make_unique<SubHorizon>(values); });
 }

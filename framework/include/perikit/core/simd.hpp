@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #if defined(__SSE2__)
 #include <immintrin.h>
@@ -142,11 +143,45 @@ inline void subtract_at(double* p, std::uint8_t bits, Pack a) noexcept {
     if (bits >> i & 1) p[i] -= a.v[i];
 #endif
 }
+/// Lane i: p[at[i]].
+inline Pack gather(const double* p, const std::int32_t* at) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  const __m256i index = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at));
+  return {reinterpret_cast<detail::Lanes>(_mm512_mask_i32gather_pd(_mm512_setzero_pd(), 0xff, index, p, 8))};
+#else
+  Pack r;
+  for (int i = 0; i < pack_width; ++i) r.v[i] = p[at[i]];
+  return r;
+#endif
+}
 inline Pack abs(Pack a) noexcept {
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & std::int64_t{0x7fffffffffffffff})};
 }
 inline Pack min(Pack a, Pack b) noexcept { return select(a < b, a, b); }
 inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
+
+namespace detail {
+/// Rows i and i + Step change places of their blocks of Step lanes off the diagonal.
+template <int Step, std::size_t... J>
+inline void transpose_blocks(Pack (&rows)[pack_width], std::index_sequence<J...>) noexcept {
+  constexpr Bits low = {((J & Step) != 0 ? pack_width + static_cast<int>(J) - Step : static_cast<int>(J))...};
+  constexpr Bits high = {((J & Step) != 0 ? pack_width + static_cast<int>(J) : static_cast<int>(J) + Step)...};
+  for (int i = 0; i < pack_width; ++i) {
+    if ((i & Step) != 0) continue;
+    const Lanes a = rows[i].v, b = rows[i + Step].v;
+    rows[i].v = __builtin_shuffle(a, b, low);
+    rows[i + Step].v = __builtin_shuffle(a, b, high);
+  }
+}
+}  // namespace detail
+
+/// rows[i][j] <-> rows[j][i]
+inline void transpose(Pack (&rows)[pack_width]) noexcept {
+  constexpr auto lanes = std::make_index_sequence<pack_width>();
+  detail::transpose_blocks<1>(rows, lanes);
+  if constexpr (pack_width > 2) detail::transpose_blocks<2>(rows, lanes);
+  if constexpr (pack_width > 4) detail::transpose_blocks<4>(rows, lanes);
+}
 
 /// Sum of the lanes, always in the same order.
 inline double sum(Pack a) noexcept {

@@ -114,10 +114,11 @@ class Kinematics {
   virtual int parts(int /*dimension*/) const { return 0; }
   /// bond shape: g_b for each bond of the view, g[c * stride + k], c < dimension [1/m]. Fully overwritten.
   virtual void correction(const FamilyView&, double* /*g*/, std::size_t /*stride*/) const noexcept {}
-  /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself): omega[k] for all bonds, at most the
-  /// view's omega for a part. Fully overwritten. A part without a well-conditioned gradient of its own is dropped and the others share
-  /// its weight; a bond's domain without one, and a family without any part, use the whole family.
-  virtual void weights(const FamilyView&, int /*q*/, double* /*omega*/) const noexcept {}
+  /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k],
+  /// at most the view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a
+  /// well-conditioned gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family
+  /// without any part, use the whole family.
+  virtual void weights(const FamilyView&, double* /*omega*/, std::size_t /*stride*/) const noexcept {}
   /// pairs: moduli of one point, asked for at set-up.
   virtual PairModuli pair_moduli(const PairPoint&) const noexcept { return {}; }
   /// pairs: what is wrong with the law for such a point, as one line for the log; empty: nothing.

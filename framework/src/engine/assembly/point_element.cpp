@@ -48,13 +48,14 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
     return;
   }
   families.bond_shares(row, s.family, s.share);
-  build_stencil(*shape.kinematics, shape.traits, s.family, horizon, s.share.data(), s.stencil, s.weights);
+  s.stencil.build({shape.kinematics.get(), shape.traits, horizon}, s.family, s.share.data(), nullptr, 0, nullptr);
+  s.stencil.expand(s.gradient);
   const int owners = shape.traits.selective ? 1 : 0;
-  out.g.assign(static_cast<std::size_t>(s.stencil.points * D) * out.width, 0.0);
-  for (int q = 0, to = 0; q < s.stencil.points; ++q) {
-    const double share = s.stencil.share[static_cast<std::size_t>(q)];
+  out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
+  for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
+    const double share = s.stencil.share(q);
     if (q >= owners && share == 0) continue;  // a dropped part
-    write_point<D>(out, to++, [&](int k, int e) { return s.stencil.row(e, q / 8)[k * 8 + q % 8]; });
+    write_point<D>(out, to++, [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; });
     if (q < owners) continue;
     out.weight.push_back(share * (shape.parts > 0 ? intact : families.volume(row)));
     ++out.points;

@@ -31,8 +31,8 @@ struct PointElement {
 template <int D>
 struct ElementScratch {
   FamilyArrays family;
-  LocalStencil stencil;
-  AlignedVector<double> share, weights;
+  LocalStencil<D> stencil;
+  AlignedVector<double> share;
   std::vector<double> gradient;
   AlignedVector<double> T;  ///< A g of eight nodes
   AlignedVector<double> K;  ///< [a][b][k][l], width x width each; tiles of 8 x 8 on and above the diagonal
