@@ -44,7 +44,7 @@ class BodyProblem final : public Problem {
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
-  bool advance_history(double) override;
+  bool advance_history(double time_step, ConstFieldView velocity = {}) override;
 
   bool any_constraint() const noexcept override { return !constrained_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
