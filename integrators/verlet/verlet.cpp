@@ -124,12 +124,13 @@ std::string Verlet::plan(Problem& problem) {
 
 void Verlet::run(Problem& problem, Observer& observer) {
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
-  const std::span<double> plan = problem.declare_numbers("verlet_plan", 5);
+  const std::span<double> plan = problem.declare_numbers("verlet_plan", 6);
   double& first = plan[0];     // step at which the plan was made
   double& start = plan[1];     // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
   double& counter = plan[4];   // steps of the plan
+  double& broke = plan[5];     // whether bonds have failed since the last estimate
   const auto steps_to_end = [&](double step) { return std::max(1.0, std::ceil((options_.end_time - problem.time()) / step * (1 - 1e-12))); };
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
@@ -187,13 +188,14 @@ void Verlet::run(Problem& problem, Observer& observer) {
       stepper.kick(stepper.half(), v, 0.5 * dt);
       if (problem.any_constraint()) problem.prescribe_velocity(t_next, v);
     }
-    problem.advance_history(dt);
+    if (problem.advance_history(dt, stepper.half())) broke = 1;
     const bool last = problem.step() == static_cast<std::int64_t>(first + counter);
-    if (estimated && !last && !problem.constant_stiffness() && problem.step() % options_.check_every == 0) {
+    if (estimated && !last && !problem.constant_stiffness() && problem.step() % (broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every) == 0) {
+      broke = 0;
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the body became stiffer; {:.0f} more steps of {:.6g} s", problem.step(), counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", problem.step(), counter, dt));
       }
     }
     observer.step_done(report());

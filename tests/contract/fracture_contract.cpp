@@ -166,6 +166,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         CHECK(update.changed > 0);
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.released) <= 1e-11 * intact.energy);
+        CHECK(update.dissipated == update.released);
         // Momentum; and force = -dE/du along a random direction.
         for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, r.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, r.force));
         Field w = problem.make_field(d), kept = problem.make_field(d), scratch = problem.make_field(d);

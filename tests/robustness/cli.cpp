@@ -62,7 +62,7 @@ TEST_CASE("cli: list and describe show every part") {
   const Desk desk;
   const std::string all = desk.perikit("list").out;
   std::size_t parts = 0;
-  for (const std::string kind : {"kinematics", "material", "influence", "integrator"}) {
+  for (const std::string kind : {"kinematics", "material", "damage", "influence", "integrator"}) {
     CHECK(contains(all, kind + "\n"));
     const Result list = desk.perikit(fmt::format("list {}", kind));
     CHECK(list.status == 0);

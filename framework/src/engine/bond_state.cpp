@@ -10,7 +10,7 @@ bool before(const BondChange& a, const BondChange& b) noexcept { return a.point 
 
 }  // namespace
 
-BondUpdate Fracture::update(ConstFieldView u, const Energy& energy, const Changed& changed) {
+BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy& energy, const Changed& changed) {
   ++updates_;
   const std::vector<BondChange> changes = monitor_->find(u);
   if (changes.empty()) return {};
@@ -23,10 +23,16 @@ BondUpdate Fracture::update(ConstFieldView u, const Energy& energy, const Change
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
   GroupMarks marks(body_.stride() / padding, 0);
   state_.mark_families(ends, marks);
-  const double held = energy(marks);
+  const bool moves = motion.velocity.data != nullptr;
+  if (moves) {
+    if (end_.size() == 0) end_ = body_.make_field(u.components);
+    for (std::size_t k = 0; k < u.size(); ++k) end_.data()[k] = u.data[k] + motion.time * motion.velocity.data[k];
+  }
+  const double here = energy(u, marks), there = moves ? energy(end_, marks) : here;
   changed(state_.lower(changes));
   remember(changes);
-  return {changes.size(), held - energy(marks)};
+  const double left = energy(u, marks);
+  return {changes.size(), here - left, moves ? there - energy(end_, marks) : here - left};
 }
 
 std::vector<BondChange> Fracture::changes() const {

@@ -31,11 +31,11 @@ class Fracture {
   Fracture(const Body& body, const BodyDamage& damage, BondState& state, bool skip)
       : body_(body), state_(state), monitor_(state.make_monitor(damage, skip)) {}
 
-  /// energy(marks): strain energy of the evaluation points of the marked groups at u; changed(points): what follows from the
+  /// energy(u, marks): strain energy of the evaluation points of the marked groups; changed(points): what follows from the
   /// bonds of these points is to be computed anew.
-  using Energy = std::function<double(const GroupMarks&)>;
+  using Energy = std::function<double(ConstFieldView, const GroupMarks&)>;
   using Changed = std::function<void(std::span<const std::int32_t>)>;
-  BondUpdate update(ConstFieldView u, const Energy& energy, const Changed& changed);
+  BondUpdate update(ConstFieldView u, const Motion& motion, const Energy& energy, const Changed& changed);
 
   /// The bonds that are not as they were at the set-up, for checkpoints.
   std::vector<BondChange> changes() const;
@@ -52,6 +52,7 @@ class Fracture {
   std::vector<BondChange> log_;      ///< every change in its order, now and then only the last one of each bond
   std::size_t compact_ = 0;          ///< entries that were left the last time
   std::size_t updates_ = 0;
+  Field end_;                        ///< where failing bonds cease to act
 };
 
 }  // namespace perikit

@@ -395,10 +395,10 @@ EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) 
 }
 
 template <int D>
-BondUpdate CloudModel<D>::update_bonds(ConstFieldView u) {
+BondUpdate CloudModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
-  return fracture_->update(u, [&](const GroupMarks& marks) {
-    return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
+  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
+    return run_energy(body_, laws_, traits_.selective, blocks(), at, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
   }, [&](std::span<const std::int32_t> points) { families_.changed(points); });
 }
 

@@ -24,7 +24,7 @@ class CloudModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return families_.condition; }
   Field damage() override { return families_.damage; }
   ModelReport report() const override;
-  BondUpdate update_bonds(ConstFieldView u) override;
+  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
   std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) override;
   BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }

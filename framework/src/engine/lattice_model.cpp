@@ -456,10 +456,10 @@ EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples
 }
 
 template <int D>
-BondUpdate LatticeModel<D>::update_bonds(ConstFieldView u) {
+BondUpdate LatticeModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
-  return fracture_->update(u, [&](const GroupMarks& marks) {
-    return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_, [&](Pass& pass) { return run(pass); });
+  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
+    return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), at, marks, *bonds_, [&](Pass& pass) { return run(pass); });
   }, [](std::span<const std::int32_t>) {});
 }
 

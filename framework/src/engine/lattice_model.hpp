@@ -27,7 +27,7 @@ class LatticeModel final : public AssemblingModel {
   Field shape_tensor_condition() override;
   Field damage() override;
   ModelReport report() const override;
-  BondUpdate update_bonds(ConstFieldView u) override;
+  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
   std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) override;
   BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }

@@ -154,9 +154,9 @@ double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
 }
 
 template <int D>
-BondUpdate PairModel<D>::update_bonds(ConstFieldView u) {
+BondUpdate PairModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
-  return fracture_->update(u, [&](const GroupMarks& marks) { return energy_of(u, marks); }, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks); }, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
 template <int D>

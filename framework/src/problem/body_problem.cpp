@@ -93,9 +93,9 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   return status;
 }
 
-bool BodyProblem::advance_history(double) {
+bool BodyProblem::advance_history(double time_step, ConstFieldView velocity) {
   if (laws_->history()) laws_->history()->advance();
-  return damage_ && update_bonds();
+  return damage_ && update_bonds(time_step, velocity);
 }
 
 void BodyProblem::prepare_history(bool quasi_static) {

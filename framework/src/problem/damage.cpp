@@ -69,13 +69,13 @@ void BodyProblem::read_damage(bool quasi_static) {
   if (equal) damage_->failure = Field();
 }
 
-bool BodyProblem::update_bonds() {
-  const BondUpdate update = model_->update_bonds(displacement_);
-  energies_.dissipated += update.released;
+bool BodyProblem::update_bonds(double time_step, ConstFieldView velocity) {
+  const BondUpdate update = model_->update_bonds(displacement_, {velocity, 0.5 * time_step});
+  energies_.dissipated += update.dissipated;
   energies_.strain -= update.released;
-  if (update.released < 0) {
+  if (update.dissipated < 0) {
     ++gains_;
-    gained_ -= update.released;
+    gained_ -= update.dissipated;
   }
   return update.changed > 0;
 }

@@ -24,9 +24,16 @@ struct BondChange {
   double integrity = 0;
 };
 
+/// How the body moves on: bonds that fail act until then. Empty: not at all.
+struct Motion {
+  ConstFieldView velocity;
+  double time = 0;                  ///< [s]
+};
+
 struct BondUpdate {
   std::size_t changed = 0;          ///< bonds, each once
   double released = 0;              ///< strain energy that they held: before less after, at the same displacement [J]
+  double dissipated = 0;            ///< the same at the displacement where they cease to act [J]
 };
 
 /// How the checks went: what the conservative skip saved.

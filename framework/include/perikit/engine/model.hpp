@@ -71,7 +71,7 @@ class Model {
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that u stretches too far, and recomputes what depends on them. To be called after every step.
-  virtual BondUpdate update_bonds(ConstFieldView /*u*/) { return {}; }
+  virtual BondUpdate update_bonds(ConstFieldView /*u*/, const Motion& /*motion*/ = {}) { return {}; }
   /// Every bond that is not as it was at the set-up: run state, for checkpoints.
   virtual std::vector<BondChange> changed_bonds() const { return {}; }
   virtual void restore_bonds(std::span<const BondChange> /*changes*/) {}

@@ -45,7 +45,7 @@ class BodyProblem final : public Problem {
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
-  bool advance_history(double) override;
+  bool advance_history(double time_step, ConstFieldView velocity = {}) override;
 
   bool any_constraint() const noexcept override { return !constrained_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
@@ -100,7 +100,7 @@ class BodyProblem final : public Problem {
   void prepare_history(bool quasi_static);
   void read_damage(bool quasi_static);
   /// Lets bonds fail at the present displacement; true where any changed.
-  bool update_bonds();
+  bool update_bonds(double time_step, ConstFieldView velocity);
   void read_initial();
   void read_constraints(bool quasi_static);
   void read_loads(bool quasi_static);
