@@ -90,11 +90,12 @@ EvaluationStatus LocalForceModel<D>::run(Pass& pass) {
   std::fill_n(pass.out.data, pass.out.size(), 0.0);
   colouring_.for_each([&](std::size_t b) {
     Memory& m = memory_.mine();
+    BatchScratch& s = scratch_.begin_block(b);
     for (std::size_t r = b * cloud_block_points; r < std::min(families_.rows(), (b + 1) * cloud_block_points); ++r) {
       const auto family = families_.neighbours(r);
       const std::size_t p = families_.point(r);
       if (family.empty()) continue;
-      if (!bond_forces(r, m, scratch_.mine(), pass)) return pass.report(static_cast<std::int64_t>(p));
+      if (!bond_forces(r, m, s, pass)) return pass.report(static_cast<std::int64_t>(p));
       for (std::size_t k = 0; k < family.size(); ++k)
         for (std::size_t c = 0; c < D; ++c) {
           double* out = pass.out.component(static_cast<int>(c));

@@ -114,6 +114,7 @@ void BodyProblem::prepare_history(bool quasi_static) {
              "an explicit integrator, or another material");
     }
     if (scene_.damage) refuse("[damage]", "a material without history, or no [damage]");
+    if (kinematics_->traits().force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
   // The first evaluation only counts.
   model_->forces(displacement_, internal_force_, nullptr);
