@@ -16,12 +16,15 @@ using namespace perikit::contract;
 
 namespace {
 
+/// Laws without history: those with one run explicitly only and are never assembled.
 std::vector<std::string> materials() {
   std::vector<std::string> all;
   Registry& registry = subject().registry;
   for (const std::string& name : registry.names(Kind::material)) {
-    for (const std::string& table : registry.describe(Kind::material, name).examples)
+    for (const std::string& table : registry.describe(Kind::material, name).examples) {
+      if (!registry.material(*parse_part(Kind::material, name, table, registry))->traits().hyperelastic) continue;
       all.push_back(fmt::format("type = \"{}\"\n{}", name, table));
+    }
   }
   return all;
 }
@@ -88,7 +91,6 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
       BodyProblem& problem = simulation->problem();
-      if (problem.laws().history()) continue;  // explicit runs only: never assembled
       const Body& body = problem.body();
       deform(body, problem.displacement(), 71, 0.02);
       Field w = problem.make_field(problem.dimension()), expected = problem.make_field(problem.dimension());

@@ -37,6 +37,10 @@ void for_every_model(const std::function<void(BodyProblem&)>& check) {
         for (const bool mixed : {false, true}) {
           INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice",
                            mixed ? " two materials" : ""));
+          if (!Case{example, {}}.conservative()) {
+            CHECK_THROWS_WITH_AS(build(rate_scene(example, d, cloud, mixed)), doctest::Contains("force_state"), InputError);
+            continue;
+          }
           const auto simulation = build(rate_scene(example, d, cloud, mixed));
           if (simulation->problem().model().has_gradients()) check(simulation->problem());
         }

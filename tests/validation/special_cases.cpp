@@ -141,5 +141,22 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       };
       const double h = 2e-3, slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
       CHECK(std::abs(slope + contract::dot(body, f, w)) <= 1e-7 * contract::largest(body, f) * static_cast<double>(body.points()));
+      // The assembled tangent knows these owners too.
+      Field Kw = problem.make_field(2);
+      BlockMatrix K;
+      REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
+      REQUIRE(problem.assemble_tangent(problem.displacement(), K).ok());
+      double worst = 0;
+      for (std::size_t r = 0; r < K.rows(); ++r)
+        for (int a = 0; a < 2; ++a) {
+          double sum = 0;
+          for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+            for (int c = 0; c < 2; ++c) {
+              const double value = K.values[4 * b + static_cast<std::size_t>(2 * a + c)];
+              sum += value * w.component(c)[K.point[static_cast<std::size_t>(K.column[b])]];
+            }
+          worst = std::max(worst, std::abs(sum - Kw.component(a)[K.point[r]]));
+        }
+      CHECK_MESSAGE(worst <= 1e-12 * contract::largest(body, Kw), "K w is off by ", worst);
     }
 }
