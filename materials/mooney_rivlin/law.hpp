@@ -50,13 +50,34 @@ struct MooneyRivlin {
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [C1, C2, kappa] = k;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), inverse_J = T(1.0) / (1.0 + j);
-    const T scale = cbrt(T(1.0 + j)) * inverse_J;  // J^(-2/3)
+    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j));
+    const T scale = root * root, inverse_J = scale * root;  // J^(-2/3), 1/J
     const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale);
     const T pressure = volumetric_kirchhoff(volumetric, kappa, j);
     const Tensor<T, S> tau = add_diagonal((first + second * (1.0 + m)) * d - second * deviator(gram(d)), pressure);
     const Tensor<T, S> G = cofactor_minus_identity(H);
     return inverse_J * (tau + tau * G);
+  }
+
+  /// dP = (dtau - P dF^T) F^-T, dtau from db = 2 sym(dF F^T) and dJ/J = F^-T : dF.
+  template <class T, class S, class K>
+  auto tangent(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
+    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root;
+    const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale), on_d = first + second * (1.0 + m);
+    const Tensor<T, S> square = second * deviator(gram(d));
+    const Tensor<T, S> tau = add_diagonal(on_d * d - square, volumetric_kirchhoff(volumetric, kappa, j));
+    const Tensor<T, S> G = (scale * root) * add_diagonal(cofactor_minus_identity(H), T(1.0)), P = tau * G;  // F^-T
+    const Tensor<T, S> by_volume = add_diagonal(                                                            // dtau for dJ/J = 1
+        T(-2.0 / 3) * (first * d) - T(4.0 / 3) * ((second * (1.0 + m)) * d - square),
+        volumetric_kirchhoff_slope(volumetric, kappa, j));
+    return [=](const Tensor<T, S>& dH) {
+      const Tensor<T, S> de = T(2.0) * symmetric_part(dH + dH * transpose(H)), dd = deviator(de);
+      const Tensor<T, S> turn = (second * (1.0 / 3.0)) * (trace(de) * d) - (2.0 * second) * deviator(symmetric_part(d * dd));
+      const Tensor<T, S> dtau = on_d * dd + turn + inner(G, dH) * by_volume;
+      return (dtau - P * transpose(dH)) * G;
+    };
   }
 };
 

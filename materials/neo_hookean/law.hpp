@@ -45,8 +45,8 @@ struct NeoHookean {
     const auto& [mu, kappa] = k;
     const T m = mean_strain(H), j = jacobian_minus_one(H), J = 1.0 + j;
     const Tensor<T, S> G = cofactor_minus_identity(H);
-    const T inverse_J = T(1.0) / J;
-    const T shear = mu * (cbrt(J) * inverse_J);                                      // mu J^(-2/3)
+    const T root = reciprocal_cbrt(J), inverse_J = root * (root * root);
+    const T shear = mu * (root * root);                                              // mu J^(-2/3)
     const T cofactor_part = volumetric_kirchhoff(volumetric, kappa, j) * inverse_J;  // factor of cof F from psi_vol
     const T on_cofactor = cofactor_part - shear * (inverse_J * (1.0 + m));
     const T on_identity = shear * (inverse_J * (j - m)) + cofactor_part;
@@ -54,6 +54,23 @@ struct NeoHookean {
       const T off = shear * H(i, l) + on_cofactor * G(i, l);
       return i == l ? T(off + on_identity) : off;
     });
+  }
+
+  /// With P = a F + c F^-T, a = mu J^(-2/3), c = J psi_vol' - a (1 + m):
+  ///   dP = a dF - c F^-T dF^T F^-T + da F + dc F^-T,  da/a = -2/3 dJ/J,  dJ/J = F^-T : dF,  dm = 2/3 F : dF
+  template <class T, class S, class K>
+  auto tangent(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [mu, kappa] = k;
+    const T m = mean_strain(H), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), a = mu * (root * root);
+    const T c = volumetric_kirchhoff(volumetric, kappa, j) - a * (1.0 + m);
+    const T c_by_volume = volumetric_kirchhoff_slope(volumetric, kappa, j) + (2.0 / 3) * a * (1.0 + m);  // dc for dJ/J = 1
+    const Tensor<T, S> F = add_diagonal(H, T(1.0)),
+                       G = (root * (root * root)) * add_diagonal(cofactor_minus_identity(H), T(1.0));  // F^-T
+    return [=](const Tensor<T, S>& dH) {
+      const T volume = inner(G, dH), shape = T(2.0 / 3) * a * inner(F, dH);
+      const Tensor<T, S> turned = G * (transpose_times(dH, G));
+      return a * dH + (T(-2.0 / 3) * a * volume) * F + (c_by_volume * volume - shape) * G - c * turned;
+    };
   }
 };
 

@@ -42,6 +42,7 @@ class Counted {
   friend Counted sqrt(Counted a) noexcept { return operation(std::sqrt(a.value_), 1, 's', a, a); }
   friend Counted log1p(Counted a) noexcept { return operation(std::log1p(a.value_), 48, 'l', a, a); }
   friend Counted cbrt(Counted a) noexcept { return operation(std::cbrt(a.value_), 46, 'r', a, a); }
+  friend Counted reciprocal_cbrt(Counted a) noexcept { return operation(1 / std::cbrt(a.value_), 30, 'i', a, a); }
   friend Counted abs(Counted a) noexcept { return operation(std::abs(a.value_), 0, 'a', a, a); }
   friend Counted min(Counted a, Counted b) noexcept { return a.value_ < b.value_ ? a : b; }
   friend Counted max(Counted a, Counted b) noexcept { return a.value_ > b.value_ ? a : b; }

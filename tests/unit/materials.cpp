@@ -63,6 +63,8 @@ struct EnergyOnly : Law {
 
  private:
   using Law::P;
+  template <class T, class S, class K>
+  void tangent(const Tensor<T, S>& H, const K& k) const = delete;
 };
 template <class Law>
 struct StressOnly : Law {
@@ -74,6 +76,8 @@ struct StressOnly : Law {
 
  private:
   using Law::psi;
+  template <class T, class S, class K>
+  void tangent(const Tensor<T, S>& H, const K& k) const = delete;
 };
 
 /// psi, P, dP, A of two materials agree to 1e-10 of the magnitude of each.

@@ -113,7 +113,6 @@ void BodyProblem::prepare_history(bool quasi_static) {
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene_.integrator->type),
              "an explicit integrator, or another material");
     }
-    if (scene_.damage) refuse("[damage]", "a material without history, or no [damage]");
     if (kinematics_->traits().force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
   // The first evaluation only counts.

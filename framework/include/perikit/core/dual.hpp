@@ -95,6 +95,11 @@ Dual<T> cbrt(Dual<T> x) noexcept {
   return {root, x.derivative * root / (3.0 * x.value)};
 }
 template <class T>
+Dual<T> reciprocal_cbrt(Dual<T> x) noexcept {
+  const T root = reciprocal_cbrt(x.value), square = root * root;
+  return {root, x.derivative * (square * square) * (-1.0 / 3)};
+}
+template <class T>
 Dual<T> log(Dual<T> x) noexcept {
   return {log(x.value), x.derivative / x.value};
 }

@@ -22,4 +22,10 @@ T volumetric_kirchhoff(Volumetric form, const K& kappa, const T& j) noexcept {
   return form == Volumetric::quadratic ? T(kappa * (j + j * j)) : T(kappa * log1p(j));
 }
 
+/// J times the derivative of volumetric_kirchhoff by J.
+template <class T, class K>
+T volumetric_kirchhoff_slope(Volumetric form, const K& kappa, const T& j) noexcept {
+  return form == Volumetric::quadratic ? T(kappa * ((1.0 + j) * (1.0 + 2.0 * j))) : T(kappa);
+}
+
 }  // namespace perikit
