@@ -104,7 +104,7 @@ double quantile(std::vector<Stretched> all, double share) {
 bool suits(const Example& example, int dimension) {
   const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
   const KinematicsTraits traits = kinematics->traits();
-  if (traits.at != EvaluationPoints::weighted && (traits.at != EvaluationPoints::points || traits.order == 1)) return true;
+  if (traits.at != EvaluationPoints::weighted && traits.order == 1) return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
 }
