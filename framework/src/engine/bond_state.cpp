@@ -23,16 +23,15 @@ BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
   GroupMarks marks(body_.stride() / padding, 0);
   state_.mark_families(ends, marks);
-  const bool moves = motion.velocity.data != nullptr;
-  if (moves) {
+  if (motion) {
     if (end_.size() == 0) end_ = body_.make_field(u.components);
-    for (std::size_t k = 0; k < u.size(); ++k) end_.data()[k] = u.data[k] + motion.time * motion.velocity.data[k];
+    motion(end_);
   }
-  const double here = energy(u, marks), there = moves ? energy(end_, marks) : here;
+  const double here = energy(u, marks), there = motion ? energy(end_, marks) : here;
   changed(state_.lower(changes));
   remember(changes);
   const double left = energy(u, marks);
-  return {changes.size(), here - left, moves ? there - energy(end_, marks) : here - left};
+  return {changes.size(), here - left, motion ? there - energy(end_, marks) : here - left};
 }
 
 std::vector<BondChange> Fracture::changes() const {

@@ -71,7 +71,17 @@ void BodyProblem::read_damage(bool quasi_static) {
 }
 
 bool BodyProblem::update_bonds(double time_step, ConstFieldView velocity) {
-  const BondUpdate update = model_->update_bonds(displacement_, {velocity, 0.5 * time_step});
+  // Half of the next step of an explicit scheme: its forces are known, and come from the bonds as they were.
+  const Motion half_step = [&](FieldView end) {
+    const auto masses = mass();
+    const ConstFieldView free = free_mask(), external = any_load() ? ConstFieldView(external_force()) : ConstFieldView();
+    for (std::size_t k = 0; k < end.size(); ++k) {
+      const double m = masses[k % stride()], force = internal_force_.data()[k] + (external.data ? external.data[k] : 0.0);
+      const double next = velocity.data[k] + (m > 0 ? free.data[k] * time_step * force / m : 0.0);
+      end.data[k] = displacement_.data()[k] + 0.5 * time_step * next;
+    }
+  };
+  const BondUpdate update = model_->update_bonds(displacement_, velocity.data ? half_step : Motion());
   energies_.dissipated += update.dissipated;
   energies_.strain -= update.released;
   if (update.dissipated < 0) {

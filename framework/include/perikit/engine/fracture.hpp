@@ -2,6 +2,7 @@
 /// Bonds that fail during a run: what a model is told, and what it answers.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "perikit/core/field.hpp"
@@ -24,11 +25,8 @@ struct BondChange {
   double integrity = 0;
 };
 
-/// How the body moves on: bonds that fail act until then. Empty: not at all.
-struct Motion {
-  ConstFieldView velocity;
-  double time = 0;                  ///< [s]
-};
+/// motion(end): end <- the displacement until which bonds that fail now still act. Called where any fail; empty: they act no longer.
+using Motion = std::function<void(FieldView)>;
 
 struct BondUpdate {
   std::size_t changed = 0;          ///< bonds, each once

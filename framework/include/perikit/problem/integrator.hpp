@@ -104,7 +104,7 @@ class Problem {
   virtual bool any_load() const noexcept = 0;
   virtual bool loads_depend_on_time() const noexcept = 0;
   /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
-  /// velocity: of explicit schemes. Their forces of this step come from the bonds as they were, so that bonds that fail now act for another
+  /// velocity: of explicit schemes, of the last half step. Their forces of this step come from the bonds as they were, so that bonds that fail now act for another
   /// half step, and what they dissipate is taken there.
   virtual bool advance_history(double time_step, ConstFieldView velocity = {}) = 0;
 
