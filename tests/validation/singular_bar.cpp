@@ -1,0 +1,42 @@
+/// The singular bar of Roy Chowdhury et al., section 5.1.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tests/validation/quasi_static.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+
+namespace {
+
+struct Bar {
+  double end;         ///< displacement of the pulled end [m]
+  double roughness;   ///< sum of the second differences of u over u(end): 0.04 for the exact solution, 2 (0.01 sqrt(dx))/u(end)
+};
+
+Bar pull(double ratio, const std::string& kinematics) {
+  const auto simulation = load("chowdhury/singular_bar.toml", {fmt::format("family.horizon_ratio={}", ratio), "kinematics=" + kinematics});
+  CHECK(run(*simulation).reports.back().residual <= 1e-8);
+  const FieldView u = simulation->problem().displacement();
+  const std::vector<std::int32_t>& points = simulation->problem().body().set("pulled");
+  double sum = 0;
+  for (std::size_t k = 1; k + 1 < points.size(); ++k) sum += std::abs(u.data[points[k + 1]] - 2 * u.data[points[k]] + u.data[points[k - 1]]);
+  const double end = mean(*simulation, "end", 0);
+  return {end, sum / end};
+}
+
+}  // namespace
+
+TEST_CASE("singular bar: sub_horizon is smooth for every horizon, conventional is not") {
+  const std::string two = "{ type = \"sub_horizon\", parts = 2 }", four = "{ type = \"sub_horizon\", parts = 4 }";
+  CHECK(pull(1.1, two).end == doctest::Approx(7.96e-3).epsilon(1e-3));
+  const Bar wide = pull(10.1, two);
+  CHECK(wide.end == doctest::Approx(7.70e-3).epsilon(1e-3));
+  CHECK(std::abs(pull(10.1, four).end / wide.end - 1) < 0.01);
+  CHECK(wide.roughness < 0.1);
+  CHECK(pull(5.1, two).roughness < 0.1);
+  CHECK(pull(5.1, "{ type = \"conventional\" }").roughness > 10);
+}
