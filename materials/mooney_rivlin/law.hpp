@@ -12,8 +12,8 @@ namespace perikit {
 
 /// Compressible Mooney-Rivlin rubber [Scabbia et al. 2025, eqs. 3-7].
 ///   psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J),  I1, I2 invariants of C
-///   P = tau F^-T,  tau = 2 C1 J^(-2/3) d + 2 C2 J^(-4/3) ((1 + m) d - dev d^2) + J psi_vol'(J) I
-/// with b = F F^T, 1 + m = tr(b)/3, d = dev b.
+///   P = tau F^-T,  tau = dev(2 C1 J^(-2/3) b + 2 C2 J^(-4/3) (I1 b - b^2)) + J psi_vol'(J) I,  b = F F^T.
+/// Written in e = b - I, every term of the order of e: I1 b - b^2 = I2 I - cof b (Cayley-Hamilton), cof b = I + tr(e) I - e + cof e.
 struct MooneyRivlin {
   static constexpr MaterialTraits traits{.constants = 3};
   Volumetric volumetric = Volumetric::quadratic;
@@ -49,14 +49,14 @@ struct MooneyRivlin {
   template <class T, class S, class K>
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j));
+    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), G = cofactor_minus_identity(H);
+    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j));
     const T scale = root * root, inverse_J = scale * root;  // J^(-2/3), 1/J
     const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale);
-    const T pressure = volumetric_kirchhoff(volumetric, kappa, j);
-    const Tensor<T, S> tau = add_diagonal((first + second * (1.0 + m)) * d - second * deviator(gram(d)), pressure);
-    const Tensor<T, S> G = cofactor_minus_identity(H);
-    return inverse_J * (tau + tau * G);
+    const Tensor<T, S> shear = subtract_cofactor((first + second) * e, second, e);
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - trace(shear) * (1.0 / 3.0);
+    const Tensor<T, S> tau = inverse_J * add_diagonal(shear, pressure);
+    return tau + tau * G;
   }
 
   /// dP = (dtau - P dF^T) F^-T, dtau from db = 2 sym(dF F^T) and dJ/J = F^-T : dF.

@@ -48,23 +48,17 @@ struct Operations {
   std::int64_t stress = 0, tangent = 0;  ///< 0: not counted
 };
 
-/// Different operations that the law's formulas ask for at a point of no particular symmetry.
-template <class S, class Law>
-Operations count(const Law& law) {
+/// Different operations that `what` asks for at a point of no particular symmetry.
+template <class S, class Law, class What>
+std::int64_t count(const Law& law, What&& what) {
   using H = Tensor<Counted, S>;
   const auto variables = [] { return H::map([](int c) { return Counted::variable(0.02 * (c + 1) - 0.05 * (c % 2)); }); };
   std::array<Counted, Law::traits.constants> k;
   for (std::size_t i = 0; i < k.size(); ++i) k[i] = Counted::variable(0.7 + 0.4 * static_cast<double>(i));
   const auto measure = [&](const auto& step) {
-    Operations n;
     Counted::forget();
-    stress(step, variables(), k);
-    n.stress = Counted::operations();
-    Counted::forget();
-    const auto action = tangent(step, variables(), k);
-    for (int c = 0; c < S::components; ++c) action(variables());
-    n.tangent = Counted::operations();
-    return n;
+    what(step, variables, k);
+    return Counted::operations();
   };
   if constexpr (HasHistory<Law>) {
     std::array<Counted, state_size<Law, S>()> state;
@@ -75,15 +69,25 @@ Operations count(const Law& law) {
   }
 }
 
+/// The stress at deformations of `Confined`, and all columns of the tangent, which no law restricts.
+template <class Confined, class S, class Law>
+Operations count(const Law& law) {
+  return {count<Confined>(law, [](const auto& step, const auto& variables, const auto& k) { stress(step, variables(), k); }),
+          count<S>(law, [](const auto& step, const auto& variables, const auto& k) {
+            const auto action = tangent(step, variables(), k);
+            for (int c = 0; c < S::components; ++c) action(variables());
+          })};
+}
+
 template <class Law>
 Operations count(const Law& law, Space space) {
   switch (space) {
     case Space::solid:
-      return count<Solid>(law);
+      return count<Solid, Solid>(law);
     case Space::plane_strain:
-      return count<Plane>(law);
+      return count<ConfinedPlane, Plane>(law);
     case Space::line_strain:
-      return count<Line>(law);
+      return count<ConfinedLine, Line>(law);
     default:
       return {};
   }
@@ -101,7 +105,9 @@ Cost measure(const Material& material, Space space, const double* constants) {
   std::uniform_real_distribution<double> uniform(-0.1, 0.1);
   for (int c = 0; c < components; ++c)
     for (int p = 0; p < points; ++p) H.component(c)[p] = uniform(random);
-  MaterialBatch batch{.n = points, .stride = points, .H = H.data(), .constants = constants};
+  const bool confined = space == Space::plane_strain || space == Space::line_strain;
+  for (int c = gradient_components(dimension(space)); confined && c < components; ++c) std::fill_n(H.component(c), points, 0.0);
+  MaterialBatch batch{.n = points, .stride = points, .confined = confined, .H = H.data(), .constants = constants};
   if (old.components() > 0) batch.state_old = old.data(), batch.state_stride = points;
   MaterialBatch stress = batch, tangent = batch;
   stress.P = P.data();

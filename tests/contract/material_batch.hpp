@@ -105,7 +105,7 @@ struct Evaluation {
 
   Evaluation(const Material& material, Space space, std::span<const double> constants, const std::vector<Values>& points,
              const std::vector<Values>& directions = {}, bool constants_per_point = false,
-             const std::vector<Values>& histories = {})
+             const std::vector<Values>& histories = {}, bool confined = false)
       : n(static_cast<int>(points.size())),
         components(tensor_components(space)),
         stride(padded(points.size()) + padding),
@@ -131,6 +131,7 @@ struct Evaluation {
     for (Field* f : {&psi, &P, &dP, &A, &lateral, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
     status = material.evaluate(space, {.n = n,
                                        .stride = stride,
+                                       .confined = confined,
                                        .H = H.data(),
                                        .dH = dH.data(),
                                        .constants = constants_per_point ? constant_field.data() : constants.data(),
@@ -142,7 +143,7 @@ struct Evaluation {
                                        .P = P.data(),
                                        .dP = dP.data(),
                                        .lateral = free_stretch(space) ? lateral.data() : nullptr,
-                                       .A = A.data()});
+                                       .A = confined ? nullptr : A.data()});
     for (Field* f : {&psi, &P, &dP, &A, &lateral, &state})
       for (int c = 0; c < f->components(); ++c)
         for (std::size_t p = padded(points.size()); p < f->stride(); ++p) guards_intact &= std::isnan(f->component(c)[p]);

@@ -121,6 +121,22 @@ class MaterialContract : MaterialCheck {
     }
   }
 
+  /// Plane and uniaxial strain: a law that relies on vanishing lateral components gives what it gives without that promise.
+  void confined() {
+    if (dimension(space_) == 3 || free_stretch(space_)) return;
+    constexpr int n = 16;
+    std::vector<Values> points = random_points(n), directions = random_directions(n);
+    for (auto* values : {&points, &directions})
+      for (Values& H : *values) std::fill(H.begin() + gradient_components(dimension(space_)), H.end(), 0.0);
+    const Evaluation open = evaluate(points, directions), confined(material_, space_, constants_, points, directions, false, {}, true);
+    for (int p = 0; p < n; ++p) {
+      const double scale = stress_scale(open, p);
+      near("P of confined points", confined.at(confined.P, p), open.at(open.P, p), 1e-12, scale);
+      near("psi of confined points", confined.at(confined.psi, p), open.at(open.psi, p), 1e-12, scale);
+      near("dP of confined points", confined.at(confined.dP, p), open.at(open.dP, p), 1e-12, scale);
+    }
+  }
+
   /// A batch equals its points one at a time, to the bit; outputs are overwritten; nothing behind the padding is touched.
   void batches() {
     constexpr int n = 37;
@@ -226,7 +242,7 @@ inline void check_history(const Material& material, const std::vector<double>& c
 inline void check_material(const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
   using Contract = MaterialContract;
   for (const auto identity : {&Contract::reference_state, &Contract::small_strains, &Contract::derivatives, &Contract::tangent_action,
-                              &Contract::free_stretches, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
+                              &Contract::free_stretches, &Contract::confined, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
     check_material(material, constants, options, identity);
   }
   check_history(material, constants, options);

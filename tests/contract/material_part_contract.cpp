@@ -80,6 +80,7 @@ TEST_CASE("material: stress is the derivative of the energy, the tangent that of
 TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") { in_every_space(&MaterialContract::tangent_action); }
 
 TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") { in_every_space(&MaterialContract::free_stretches); }
+TEST_CASE("material: the promise that lateral components vanish changes nothing but the cost") { in_every_space(&MaterialContract::confined); }
 
 TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
 

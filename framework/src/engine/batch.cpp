@@ -19,6 +19,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
+  batch.confined = !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain);
   batch.points = points;
   if (energy_ || work_ == Work::sample) batch.psi = s.psi;
   batch.P = P;

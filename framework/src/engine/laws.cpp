@@ -46,6 +46,7 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.stride = batch_points;
   call.H = batch.H;
   call.dH = batch.dH;
+  call.confined = batch.confined;
   call.psi = batch.psi;
   call.P = batch.P;
   call.dP = batch.dP;

@@ -27,15 +27,22 @@ typedef double UnalignedLanes __attribute__((vector_size(8 * pack_width), aligne
 typedef std::int64_t Bits __attribute__((vector_size(8 * pack_width)));
 }  // namespace detail
 
-/// Result of a lane-wise comparison: all bits set where it holds.
+/// Result of a lane-wise comparison: in each lane, whether it holds.
 struct PackMask {
-  detail::Bits v;
-  friend PackMask operator&(PackMask a, PackMask b) noexcept { return {a.v & b.v}; }
-  friend PackMask operator|(PackMask a, PackMask b) noexcept { return {a.v | b.v}; }
-  friend PackMask operator!(PackMask a) noexcept { return {~a.v}; }
-  PackMask& operator&=(PackMask b) noexcept { v &= b.v; return *this; }
-  PackMask& operator|=(PackMask b) noexcept { v |= b.v; return *this; }
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  __mmask8 v;
+  static constexpr __mmask8 everywhere = 0xff;
+  bool operator[](int lane) const noexcept { return (v >> lane & 1) != 0; }
+#else
+  detail::Bits v;   // all bits set where it holds
+  static constexpr std::int64_t everywhere = -1;
   bool operator[](int lane) const noexcept { return v[lane] != 0; }
+#endif
+  friend PackMask operator&(PackMask a, PackMask b) noexcept { return {static_cast<decltype(v)>(a.v & b.v)}; }
+  friend PackMask operator|(PackMask a, PackMask b) noexcept { return {static_cast<decltype(v)>(a.v | b.v)}; }
+  friend PackMask operator!(PackMask a) noexcept { return {static_cast<decltype(v)>(a.v ^ everywhere)}; }
+  PackMask& operator&=(PackMask b) noexcept { return *this = *this & b; }
+  PackMask& operator|=(PackMask b) noexcept { return *this = *this | b; }
 };
 
 struct Pack {
@@ -69,19 +76,35 @@ struct Pack {
   Pack& operator*=(Pack b) noexcept { v *= b.v; return *this; }
   Pack& operator/=(Pack b) noexcept { v /= b.v; return *this; }
 
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  friend PackMask operator<(Pack a, Pack b) noexcept { return compare<_CMP_LT_OQ>(a, b); }
+  friend PackMask operator<=(Pack a, Pack b) noexcept { return compare<_CMP_LE_OQ>(a, b); }
+  friend PackMask operator==(Pack a, Pack b) noexcept { return compare<_CMP_EQ_OQ>(a, b); }
+  template <int predicate>
+  static PackMask compare(Pack a, Pack b) noexcept {
+    return {_mm512_cmp_pd_mask(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), predicate)};
+  }
+#else
   friend PackMask operator<(Pack a, Pack b) noexcept { return {a.v < b.v}; }
-  friend PackMask operator>(Pack a, Pack b) noexcept { return {a.v > b.v}; }
   friend PackMask operator<=(Pack a, Pack b) noexcept { return {a.v <= b.v}; }
-  friend PackMask operator>=(Pack a, Pack b) noexcept { return {a.v >= b.v}; }
   friend PackMask operator==(Pack a, Pack b) noexcept { return {a.v == b.v}; }
+#endif
+  friend PackMask operator>(Pack a, Pack b) noexcept { return b < a; }
+  friend PackMask operator>=(Pack a, Pack b) noexcept { return b <= a; }
 };
 
-inline Pack select(PackMask m, Pack a, Pack b) noexcept { return {m.v ? a.v : b.v}; }
+inline Pack select(PackMask m, Pack a, Pack b) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return {reinterpret_cast<detail::Lanes>(_mm512_mask_blend_pd(m.v, reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(a.v)))};
+#else
+  return {m.v ? a.v : b.v};
+#endif
+}
 inline double select(bool m, double a, double b) noexcept { return m ? a : b; }
 
 inline bool any(PackMask m) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(m.v)) != 0;
+  return m.v != 0;
 #elif defined(__AVX__)
   return _mm256_movemask_pd(reinterpret_cast<__m256d>(m.v)) != 0;
 #else
@@ -91,6 +114,13 @@ inline bool any(PackMask m) noexcept {
 #endif
 }
 inline bool any(bool m) noexcept { return m; }
+inline bool all(PackMask m) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return m.v == PackMask::everywhere;
+#else
+  return !any(!m);
+#endif
+}
 
 inline Pack sqrt(Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)

@@ -152,39 +152,51 @@ inline Pack expm1(Pack x) noexcept {
 }
 
 namespace detail {
-/// x = m 2^(3 third) for normal x > 0, m in [1/2, 4); returns m^(-1/3) to a few units in the last place.
-inline Pack reduced_reciprocal_cbrt(Pack x, Pack& m, Pack& third) noexcept {
-  m = x;
-  third = 0.0;
-  if (any(!((x >= 0.5) & (x < 4.0)))) {   // else this changes nothing
-    const Bits exponent = (bits(x) - one_bits) >> 52;
-    const Pack e = to_double(exponent), mantissa = from_bits(bits(x) - (exponent << 52));
-    third = nearest_integer(e * (1.0 / 3.0));
-    m = mantissa * power_of_two(e - 3.0 * third);
-  }
-  // y -> m^(-1/3): y (1 - h)^(-1/3) with h = 1 - m y^3, first from a cubic fit (2.6 %), then to 6e-6 and below rounding
-  Pack y = 1.518645700691947 + m * (-0.6744191525243759 + m * (0.19491008005708438 + m * -0.020547832477409447));
-  for (int i = 0; i < 2; ++i) {
-    const Pack h = 1.0 - m * y * y * y;
-    y += y * h * (1.0 / 3 + h * (2.0 / 9 + h * (14.0 / 81)));
-  }
-  return y;
+/// Lanes in [1/2, 4), where the root needs no scaling.
+inline bool needs_no_scaling(Pack x) noexcept {
+  return all((x >= 0.5) & (x < 4.0));
+}
+
+/// x = m 2^(3 third) with m in [1/2, 4), for normal x > 0.
+inline Pack scaled_by_thirds(Pack x, Pack& third) noexcept {
+  const Bits exponent = (bits(x) - one_bits) >> 52;
+  const Pack e = to_double(exponent), mantissa = from_bits(bits(x) - (exponent << 52));
+  third = nearest_integer(e * (1.0 / 3.0));
+  return mantissa * power_of_two(e - 3.0 * third);
+}
+
+/// m^(-1/3) of m in [1/2, 4) to a few units in the last place.
+inline Pack reduced_reciprocal_cbrt(Pack m) noexcept {
+  // y -> m^(-1/3): y (1 - h)^(-1/3) with h = 1 - m y^3, first from a cubic fit (2.6 %), then to 6e-6 and below rounding. Products
+  // are paired so that few of them wait for each other.
+  Pack y = (1.518645700691947 + m * -0.6744191525243759) + (m * m) * (0.19491008005708438 + m * -0.020547832477409447);
+  Pack h = 1.0 - (m * y) * (y * y);
+  y += (y * h) * (1.0 / 3 + h * (2.0 / 9 + h * (14.0 / 81)));
+  h = 1.0 - (m * y) * (y * y);
+  return y + (y * h) * (1.0 / 3 + h * (2.0 / 9));
+}
+
+[[gnu::noinline]] inline Pack reciprocal_cbrt_of_any(Pack x) noexcept {
+  Pack third;
+  const Pack y = reduced_reciprocal_cbrt(scaled_by_thirds(x, third));
+  return select(x == x, y * power_of_two(-third), x);
 }
 }  // namespace detail
 
 /// x^(-1/3) of normal x > 0 to a few units in the last place; not a number where x is none.
 inline Pack reciprocal_cbrt(Pack x) noexcept {
-  Pack m, third;
-  const Pack y = detail::reduced_reciprocal_cbrt(x, m, third);
-  return select(x == x, y * detail::power_of_two(-third), x);
+  if (detail::needs_no_scaling(x)) [[likely]]
+    return detail::reduced_reciprocal_cbrt(x);
+  return detail::reciprocal_cbrt_of_any(x);
 }
 
 inline Pack cbrt(Pack x) noexcept {
   const Pack magnitude = abs(x);
   const PackMask subnormal = magnitude < std::numeric_limits<double>::min();
   const Pack scaled = select(subnormal, magnitude * 0x1p54, magnitude);
-  Pack m, third;
-  const Pack y = detail::reduced_reciprocal_cbrt(scaled, m, third);
+  Pack m = scaled, third = 0.0;
+  if (!detail::needs_no_scaling(scaled)) m = detail::scaled_by_thirds(scaled, third);
+  const Pack y = detail::reduced_reciprocal_cbrt(m);
   Pack root = m * y * y;
   root += (m - root * root * root) * (y * y) * (1.0 / 3);
   const Pack result = root * detail::power_of_two(third + select(subnormal, Pack(-18.0), Pack(0.0)));

@@ -69,13 +69,15 @@ Vector<T> choose(M mask, const Vector<T>& a, const Vector<T>& b) noexcept {
 
 }  // namespace detail
 
-template <class T>
-Spectral<T, Line> spectral(const Tensor<T, Line>& a) noexcept {
+template <class T, class S>
+requires(S::dimension == 1)
+Spectral<T, S> spectral(const Tensor<T, S>& a) noexcept {
   return {{a[0], a[1], a[2]}, {{T(1.0), T(1.0), T(1.0)}}};
 }
 
-template <class T>
-Spectral<T, Plane> spectral(const Tensor<T, Plane>& a) noexcept {
+template <class T, class S>
+requires(S::dimension == 2)
+Spectral<T, S> spectral(const Tensor<T, S>& a) noexcept {
   T largest = max(max(abs(a[0]), abs(a[3])), abs(a[1]));
   largest = select(largest > T(0.0), largest, T(1.0));  // squares of tiny strains must not underflow
   T cosine, sine;

@@ -15,13 +15,31 @@ namespace perikit {
 
 struct Solid {
   static constexpr int components = 9, dimension = 3;
+  static constexpr bool confined = false;
 };  ///< xx xy xz yx yy yz zx zy zz
 struct Plane {
   static constexpr int components = 5, dimension = 2;
+  static constexpr bool confined = false;
 };  ///< xx xy yx yy zz
 struct Line {
   static constexpr int components = 3, dimension = 1;
+  static constexpr bool confined = false;
 };  ///< xx yy zz
+
+/// Plane and uniaxial strain: the lateral components of displacement gradients and strains are zero, known when compiling. Their
+/// stresses have lateral components as any other.
+struct ConfinedPlane : Plane {
+  static constexpr bool confined = true;
+};
+struct ConfinedLine : Line {
+  static constexpr bool confined = true;
+};
+
+/// Component ii of displacement gradients and strains is always zero.
+template <class S>
+constexpr bool always_zero(int i) noexcept {
+  return S::confined && i >= S::dimension;
+}
 
 /// Place of component ij, -1 where it is always zero.
 template <class S>
@@ -165,7 +183,8 @@ Tensor<T, S> gram(const Tensor<T, S>& a) noexcept {
 template <class T, class S>
 Tensor<T, S> right_cauchy_green_minus_identity(const Tensor<T, S>& H) noexcept {
   const Tensor<T, S> square = gram(H);
-  return Tensor<T, S>::build_symmetric([&](int i, int j) { return (H(i, j) + H(j, i)) + square(i, j); });
+  return Tensor<T, S>::build_symmetric(
+      [&](int i, int j) { return always_zero<S>(i) ? T(0.0) : T((H(i, j) + H(j, i)) + square(i, j)); });
 }
 
 /// F F^T - I of F = I + H.
@@ -214,12 +233,33 @@ T determinant(const Tensor<T, S>& a) noexcept {
 /// det(I + H) - 1 from the invariants of H.
 template <class T, class S>
 T jacobian_minus_one(const Tensor<T, S>& H) noexcept {
-  return trace(H) + (second_invariant(H) + determinant(H));
+  if constexpr (S::confined && S::dimension == 2)
+    return (H(0, 0) + H(1, 1)) + (H(0, 0) * H(1, 1) - H(0, 1) * H(1, 0));
+  else if constexpr (S::confined)
+    return H(0, 0);
+  else
+    return trace(H) + (second_invariant(H) + determinant(H));
+}
+
+/// a - s cof(e) of a symmetric strain e.
+template <class T, class S>
+Tensor<T, S> subtract_cofactor(Tensor<T, S> a, const T& s, const Tensor<T, S>& e) noexcept {
+  if constexpr (S::confined) {
+    if constexpr (S::dimension == 2) a(2, 2) = a(2, 2) - s * (e(0, 0) * e(1, 1) - e(0, 1) * e(1, 0));
+    return a;
+  } else {
+    const Tensor<T, S> c = cofactor(e);
+    return Tensor<T, S>::build_symmetric([&](int i, int j) { return a(i, j) - s * c(i, j); });
+  }
 }
 
 /// cof(I + H) - I = tr(H) I - H^T + cof(H).
 template <class T, class S>
 Tensor<T, S> cofactor_minus_identity(const Tensor<T, S>& H) noexcept {
+  if constexpr (S::confined && S::dimension == 2)
+    return {{H(1, 1), -H(1, 0), -H(0, 1), H(0, 0), jacobian_minus_one(H)}};
+  else if constexpr (S::confined)
+    return {{T(0.0), H(0, 0), H(0, 0)}};
   const Tensor<T, S> quadratic = cofactor(H);
   return Tensor<T, S>::build([&](int i, int j) {
     if (i != j) return quadratic(i, j) - H(j, i);

@@ -42,6 +42,7 @@ struct LawBatch {
   int n = 0;                             ///< <= batch_points; arrays have stride batch_points
   const double* H = nullptr;
   const double* dH = nullptr;
+  bool confined = false;                 ///< see MaterialBatch
   const std::int32_t* points = nullptr;  ///< owner of each lane (any live index in the padding); null where single()
   double* psi = nullptr;
   double* P = nullptr;

@@ -31,6 +31,7 @@ struct Moduli {
 struct MaterialBatch {
   int n = 0;
   std::size_t stride = 0;
+  bool confined = false;            ///< lateral components of H and dH are all zero (plane and uniaxial strain); a law may rely on it
   double time_step = 0;             ///< of laws with history [s]; 0 where no step is taken
   const double* H = nullptr;        ///< displacement gradient [-]
   const double* dH = nullptr;       ///< direction of dP [-]

@@ -55,11 +55,11 @@ class LawMaterial final : public Material {
       case Space::solid:
         return run<Solid, false>(batch);
       case Space::plane_strain:
-        return run<Plane, false>(batch);
+        return batch.confined && !batch.A ? run<ConfinedPlane, false>(batch) : run<Plane, false>(batch);
       case Space::plane_stress:
         return run<Plane, true>(batch);
       case Space::line_strain:
-        return run<Line, false>(batch);
+        return batch.confined && !batch.A ? run<ConfinedLine, false>(batch) : run<Line, false>(batch);
       case Space::line_stress:
         return run<Line, true>(batch);
     }
@@ -77,9 +77,11 @@ class LawMaterial final : public Material {
     return k;
   }
 
+  /// A displacement gradient, or a direction of one.
   template <class S>
   static Tensor<Pack, S> load(const double* x, std::size_t stride, int p) noexcept {
-    return Tensor<Pack, S>::map([&](int c) { return Pack::load(x + c * stride + p); });
+    return Tensor<Pack, S>::map(
+        [&](int c) { return always_zero<S>(row<S>(c)) ? Pack(0.0) : Pack::load(x + c * stride + p); });
   }
   template <class S>
   static void store(const Tensor<Pack, S>& t, double* x, std::size_t stride, int p) noexcept {
@@ -167,7 +169,7 @@ class LawMaterial final : public Material {
       }
       if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k);
       good &= probe == 0.0;
-      if (any(!good)) [[unlikely]]
+      if (!all(good)) [[unlikely]]
         clear(b, S::components, state_size<Law, S>(), p, good, status);
     }
     return status;
@@ -183,11 +185,13 @@ class LawMaterial final : public Material {
         return tangent(law, H, k);
     }();
     if (b.dP) store(action(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
-    if (!b.A) return;
+    if constexpr (!S::confined) {
+      if (!b.A) return;
 #pragma GCC unroll 1
-    for (int c = 0; c < S::components; ++c) {
-      Tensor<Pack, S> direction = Tensor<Pack, S>::unit(c);
-      store(action(direction), b.A + c * b.stride, S::components * b.stride, p);
+      for (int c = 0; c < S::components; ++c) {
+        Tensor<Pack, S> direction = Tensor<Pack, S>::unit(c);
+        store(action(direction), b.A + c * b.stride, S::components * b.stride, p);
+      }
     }
   }
 

@@ -43,7 +43,7 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
       du[c] = Pack::load(m.du[c].data() + l);
     }
     const Stretch<D> bond(xi, Pack::load(m.family.length.data() + l), du);
-    finite = finite && !any(!(bond.e == bond.e));
+    finite = finite && all(bond.e == bond.e);
     bond.e.store(m.extension.data() + l);
     bond.inverse_length.store(m.inverse_length.data() + l);
     for (int c = 0; c < D; ++c) bond.n[c].store(m.direction[c].data() + l);
