@@ -198,11 +198,9 @@ void LocalStencil<D>::invert_all() {
 }
 
 template <int D>
-void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& family, const double* lever) {
+void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& family) {
   lever_.resize(D * row_);
-  if (lever) {
-    std::copy_n(lever, D * row_, lever_.data());
-  } else if (rules.at_points()) {
+  if (rules.at_points()) {
     std::vector<double> g;
     fallbacks_ = reproducing_kernel(family, rules.horizon, rules.traits.order, g) < rules.traits.order;
     std::fill(lever_.begin(), lever_.end(), 0.0);
@@ -215,12 +213,12 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
 }
 
 template <int D>
-void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever,
-                            int fields, const double* const (*u)[D]) {
+void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields,
+                            const double* const (*u)[D]) {
   bonds_ = family.bonds;
   row_ = family.size;
   fallbacks_ = dropped_ = 0;
-  set_lever(rules, family, lever);
+  set_lever(rules, family);
   constexpr std::size_t entries = symmetric_components(D);
   const int parts = rules.at_points() ? 1 : rules.kinematics->parts(D), first = rules.traits.selective ? 1 : 0;
   const bool by_bond = parts == 0;

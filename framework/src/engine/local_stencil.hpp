@@ -37,10 +37,8 @@ template <int D>
 class LocalStencil {
  public:
   /// For families that carry up to two `fields` of displacements: u[f][c]: component c of field f relative to the owner, by bond,
-  /// `family.size` long. bond_share: w_ij of each bond, used where evaluation points belong to bonds. `lever`: b_k of a point
-  /// gradient of higher order where it is known, [c * family.size + k]; else null.
-  void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, const double* lever, int fields,
-             const double* const (*u)[D]);
+  /// `family.size` long. bond_share: w_ij of each bond, used where evaluation points belong to bonds.
+  void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields, const double* const (*u)[D]);
 
   int bonds() const noexcept { return bonds_; }
   int points() const noexcept { return points_; }
@@ -59,7 +57,7 @@ class LocalStencil {
   void expand(std::vector<double>& g) const;
 
  private:
-  void set_lever(const StencilRules& rules, const FamilyArrays& family, const double* lever);
+  void set_lever(const StencilRules& rules, const FamilyArrays& family);
   template <int Fields>
   void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
   /// Sums of the tiles that hold rows [begin, end): moments_ = omega_ columns_.

@@ -123,31 +123,31 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   singular_ = f.singular;
   condition_ = f.condition;
   damage_ = f.damage;
+  const std::size_t together = parts_ > 0 ? 8 : 1;
   for (std::size_t p = 0; p < body_.points(); ++p) {
     if (p % cloud_block == 0) block_first_.push_back(groups_.size());
     if (f.neighbours(p).empty()) continue;
-    groups_.push_back({static_cast<std::uint32_t>(members_.size()), -1, -1, 1, false});
+    if (groups_.size() == block_first_.back() || groups_.back().count == together)
+      groups_.push_back({static_cast<std::uint32_t>(members_.size()), -1, -1, 0, false});
+    ++groups_.back().count;
     members_.push_back(static_cast<std::int32_t>(p));
   }
   block_first_.push_back(groups_.size());
   const std::size_t blocks = block_first_.size() - 1;
   std::vector<std::size_t> fallbacks(blocks, 0), dropped(blocks, 0);
-  AlignedVector<double> levers(rules_.at_points() ? bonds_ * D : 0);
+  if (parts_ > 0) sparse_.resize(blocks);
   parallel_for(blocks, [&](std::size_t b) {
     Memory m;
-    for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
-      const auto p = static_cast<std::size_t>(members_[groups_[g].first]);
+    const auto member = [&](std::size_t g) { return g < groups_.size() ? groups_[g].first : members_.size(); };
+    for (std::size_t i = member(block_first_[b]); i < member(block_first_[b + 1]); ++i) {
+      const auto p = static_cast<std::size_t>(members_[i]);
       load_cloud_family(p, m);
       build(m, 0, nullptr);
       fallbacks[b] += static_cast<std::size_t>(m.stencil.fallbacks());
       dropped[b] += static_cast<std::size_t>(m.stencil.dropped());
-      if (!rules_.at_points()) continue;
-      std::vector<double> gradient;
-      m.stencil.expand(gradient);
-      std::copy(gradient.begin(), gradient.end(), levers.begin() + D * f.lists.first[p]);
+      if (parts_ > 0) sparse_[b].append(m.stencil, f.neighbours(p));
     }
   });
-  levers_ = std::move(levers);
   fallbacks_ = std::accumulate(fallbacks.begin(), fallbacks.end(), std::size_t{0});
   dropped_ = std::accumulate(dropped.begin(), dropped.end(), std::size_t{0});
   std::vector<std::vector<std::int32_t>> touches(blocks);
@@ -178,16 +178,11 @@ void WeightedModel<D>::load_cloud_family(std::size_t p, Memory& m) const {
   m.share.assign(m.family.size, 0.0);
   for (std::size_t k = 0; k < bonds; ++k)
     m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / cloud_->normaliser[p];
-  m.lever.assign(levers_.empty() ? 0 : D * m.family.size, 0.0);
-  if (levers_.empty()) return;
-  const double* lever = levers_.data() + D * static_cast<std::size_t>(cloud_->lists.first[p]);
-  for (std::size_t k = 0; k < bonds; ++k)
-    for (std::size_t c = 0; c < D; ++c) m.lever[c * m.family.size + k] = lever[k * D + c];
 }
 
 template <int D>
 void WeightedModel<D>::build(Memory& m, int fields, const double* const (*u)[D]) const {
-  m.stencil.build(rules_, m.family, m.share.data(), m.lever.empty() ? nullptr : m.lever.data(), fields, u);
+  m.stencil.build(rules_, m.family, m.share.data(), fields, u);
 }
 
 template <int D>
@@ -346,13 +341,63 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
 }
 
 template <int D>
+std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
+  const SparseStencils<D>& stencils = sparse_[b];
+  const std::size_t stencil = g.first - groups_[block_first_[b]].first;
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const std::span<const std::int32_t> members(members_.data() + g.first, g.count);
+  const auto gradients = [&](const AlignedVector<Row>& rows, int first, int n, double* H) {
+    for (std::size_t l = 0; l < members.size(); ++l)
+      stencils.gradient(stencil + l, first, n, static_cast<std::size_t>(members[l]), rows.data(), H + l, batch_points);
+    for (int c = 0; c < D * D && members.size() < 8; ++c)
+      for (int q = 0; q < n; ++q) std::fill_n(H + c * batch_points + 8 * q + members.size(), 8 - members.size(), 0.0);
+  };
+  const auto scatter = [&](int first, int n) {
+    for (std::size_t l = 0; l < members.size(); ++l)
+      stencils.scatter(stencil + l, first, n, static_cast<std::size_t>(members[l]), s.P + l, batch_points, out_rows_.data());
+  };
+  double* const H = traits_.selective ? s.Ht : s.H;
+  double* const dH = traits_.selective ? s.dHt : s.dH;
+  double pressure[2][8] = {};  // on the owners' gradients (selective map), and its rate
+  for (int first = 0; first < owners_ + parts_; first += batch_points / 8) {
+    const int n = std::min(batch_points / 8, owners_ + parts_ - first);
+    gradients(u_rows_, first, n, H);
+    if (tangent) gradients(w_rows_, first, n, dH);
+    if (traits_.selective && first == 0) keep_owner_gradients(8, m, s, tangent);
+    for (int l = 0; l < 8 * n; ++l) {
+      const auto lane = static_cast<std::size_t>(l % 8);
+      s.owner[l] = members[lane < members.size() ? lane : 0];
+      s.weight[l] = lane < members.size() ? weight(s.owner[l], stencils.share(stencil + lane, first + l / 8)) : 0.0;
+    }
+    const int bad = pass.work.evaluate(8 * n, s, false, energy);
+    if (bad >= 0) return s.owner[bad];
+    if (sample) {
+      pass.work.add_samples(8 * n, s, *pass.sums);
+      continue;
+    }
+    for (int l = 0; l < 8 * n && traits_.selective; ++l) {
+      pressure[0][l % 8] += s.pressure[l];
+      if (tangent) pressure[1][l % 8] += s.pressure_rate[l];
+    }
+    scatter(first, n);
+  }
+  if (sample || !traits_.selective) return -1;
+  for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
+  add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+  scatter(0, 1);
+  return -1;
+}
+
+template <int D>
 void WeightedModel<D>::block(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.begin_block(b);
   Memory& m = *memory_[static_cast<std::size_t>(thread_index())];
   double energy = 0;
   for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
     const Group& group = groups_[g];
-    const std::int32_t bad = group.stencil >= 0 ? together(group, m, s, pass, &energy) : single(group, m, s, pass, &energy);
+    const std::int32_t bad = group.stencil >= 0 ? together(group, m, s, pass, &energy)
+                             : sparse_.empty()  ? single(group, m, s, pass, &energy)
+                                                : side_by_side(group, b, m, s, pass, &energy);
     if (bad >= 0) {
       pass.report(bad);
       return;
@@ -414,8 +459,10 @@ ModelReport WeightedModel<D>::report() const {
   report.evaluation_points = parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : bonds_;
   std::size_t stencils = 0;
   for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
+  std::size_t sparse = 0;
+  for (const SparseStencils<D>& s : sparse_) sparse += s.bytes();
   report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) +
-                 members_.size() * sizeof(std::int32_t) + levers_.size() * sizeof(double) +
+                 members_.size() * sizeof(std::int32_t) + sparse +
                  (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() +
                  scratch_.bytes();
   if (lattice_) {

@@ -12,12 +12,14 @@
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
 #include "mirrored_stencil.hpp"
+#include "sparse_stencils.hpp"
 
 namespace perikit {
 
 /// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its
-/// mirrors, and up to eight of them are evaluated at a time. Points of a cloud, of rare classes, and of classes beyond a cap in
-/// bytes make their stencil when they need it.
+/// mirrors, and up to eight of them are evaluated at a time. Points of a cloud with few evaluation points keep their stencils,
+/// without the bonds that an evaluation point does not see. With an evaluation point at every bond, points of a cloud, of rare
+/// classes, and of classes beyond a cap in bytes make their stencil when they need it.
 template <int D>
 class WeightedModel final : public AssemblingModel {
  public:
@@ -37,9 +39,10 @@ class WeightedModel final : public AssemblingModel {
   /// Fewer points with an evaluation point at every bond are faster one by one.
   static constexpr std::size_t fewest_together = 3;
 
-  /// Up to eight points with one stored stencil, or a single point that makes its own.
+  /// Up to eight points with one stored stencil, up to eight points of a cloud with stored stencils, or a single point that makes
+  /// its own.
   struct Group {
-    std::uint32_t first;   ///< into members_: eight entries where there is a stencil, the last ones may repeat the first
+    std::uint32_t first;   ///< into members_: eight entries where there is one stencil, the last ones may repeat the first
     std::int32_t family;   ///< class (lattices)
     std::int32_t stencil;  ///< index of the stored one, or -1
     std::uint8_t count;
@@ -48,7 +51,7 @@ class WeightedModel final : public AssemblingModel {
   struct Memory {
     FamilyArrays family;
     LocalStencil<D> stencil;
-    AlignedVector<double> share, lever, u, w, t, m, dm;
+    AlignedVector<double> share, u, w, t, m, dm;
     double owner_H[72], owner_dH[72];  ///< of the owners, where the map is selective: [component][8]
     std::vector<std::int32_t> index;
   };
@@ -71,6 +74,7 @@ class WeightedModel final : public AssemblingModel {
   /// Evaluate a group; -1, or an inadmissible one of its points.
   std::int32_t single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   std::int32_t together(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  std::int32_t side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   /// W of evaluation point q of point p.
   double weight(std::int32_t p, double share) const noexcept;
   /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
@@ -89,7 +93,7 @@ class WeightedModel final : public AssemblingModel {
   std::vector<MirroredStencil<D>> stencils_;
   std::vector<std::int32_t> members_;
   std::optional<CloudFamilies> cloud_;
-  AlignedVector<double> levers_;  ///< clouds, point gradients of higher order: g by bond, rows of D
+  std::vector<SparseStencils<D>> sparse_;  ///< clouds with few evaluation points: by block
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;
   Colouring cloud_colouring_;

@@ -48,7 +48,7 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
     return;
   }
   families.bond_shares(row, s.family, s.share);
-  s.stencil.build({shape.kinematics.get(), shape.traits, horizon}, s.family, s.share.data(), nullptr, 0, nullptr);
+  s.stencil.build({shape.kinematics.get(), shape.traits, horizon}, s.family, s.share.data(), 0, nullptr);
   s.stencil.expand(s.gradient);
   const int owners = shape.traits.selective ? 1 : 0;
   out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
