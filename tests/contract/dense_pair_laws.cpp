@@ -144,9 +144,11 @@ Matrix stabilization(const Cloud& cloud, const std::string& name, const Elastici
       z[i] -= 1;
       for (const auto& [k, g] : own) z[k] -= g.dot(cloud.bond(i, j));
       const double factor = cloud.volume[i] * cloud.volume[j] * cloud.intact(i, j) * cloud.omega(i, j);
+      std::vector<int> touched;
       for (int k = 0; k < n; ++k)
-        for (int l = 0; l < n; ++l)
-          if (z[k] != 0 && z[l] != 0) S.block(d * k, d * l, d, d) += factor * z[k] * z[l] * M;
+        if (z[k] != 0) touched.push_back(k);
+      for (const int k : touched)
+        for (const int l : touched) S.block(d * k, d * l, d, d) += factor * z[k] * z[l] * M;
     }
   }
   return S;

@@ -27,7 +27,8 @@ std::vector<Example> kinematics_examples() {
     std::string table = fmt::format("type = \"{}\"{}{}", example.part, example.table.empty() ? "" : "\n", example.table);
     std::replace(table.begin(), table.end(), '\n', ',');
     const auto part = parse_part(Kind::stabilization, example.part, example.table, subject().registry);
-    all.push_back({"conventional", "", fmt::format("{{ {} }}", table), subject().registry.stabilization(*part)->traits().isotropic});
+    for (const char* order : {"", "order = 2"})
+      all.push_back({"conventional", order, fmt::format("{{ {} }}", table), subject().registry.stabilization(*part)->traits().isotropic});
   }
   return all;
 }

@@ -9,12 +9,16 @@ namespace perikit {
 
 namespace {
 
-/// A point or bond model, and its zero-energy penalty where there is one.
+/// A model, and its zero-energy penalty where there is one.
 template <int D, class Base>
-std::unique_ptr<Model> make_local(const ModelParts& parts) {
+std::unique_ptr<Model> make_stabilized(const ModelParts& parts) {
   auto model = std::make_unique<Base>(parts);
   if (!parts.stabilization) return model;
-  auto penalty = make_penalty<D>(parts, *model);
+  std::unique_ptr<ZeroEnergyPenalty> penalty;
+  if constexpr (std::is_same_v<Base, WeightedModel<D>>)
+    penalty = make_stencil_penalty<D>(parts);
+  else
+    penalty = make_penalty<D>(parts, *model);
   return std::make_unique<StabilizedModel>(std::move(model), std::move(penalty));
 }
 
@@ -24,9 +28,10 @@ std::unique_ptr<Model> make(const ModelParts& parts) {
   if (traits.at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
   if (traits.force_state == ForceState::local) return std::make_unique<LocalForceModel<D>>(parts, std::make_unique<WeightedModel<D>>(parts));
   // Point gradients of higher order are stencils like any other.
-  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1)) return std::make_unique<WeightedModel<D>>(parts);
-  if (parts.body->lattice()) return make_local<D, LatticeModel<D>>(parts);
-  return make_local<D, CloudModel<D>>(parts);
+  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1))
+    return make_stabilized<D, WeightedModel<D>>(parts);
+  if (parts.body->lattice()) return make_stabilized<D, LatticeModel<D>>(parts);
+  return make_stabilized<D, CloudModel<D>>(parts);
 }
 
 }  // namespace

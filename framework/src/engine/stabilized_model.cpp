@@ -23,6 +23,7 @@ EvaluationStatus StabilizedModel::sample(ConstFieldView u, PointSamples& samples
 ModelReport StabilizedModel::report() const {
   ModelReport report = base_->report();
   report.bytes += penalty_->bytes();
+  if (!penalty_->simple_force()) return report;
   report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)",
                           "a gradient and a divergence"});
   return report;

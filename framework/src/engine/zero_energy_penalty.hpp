@@ -2,9 +2,10 @@
 /// Force and energy of a stabilization (see perikit/model/stabilization.hpp) on one body. With V_i contained in M_i from here on:
 ///
 ///   E = 1/2 sum_i sum_j V_j omega_ij z_ij . M_i z_ij,   z_ij = u_ij - H_i xi_ij
-///   f_k = sum_j omega_kj [(V_j M_k + V_k M_j) u_kj - (V_j M_k H_k + V_k M_j H_j) xi_kj]
+///   f_k = sum_j omega_kj [(V_j M_k + V_k M_j) u_kj - (V_j M_k H_k + V_k M_j H_j) xi_kj]   (order 1)
 ///
-/// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w).
+/// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w). At higher orders the gradient's own share remains: see
+/// stencil_penalty.cpp.
 
 #include <memory>
 
@@ -27,6 +28,8 @@ class ZeroEnergyPenalty {
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;
+  /// The force needs no divergence of its own, as sum of omega z (x) xi V = 0.
+  virtual bool simple_force() const noexcept { return true; }
 };
 
 /// The penalty of parts.stabilization over a point gradient of order 1, whose families it shares: `model` must outlive it.
@@ -34,5 +37,8 @@ template <int D>
 std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model);
 template <int D>
 std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model);
+/// Over a point gradient of higher order.
+template <int D>
+std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty(const ModelParts& parts);
 
 }  // namespace perikit

@@ -34,11 +34,9 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
 std::shared_ptr<const Stabilization> BodyProblem::make_stabilization(const PartFactory& factory) const {
   if (!scene_.stabilization) return nullptr;
   const KinematicsTraits traits = kinematics_->traits();
-  if (traits.at != EvaluationPoints::points || traits.order != 1) {
-    const std::string found = fmt::format("over {}{}", scene_.kinematics->type, traits.at == EvaluationPoints::points ? fmt::format(" of order {}", traits.order) : "");
+  if (traits.at != EvaluationPoints::points)
     throw InputError(scene_.kinematics->values.position("stabilization"), "kinematics.stabilization",
-                     fmt::format("found '{}' {}; allowed: over kinematics with one gradient per point, of order 1", scene_.stabilization->type, found));
-  }
+                     fmt::format("found '{}' over {}; allowed: over kinematics with one gradient per point", scene_.stabilization->type, scene_.kinematics->type));
   return factory.stabilization(*scene_.stabilization);
 }
 

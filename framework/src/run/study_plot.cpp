@@ -52,8 +52,9 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
   if (!plot.log.empty()) script += fmt::format("set logscale {}\n", plot.log);
   script +=
       "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
-  script +=
-      plot.series.empty() ? "unset key\n" : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
+  const bool wide = std::ranges::any_of(lines, [](const Line& line) { return line.name.size() > 24; });  // would leave no room beside it
+  script += plot.series.empty() ? "unset key\n"
+                                : fmt::format("set key {} title {}\n", wide ? "below" : "outside right top", gnuplot_quoted(plot.series));
   for (std::size_t i = 0; i < lines.size(); ++i) script += fmt::format("$line{} << end\n{}end\n", i, lines[i].points);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     script += fmt::format("{} $line{} using 1:2 with linespoints lw 2 ps 1.4 pt {} lc rgb '{}' title {}", i == 0 ? "plot" : ",",

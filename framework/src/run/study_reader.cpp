@@ -148,10 +148,26 @@ class StudyReader {
     const auto text = one_line(node);
     if (!text)
       reader_.refuse(node, path, fmt::format("found {}; allowed: a number, boolean, string, list or table", found(node)));
-    StudyValue value{text.value_or(""), text.value_or(""), std::nullopt};
-    if (const auto* v = node.as_string()) value.shown = v->get();
+    StudyValue value{text.value_or(""), shown(node, text.value_or("")), std::nullopt};
     if (node.is_number()) value.number = node.value<double>();
     key.values.push_back(std::move(value));
+  }
+
+  /// A string without its quotes; a table by its type, then what else it says: conventional (stabilization = wan).
+  static std::string shown(const toml::node& node, const std::string& text) {
+    if (const auto* string = node.as_string()) return string->get();
+    const auto* table = node.as_table();
+    if (!table) return text;
+    std::string type, rest;
+    for (const auto& [key, value] : *table) {
+      const std::string inner = shown(value, one_line(value).value_or(""));
+      if (key == "type")
+        type = inner;
+      else
+        rest += (rest.empty() ? "" : ", ") + std::string(key.str()) + " = " + inner;
+    }
+    if (type.empty()) return rest;
+    return rest.empty() ? type : type + " (" + rest + ")";
   }
 
   void read_quantities(const toml::table& root) {

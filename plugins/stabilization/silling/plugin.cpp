@@ -27,7 +27,7 @@ PartDescription description() {
                        .equations = "T_ij += G C (omega/omega_mean_i) z_ij,  z_ij = y_ij - F_i xi_ij,  omega_mean_i = sum_j omega V_j / sum_j V_j\n"
                                     "C = 18 K/(pi delta^5) (3D), 12 k'/(pi h delta^4) (2D), 2 E/(A delta^3) (1D),  G: coefficient",
                        .source = "Silling, Comput. Methods Appl. Mech. Engrg. 322 (2017) 42-57; Hashim et al. (2D constants, eqs. 39-40)",
-                       .limits = "over `conventional` of order 1 only; a coefficient far above 1 locks bending and shortens the stable time step"};
+                       .limits = "over `conventional` only; a coefficient far above 1 locks bending and shortens the stable time step"};
   part.parameters.number("coefficient", "-", "G: stiffness of the penalty relative to a bond-based solid of the same bulk modulus").by_default("1.0").positive();
   return part;
 }

@@ -5,7 +5,8 @@
 ///   E = 1/2 sum_i V_i sum_j V_j omega_ij z_ij . M_i z_ij           (z is linear in u: E is quadratic, its tangent constant)
 ///   T_ij = omega_ij M_i z_ij,   force density sum_j (T_ij - T_ji) V_j
 ///
-/// The simple force state is the exact derivative: Hbar_i is the minimiser of sum_j omega |z|^2 V_j, hence sum_j omega z (x) xi V_j = 0.
+/// The simple force state is the exact derivative for gradients of order 1: Hbar_i is the minimiser of sum_j omega |z|^2 V_j, hence
+/// sum_j omega z (x) xi V_j = 0. At higher orders the engine adds the derivative through Hbar_i.
 /// E vanishes for affine motions. Under a superposed rotation z turns: E is objective, and its forces keep angular momentum, where
 /// M_i is a multiple of I.
 

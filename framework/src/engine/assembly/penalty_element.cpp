@@ -8,6 +8,9 @@ template <int D>
 bool PenaltyElement<D>::load(const ModelParts& parts, const PointFamilies& families, std::size_t row) {
   families.load(row, family_);
   if (family_.inverse_shape[0] == 0) return false;
+  const int order = parts.kinematics->traits().order;
+  gradient_.clear();
+  if (order > 1 && !point_gradient(family_, parts.body->horizon(), order, gradient_)) return false;
   const auto bonds = static_cast<std::size_t>(family_.bonds);
   double intact = 0, M[6];
   spring_.resize(bonds);
@@ -28,14 +31,43 @@ bool PenaltyElement<D>::load(const ModelParts& parts, const PointFamilies& famil
 
 template <int D>
 void PenaltyElement<D>::subtract_seen(double* A) const noexcept {
+  if (!gradient_.empty()) return;
   for (int a = 0; a < D; ++a)
     for (int e = 0; e < D; ++e)
       for (int b = 0; b < D; ++b)
         for (int f = 0; f < D; ++f) A[(a * D + e) * D * D + b * D + f] -= M_(a, b) * S_(e, f);
 }
 
+// N = -(p g^T + g p^T) + g S g^T with p_k = w_k xi_k.
 template <int D>
-void PenaltyElement<D>::add_springs(std::size_t own, std::size_t width, double* K) const noexcept {
+void PenaltyElement<D>::add_higher_order(std::size_t own, std::size_t width) {
+  const std::size_t nodes = spring_.size() + 1;
+  node_.assign(nodes * 2 * D, 0.0);
+  const auto p = [&](std::size_t node) { return node_.data() + node * 2 * D; };
+  for (std::size_t k = 0; k < spring_.size(); ++k)
+    for (std::size_t e = 0; e < D; ++e) {
+      double* to = p(k < own ? k : k + 1);
+      to[e] = spring_[k] * family_.xi[e][k];
+      to[D + e] = gradient_[k * D + e];
+      p(own)[e] -= to[e];
+      p(own)[D + e] -= to[D + e];
+    }
+  seen_.assign(width * width, 0.0);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    double row[2 * D];  // of p and g, against those of l: -g_k and S g_k - p_k
+    for (int e = 0; e < D; ++e) {
+      row[e] = -p(k)[D + e];
+      row[D + e] = -p(k)[e];
+      for (int f = 0; f < D; ++f) row[D + e] += S_(e, f) * p(k)[D + f];
+    }
+    for (std::size_t l = 0; l < nodes; ++l)
+      for (std::size_t e = 0; e < 2 * D; ++e) seen_[k * width + l] += row[e] * p(l)[e];
+  }
+}
+
+template <int D>
+void PenaltyElement<D>::add_springs(std::size_t own, std::size_t width, double* K) {
+  if (!gradient_.empty()) add_higher_order(own, width);
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) {
       double* block = K + static_cast<std::size_t>(a * D + b) * width * width;
@@ -47,6 +79,7 @@ void PenaltyElement<D>::add_springs(std::size_t own, std::size_t width, double* 
         block[node * width + own] -= s;
         block[own * width + node] -= s;
       }
+      for (std::size_t i = 0; i < width * width && !gradient_.empty(); ++i) block[i] += M_(a, b) * seen_[i];
     }
 }
 

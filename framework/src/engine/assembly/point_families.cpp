@@ -66,11 +66,8 @@ std::size_t PointFamilies::bytes() const noexcept {
          lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size();
 }
 
-void point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
-  if (order > 1) {
-    reproducing_kernel(family, horizon, order, g);
-    return;
-  }
+bool point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
+  if (order > 1) return reproducing_kernel(family, horizon, order, g) > 0;
   const int d = family.dimension;
   g.assign(static_cast<std::size_t>(family.bonds * d), 0.0);
   for (int k = 0; k < family.bonds; ++k)
@@ -80,6 +77,7 @@ void point_gradient(const FamilyArrays& family, double horizon, int order, std::
         g[static_cast<std::size_t>(k * d + e)] +=
             family.omega[bond] * family.volume[bond] * family.inverse_shape[symmetric_index(d, a, e)] * family.xi[a][bond];
       }
+  return family.inverse_shape[0] != 0;
 }
 
 }  // namespace perikit

@@ -56,7 +56,7 @@ class PointFamilies {
 };
 
 /// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:
-/// g_k = omega V_k K^-1 xi_k, 0 where K is singular.
-void point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g);
+/// g_k = omega V_k K^-1 xi_k, 0 where K is singular. Whether there is a gradient at all.
+bool point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g);
 
 }  // namespace perikit
