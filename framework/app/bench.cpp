@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/errors.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/machine_limits.hpp"
 #include "perikit/run/simulation.hpp"
@@ -32,7 +35,17 @@ class StepTimer final : public Observer {
   double best_ = INFINITY;
 };
 
-std::string scene_of(const std::string& kinematics, const std::string& table, int dimension, int cells, bool cloud, int steps) {
+/// One row: a kinematics with a material on one body. Times in seconds per point, not a number where not measured.
+struct Row {
+  std::string kinematics, material;
+  int dimension = 3;
+  bool cloud = false;
+  std::size_t points = 0;
+  double step = INFINITY, bytes = 0, set_up = INFINITY, tangent = INFINITY, assembly = NAN;
+};
+
+std::string scene_of(const Row& row, const std::string& kinematics, const std::string& material, int cells, int steps) {
+  const int dimension = row.dimension;
   const auto vector = [&](double value) {
     std::string text = "[";
     for (int a = 0; a < dimension; ++a) text += fmt::format("{}{}", a > 0 ? ", " : "", value);
@@ -45,28 +58,54 @@ std::string scene_of(const std::string& kinematics, const std::string& table, in
   };
   return fmt::format(
       "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\n{}"
-      "[family]\nhorizon_ratio = 3.015\n[kinematics]\ntype = \"{}\"\n{}\n"
-      "[material]\ntype = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 1.0\npoisson_ratio = 0.25\n"
-      "[initial]\ndisplacement = {}\nvelocity = {}\n[integrator]\ntype = \"verlet\"\ntime_step = 0.01\nend_time = {}\n",
-      dimension, dimension == 2 ? "plane = \"strain\"\n" : "", vector(0.0), vector(cells), cloud ? "jitter = 0.2\n" : "", kinematics, table,
-      words("1e-3 * sin(x)"), words("1e-3 * cos(x)"), 0.01 * steps);
+      "[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n[material]\n{}\n"
+      "[initial]\ndisplacement = {}\nvelocity = {}\n[integrator]\ntype = \"verlet\"\ntime_step = 1e-4\nend_time = {}\n",
+      dimension,
+      dimension == 2   ? "plane = \"strain\"\n"
+      : dimension == 1 ? "line = \"strain\"\n"
+                       : "",
+      vector(0.0), vector(cells), row.cloud ? "jitter = 0.2\n" : "", kinematics, material, words("1e-3 * sin(x)"), words("1e-3 * cos(x)"), 1e-4 * steps);
 }
 
-/// Seconds per point and step, and bytes per point.
-std::pair<double, double> time_step_of(Registry& registry, const std::string& kinematics, const std::string& table, int dimension, int cells, bool cloud) {
-  const auto timed = [&](int steps, double& bytes) {
-    const Scene scene = parse_scene(scene_of(kinematics, table, dimension, cells, cloud, steps), "bench.toml", registry);
+/// Seconds that `work` takes, the fastest of a few times.
+template <class Work>
+double fastest(Work&& work) {
+  double best = INFINITY, total = 0;
+  for (int run = 0; run < 10 && (run == 0 || total < 1.0); ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    best = std::min(best, seconds);
+    total += seconds;
+  }
+  return best;
+}
+
+void measure(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
+  const auto timed = [&](int steps, bool all) {
+    const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, steps), "bench.toml", registry);
+    const auto start = std::chrono::steady_clock::now();
     Simulation simulation(scene, registry);
+    row.set_up = std::min(row.set_up, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    Problem& problem = simulation.problem();
     StepTimer timer;
     simulation.run(timer);
-    const auto points = static_cast<double>(simulation.problem().points());
-    bytes = static_cast<double>(simulation.problem().bytes()) / points;
-    return timer.best() / points;
+    row.points = problem.points();
+    const auto points = static_cast<double>(row.points);
+    row.bytes = static_cast<double>(simulation.problem().bytes()) / points;
+    row.step = std::min(row.step, timer.best() / points);
+    if (!all) return;
+    row.set_up /= points;
+    Field w = problem.make_field(row.dimension), Kw = problem.make_field(row.dimension);
+    std::copy_n(problem.displacement().data, w.components() * w.stride(), w.data());
+    row.tangent = fastest([&] { problem.tangent_action(problem.displacement(), w, Kw); }) / points;
+    if (!options.assembly) return;
+    BlockMatrix K;
+    problem.assemble_tangent(problem.displacement(), K);   // with the pattern, which later ones keep
+    row.assembly = fastest([&] { problem.assemble_tangent(problem.displacement(), K); }) / points;
   };
-  double bytes = 0;
-  const double points = std::pow(cells, dimension), probe = timed(4, bytes);
-  const int steps = std::clamp(static_cast<int>(1.5 / (probe * points)), 4, 200);
-  return {std::min(probe, timed(steps, bytes)), bytes};
+  timed(4, false);
+  timed(std::clamp(static_cast<int>(1.5 / (row.step * static_cast<double>(row.points))), 4, 200), true);
 }
 
 /// Every kinematics, and `conventional` with every stabilization.
@@ -76,23 +115,49 @@ std::vector<std::string> every_row(const Registry& registry) {
   return rows;
 }
 
+std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
+  const auto number = [](double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string("null"); };
+  std::string text = fmt::format(
+      "{{\n  \"threads\": {},\n  \"triad_GB_per_s\": {},\n  \"multiply_add_GFLOP_per_s\": {},\n  \"gather_GB_per_s\": {},\n  \"rows\": [",
+      limits.threads, number(limits.triad_all), number(limits.multiply_add_all), number(limits.gather_all));
+  for (const Row& row : rows)
+    text += fmt::format(
+        "{}\n    {{\"kinematics\": \"{}\", \"material\": \"{}\", \"dimension\": {}, \"body\": \"{}\", \"points\": {}, \"step_ns\": {}, "
+        "\"bytes\": {}, \"set_up_ns\": {}, \"tangent_action_ns\": {}, \"assembly_ns\": {}}}",
+        &row == rows.data() ? "" : ",", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice", row.points, number(1e9 * row.step),
+        number(row.bytes), number(1e9 * row.set_up), number(1e9 * row.tangent), number(1e9 * row.assembly));
+  return text + "\n  ]\n}\n";
+}
+
 }  // namespace
 
-void bench(Registry& registry, const std::vector<std::string>& kinematics, int dimension, int cells) {
+void bench(Registry& registry, const BenchOptions& options) {
   const MachineLimits limits = measure_machine_limits();
   fmt::print("machine: triad {:.1f} GB/s, multiply-add {:.1f} GFLOP/s, gather of 32-byte rows {:.1f} GB/s (one thread); {} threads: {:.1f}, {:.1f}, {:.1f}\n\n",
              limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
-  fmt::print("{}D, {} points a side, horizon 3.015 spacings, saint_venant_kirchhoff, verlet, {} thread(s); fastest step\n\n", dimension, cells, thread_count());
-  fmt::print("| kinematics | lattice: ns a point and step | bytes a point | cloud: ns a point and step | bytes a point |\n|---|---|---|---|---|\n");
-  for (const std::string& name : kinematics.empty() ? every_row(registry) : kinematics) {
-    const std::size_t plus = name.find('+');
-    const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
-    const std::string table = plus == name.npos ? example : fmt::format("{}\nstabilization = \"{}\"", example, name.substr(plus + 1));
-    const auto [lattice, lattice_bytes] = time_step_of(registry, part, table, dimension, cells, false);
-    const auto [cloud, cloud_bytes] = time_step_of(registry, part, table, dimension, cells, true);
-    fmt::print("| {} | {:.1f} | {:.0f} | {:.1f} | {:.0f} |\n", name, lattice * 1e9, lattice_bytes, cloud * 1e9, cloud_bytes);
-    std::fflush(stdout);
-  }
+  fmt::print("{} points a side, horizon 3.015 spacings, verlet, {} thread(s). ns a point: of the fastest step; of the set-up, the tangent action and the\n"
+             "assembly of the tangent. Traffic: the bytes of a point, once a step, against the triad.\n\n", options.cells, thread_count());
+  fmt::print("| kinematics | material | D | body | step [ns] | bytes a point | traffic | set-up [ns] | tangent action [ns] | assembly [ns] |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::vector<Row> rows;
+  for (const std::string& name : options.kinematics.empty() ? every_row(registry) : options.kinematics)
+    for (const std::string& material : options.materials)
+      for (const int dimension : options.dimensions)
+        for (const bool cloud : {false, true}) {
+          const std::size_t plus = name.find('+');
+          const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
+          const std::string stabilization = plus == name.npos ? "" : fmt::format("\nstabilization = \"{}\"", name.substr(plus + 1));
+          Row& row = rows.emplace_back(Row{name, material, dimension, cloud});
+          measure(registry, row, fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
+                  fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()), options);
+          fmt::print("| {} | {} | {} | {} | {:.1f} | {:.0f} | {:.0f} % | {:.0f} | {:.1f} | {} |\n", name, material, dimension, cloud ? "cloud" : "lattice", 1e9 * row.step,
+                     row.bytes, 100e-9 * row.bytes / row.step / limits.triad_all, 1e9 * row.set_up, 1e9 * row.tangent,
+                     std::isfinite(row.assembly) ? fmt::format("{:.0f}", 1e9 * row.assembly) : "-");
+          std::fflush(stdout);
+        }
+  if (options.json.empty()) return;
+  std::ofstream file(options.json);
+  file << json_of(limits, rows);
+  if (!file.flush()) throw RunError(fmt::format("{}: cannot be written", options.json));
 }
 
 }  // namespace perikit::app

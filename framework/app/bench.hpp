@@ -6,9 +6,17 @@
 
 namespace perikit::app {
 
-/// Prints the limits of this machine, then time per point and explicit step (everything in it, no output) and bytes per point for
-/// each kinematics with Saint Venant-Kirchhoff on a lattice and on a jittered cloud of cells^dimension points, horizon 3.015 spacings.
-/// kinematics: names, with a stabilization as "conventional+silling"; empty: all known ones.
-void bench(Registry& registry, const std::vector<std::string>& kinematics, int dimension, int cells);
+struct BenchOptions {
+  std::vector<std::string> kinematics;                          ///< with a stabilization as "conventional+silling"; empty: all known ones
+  std::vector<std::string> materials = {"saint_venant_kirchhoff"};
+  std::vector<int> dimensions = {3};
+  int cells = 32;                                               ///< points along each side
+  bool assembly = false;                                        ///< time the assembly of the tangent too: it may need much memory
+  std::string json;                                             ///< file that the figures are written to as well
+};
+
+/// Prints the limits of this machine, then for each kinematics, material and dimension, on a lattice and on a jittered cloud: time
+/// per point of an explicit step (everything in it, no output), of the set-up and of the tangent action, and bytes per point.
+void bench(Registry& registry, const BenchOptions& options);
 
 }  // namespace perikit::app

@@ -134,7 +134,7 @@ void draw(const Options& options) {
 void measure(const Options& options) {
   const auto registry = open_registry(options);
   if (options.threads > 0) set_thread_count(options.threads);
-  bench(*registry, options.kinematics, options.dimension, options.cells);
+  bench(*registry, options.bench);
 }
 
 void start_project(const Options& options) {
@@ -198,9 +198,12 @@ void add_commands(CLI::App& app, Options& options) {
   plot_command->add_option("--unit", options.unit, "Unit to show, where the scene is not in SI");
   plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf");
   CLI::App* bench_command = add("bench", "Speed of the kernels beside the limits of this machine", measure);
-  bench_command->add_option("--kinematics", options.kinematics, "Which; with a penalty: conventional+silling; default: all known ones");
-  bench_command->add_option("--dimension", options.dimension, "1, 2 or 3")->check(CLI::Range(1, 3))->capture_default_str();
-  bench_command->add_option("--cells", options.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
+  bench_command->add_option("--kinematics", options.bench.kinematics, "Which; with a penalty: conventional+silling; default: all known ones");
+  bench_command->add_option("--material", options.bench.materials, "Which")->capture_default_str();
+  bench_command->add_option("--dimension", options.bench.dimensions, "1, 2 or 3, or several of them")->check(CLI::Range(1, 3))->allow_extra_args()->capture_default_str();
+  bench_command->add_option("--cells", options.bench.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
+  bench_command->add_flag("--assembly", options.bench.assembly, "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");
+  bench_command->add_option("--json", options.bench.json, "Write the figures to this file as well");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
   new_command->add_option("kind", options.kind, "Kind of the part: material, kinematics, ...")->required();

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bench.hpp"
 #include "perikit/output/plot.hpp"
 
 namespace perikit::app {
@@ -20,8 +21,7 @@ struct Options {
   std::int64_t frame = -1;
   std::string unit;
   std::vector<double> view, range;
-  std::vector<std::string> kinematics;
-  int dimension = 3, cells = 32;
+  BenchOptions bench;
   std::function<void(const Options&)> command;
 };
 

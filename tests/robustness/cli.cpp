@@ -270,3 +270,19 @@ TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and 
   CHECK(contains(every.text("out/run.log"), fmt::format("last good frame: {}", frames.size() - 1)));
   CHECK(perikit::read_last_frame(every.path("out/results.h5"), points).step == frames.back().step);
 }
+
+TEST_CASE("cli: bench gives a table and the same figures for other programs") {
+  const Desk desk(plate);
+  const Result result = desk.perikit("bench --cells 5 --kinematics sub_horizon --material hencky --dimension 2 --assembly --json figures.json");
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK(contains(result.out, "| sub_horizon | hencky | 2 | lattice |"));
+  CHECK(contains(result.out, "| sub_horizon | hencky | 2 | cloud |"));
+  const std::string figures = desk.text("figures.json");
+  for (const std::string word : {"\"triad_GB_per_s\": ", "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25"})
+    CHECK_MESSAGE(contains(figures, word), word, " is missing in ", figures);
+  CHECK_MESSAGE(!contains(figures, "null"), figures);
+  const Result full = desk.perikit("bench --cells 5 --kinematics conventional --json no/such/folder.json");
+  CHECK(full.status == 1);
+  CHECK(contains(full.err, "no/such/folder.json: cannot be written"));
+}
