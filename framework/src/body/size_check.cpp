@@ -38,7 +38,8 @@ double memory_limit() noexcept {
 
 void check_index(const Scene& scene, double cells) {
   if (cells > most_points) {
-    throw InputError(scene.body.position, key_of(scene), fmt::format("about {:.3g} points; at most {:.3g} are possible", cells, most_points));
+    throw InputError(scene.body.position, key_of(scene),
+                     fmt::format("found about {:.3g} points; allowed: at most {:.3g}", cells, most_points));
   }
 }
 
@@ -47,12 +48,17 @@ void check_memory(const Scene& scene, double cells, double ratio, bool cloud) {
   // Near surfaces families are smaller: an eighth at a corner.
   const double whole = std::min(ball[static_cast<std::size_t>(scene.body.dimension - 1)], cells - 1), family = cloud ? whole / 8 : whole;
   if (!cloud && whole > most_bonds) {
-    throw InputError(scene.body.position, "family", fmt::format("a horizon of {:.4g} spacings gives families of about {:.3g} bonds; at most {:.0f} are possible on a lattice", ratio, whole, most_bonds));
+    throw InputError(scene.body.position, "family",
+                     fmt::format("found a horizon of {:.4g} spacings, which gives families of about {:.3g} bonds; allowed: at "
+                                 "most {:.0f} on a lattice",
+                                 ratio, whole, most_bonds));
   }
   const double bytes = cells * (cloud ? bytes_a_cloud_point + family * bytes_a_cloud_bond : bytes_a_lattice_point), limit = memory_limit();
   if (bytes > limit) {
-    throw InputError(scene.body.position, key_of(scene), fmt::format("about {:.3g} points with a horizon of {:.4g} spacings need {:.3g} GB or more; this machine offers {:.3g} GB",
-                                                           cells, ratio, bytes / 1e9, limit / 1e9));
+    throw InputError(scene.body.position, key_of(scene),
+                     fmt::format("found about {:.3g} points with a horizon of {:.4g} spacings, which need {:.3g} GB or more; "
+                                 "allowed: the {:.3g} GB that this machine offers",
+                                 cells, ratio, bytes / 1e9, limit / 1e9));
   }
 }
 
