@@ -67,6 +67,9 @@ const Fault faults[]{
     {"body.lattice", "inside", "\"log(-x)\"", "", 0, "body.lattice.inside", "nan at x = (0.5, 0.5, 0)", "finite values"},
     {"body.lattice", "upper", "[6, 0.4]", "", 6, "body.lattice.spacing", "about 0 points", "1 to"},
     {"body.lattice", "spacing", "0.00002", "", 0, "body.lattice.spacing", "points", "1 to 2e+09 points"},
+    {"family", "horizon_ratio", "1e30", "", 2, "family", "found a horizon of 1e+30 spacings", "at most 1e+07"},
+    {"family", "horizon_ratio", "2e3", "", 2, "family", "found a horizon of 2000 spacings", "at most 1e+07"},
+    {"integrator", "end_time", "1e300", "", 0, "integrator.end_time", "found 1e+300 s", "at most 1e+15 steps"},
     // materials
     {"material", "density", "\"1 - x\"", "", 0, "material.density", "found -0.5 at (1.5", "a density > 0"},
     {"material", "shear_modulus", "\"x - 3\"", "", 0, "material.shear_modulus", "found shear_modulus = -2.5", "a value > 0"},
@@ -132,6 +135,7 @@ class Bench {
   std::string refusal(const std::string& text) {
     try {
       Simulation simulation(parse_scene(text, folder.path / "scene.toml", registry), registry);
+      simulation.summary();
     } catch (const InputError& error) {
       return error.what();
     }

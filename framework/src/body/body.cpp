@@ -19,6 +19,7 @@ double centred(std::mt19937_64& random) { return static_cast<double>(random() >>
 
 void check_cloud(const Scene& scene, std::size_t points, double ratio) {
   check_index(scene, static_cast<double>(points));
+  check_horizon(scene, ratio);
   check_memory(scene, static_cast<double>(points), ratio, true);
 }
 
@@ -57,6 +58,7 @@ void Body::place_lattice(const Scene& scene, bool lists) {
   const bool jittered = description.jitter > 0;
   // What `inside` leaves is known after it was asked for every cell.
   check_index(scene, estimate);
+  check_horizon(scene, horizon_ / spacing_);
   if (!description.inside) check_memory(scene, estimate, horizon_ / spacing_, jittered);
   Lattice lattice = make_lattice(dimension_, spacing_, description.lower, description.upper, horizon_);
   std::array<std::int64_t, 3> cells{1, 1, 1}, along{};
