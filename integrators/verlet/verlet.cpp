@@ -119,7 +119,8 @@ double Verlet::steps_to_end(double time, double step) const {
   constexpr double most = 1e15;   // whole numbers that a double holds
   const double steps = std::max(1.0, std::ceil((options_.end_time - time) / step * (1 - 1e-12)));
   if (steps <= most) return steps;
-  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps", options_.end_time, steps, step, most));
+  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps",
+                                                      options_.end_time, steps, step, most));
 }
 
 std::string Verlet::plan(Problem& problem) {
