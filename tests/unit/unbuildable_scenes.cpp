@@ -94,8 +94,6 @@ const Fault faults[]{
      "found 'local' over 'baqp'", "bond_associated"},
     {"kinematics", "stabilization", "\"silling\"", "", 0, "kinematics.stabilization", "found 'silling' over baqp",
      "one gradient per point"},
-    {"kinematics", "type", "\"conventional\"\norder = 2\nstabilization = \"wan\"", "", 17, "kinematics.stabilization",
-     "of order 2", "of order 1"},
     {"kinematics", "type", "\"sub_horizon\"\nparts = 2", "", 16, "kinematics.parts", "found 2 in a body of dimension 2", "4"},
     {"family", "influence", "{ type = \"expression\", formula = \"r -\" }", "", 0, "family.influence.formula", "found \"r -\"",
      "an expression in r"},

@@ -193,7 +193,7 @@ class ByteReader {
   explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
   void take(void* to, std::size_t size) {
     if (size > bytes_.size()) throw InputError("the saved state is too short");
-    std::memcpy(to, bytes_.data(), size);
+    if (size > 0) std::memcpy(to, bytes_.data(), size);   // an empty span may point nowhere
     bytes_ = bytes_.subspan(size);
   }
   template <class T>
