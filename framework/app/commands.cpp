@@ -52,7 +52,8 @@ void run(const Options& options) {
   const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
-  RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh);
+  RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
+                       library_fingerprints(*registry));
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
     const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().time())

@@ -19,7 +19,8 @@ std::vector<std::string> kind_names() {
 Kind parse_kind(const std::string& text) {
   if (const auto kind = kind_from_name(text)) return *kind;
   const auto names = kind_names();
-  throw InputError(fmt::format("unknown kind '{}'{}; known: {}", text, did_you_mean(text, names), fmt::join(names, ", ")));
+  throw InputError(
+      fmt::format("found the unknown kind '{}'; allowed: {}{}", text, fmt::join(names, ", "), did_you_mean(text, names)));
 }
 
 /// Where a scene holds a part of this kind.
@@ -60,7 +61,9 @@ std::string describe_scene(const std::string& section) {
     known.push_back(name.empty() ? "top" : name);
     if (section.empty() || section == known.back()) out += fmt::format("[{}]\n{}\n", name.empty() ? "top level" : name, parameter_lines(table));
   }
-  if (out.empty()) throw InputError(fmt::format("unknown section '{}'{}; known: {}", section, did_you_mean(section, known), fmt::join(known, ", ")));
+  if (out.empty())
+    throw InputError(fmt::format("found the unknown section '{}'; allowed: {}{}", section, fmt::join(known, ", "),
+                                 did_you_mean(section, known)));
   return out;
 }
 

@@ -25,6 +25,7 @@ PERIKIT_PLUGIN(registrar) {
         if (values.has("safety")) options.safety = values.number("safety");
         options.bond_based = values.text("estimate") == "bond_based";
         options.check_every = values.integer("check_every");
+        options.values = values;
         return std::make_unique<Verlet>(options);
       });
 }

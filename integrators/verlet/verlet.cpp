@@ -115,9 +115,17 @@ double Verlet::stable_step(Problem& problem) const {
   return eigenvalue > 0 ? options_.safety * 2 / std::sqrt(eigenvalue) : options_.end_time;
 }
 
+double Verlet::steps_to_end(double time, double step) const {
+  constexpr double most = 1e15;   // whole numbers that a double holds
+  const double steps = std::max(1.0, std::ceil((options_.end_time - time) / step * (1 - 1e-12)));
+  if (steps <= most) return steps;
+  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps",
+                                                      options_.end_time, steps, step, most));
+}
+
 std::string Verlet::plan(Problem& problem) {
   const double dt = options_.time_step > 0 ? options_.time_step : stable_step(problem);
-  const double steps = std::max(1.0, std::ceil(options_.end_time / dt * (1 - 1e-12)));
+  const double steps = steps_to_end(0, dt);
   return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
                      options_.end_time / steps, options_.end_time, problem.bond_based_time_step());
 }
@@ -131,12 +139,11 @@ void Verlet::run(Problem& problem, Observer& observer) {
   double& last_dt = plan[3];
   double& counter = plan[4];   // steps of the plan
   double& broke = plan[5];     // whether bonds have failed since the last estimate
-  const auto steps_to_end = [&](double step) { return std::max(1.0, std::ceil((options_.end_time - problem.time()) / step * (1 - 1e-12))); };
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
     first = static_cast<double>(problem.step());
     start = problem.time();
-    counter = steps_to_end(step);
+    counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
   Stepper stepper(problem);

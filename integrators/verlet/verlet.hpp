@@ -9,6 +9,7 @@ struct VerletOptions {
   double safety = 0.9;             ///< to the estimated stable step
   bool bond_based = false;         ///< estimate by P 3.58 instead of the eigenvalue
   std::int64_t check_every = 500;  ///< steps between estimates of a nonlinear body
+  ParameterValues values{};        ///< where they come from, for messages
 };
 
 /// Velocity Verlet [Partmann et al. 3.60-3.68] in its half-step form: v(t + dt/2) = v(t - dt/2) + dt a(t), u += dt v(t + dt/2).
@@ -22,6 +23,8 @@ class Verlet final : public Integrator {
 
  private:
   double stable_step(Problem& problem) const;
+  /// Equal steps of at most `step` from `time` to the end. Throws InputError for more than can be counted.
+  double steps_to_end(double time, double step) const;
   VerletOptions options_;
 };
 

@@ -23,9 +23,10 @@ struct MooneyRivlin {
     k[1] = input.value("C2");
     k[2] = input.value("bulk_modulus");
     if (!(k[0] + k[1] > 0) || !std::isfinite(k[0] + k[1]))
-      throw std::domain_error("C1 + C2 is " + std::to_string(k[0] + k[1]) + "; must be > 0 (half the shear modulus) and finite");
+      throw std::domain_error("found C1 + C2 = " + std::to_string(k[0] + k[1]) +
+                              "; allowed: a finite value > 0 (half the shear modulus)");
     if (!(k[2] > 0) || !std::isfinite(k[2]))
-      throw std::domain_error("bulk_modulus is " + std::to_string(k[2]) + "; must be > 0 and finite");
+      throw std::domain_error("found bulk_modulus = " + std::to_string(k[2]) + "; allowed: a finite value > 0");
   }
   Moduli small_strain(const double* k) const noexcept {
     const double mu = 2 * (k[0] + k[1]);

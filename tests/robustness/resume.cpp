@@ -2,43 +2,9 @@
 
 #include <doctest/doctest.h>
 
-#include <chrono>
-#include <csignal>
-#include <random>
-#include <thread>
-
-#include "robustness/desk.hpp"
+#include "robustness/same_results.hpp"
 
 using namespace perikit::test;
-
-namespace {
-
-/// Frames, history and checkpoints that fall on different steps.
-std::string long_plate() {
-  return replaced(replaced(plate, "end_time = 1.0", "end_time = 6.0"), "frames = 5\nhistory_every = 1", "every = 23\nhistory_every = 3\ncheckpoint_every = 7");
-}
-
-void check_same_results(const Desk& desk, const std::string& folder, const std::string& whole) {
-  const std::vector<Frame> frames = read_frames(desk.path(folder)), expected = read_frames(desk.path(whole));
-  REQUIRE(frames.size() == expected.size());
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const bool same = frames[k] == expected[k], linked = read_frame(desk.path(folder + "/results.h5"), fmt::format("/frames/{:08}", k)) == expected[k];
-    CHECK_MESSAGE(same, "frame ", k, " differs");
-    CHECK_MESSAGE(linked, "results.h5 does not show frame ", k);
-  }
-  for (const std::string file : {"/history.csv", "/results.xdmf"}) {
-    const bool same = desk.text(folder + file) == desk.text(whole + file);
-    CHECK_MESSAGE(same, file, " differs");
-  }
-}
-
-int wait_for(pid_t child) {
-  int status = 0;
-  waitpid(child, &status, 0);
-  return status;
-}
-
-}  // namespace
 
 TEST_CASE("resume: killed at any moment, again and again, a run ends as without a stop") {
   const Desk desk(long_plate());
@@ -46,17 +12,7 @@ TEST_CASE("resume: killed at any moment, again and again, a run ends as without 
   const auto seed = std::random_device{}();
   INFO("seed ", seed);
   std::mt19937 random(seed);
-  int kills = 0, status = -1;
-  while (status != 0) {
-    REQUIRE_MESSAGE(kills < 100, "the run does not get on");
-    const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
-    // Later and later, so that the run also gets to its end.
-    std::this_thread::sleep_for(std::chrono::milliseconds(random() % static_cast<unsigned>(80 + 40 * kills)));
-    kill(child, SIGKILL);
-    status = wait_for(child);
-    if (WIFSIGNALED(status)) ++kills;
-    else REQUIRE_MESSAGE(status == 0, "a resumed run failed with status ", WEXITSTATUS(status));
-  }
+  const int kills = run_with_kills(desk, "out", random);
   MESSAGE(kills, " kills");
   check_same_results(desk, "out", "whole");
   // A run that has come to its end stays as it is.
@@ -72,16 +28,7 @@ TEST_CASE("resume: a signal keeps the state, and the run goes on from it") {
   REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
   std::size_t frames = 0;
   for (const int signal : {SIGINT, SIGTERM}) {
-    const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
-    const auto start = std::chrono::steady_clock::now();
-    const auto rows = lines(desk.text("out/history.csv")).size();
-    while (lines(desk.text("out/history.csv")).size() < rows + 30 && std::chrono::steady_clock::now() - start < std::chrono::seconds(30)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    kill(child, signal);
-    const int status = wait_for(child);
-    REQUIRE(WIFEXITED(status));
-    CHECK(WEXITSTATUS(status) == 1);
+    CHECK(stop_after(desk, "out", 30, signal) == 1);
     CHECK(contains(desk.text("out/run.log"), "stopped by a signal after step"));
     CHECK(fs::exists(desk.path("out/checkpoint.h5")));
     // The state of the stop is the last row and the last frame, energies and velocities included.

@@ -51,5 +51,6 @@ TEST_CASE("smooth_degradation is continuous at both ends and one half in the mid
   CHECK(b[3] + b[4] == doctest::Approx(1).epsilon(1e-12));
   // H 48, scaled: n = -1.5 at a quarter of the range.
   CHECK(b[3] == doctest::Approx((std::tanh(3.0) + std::tanh(1.5)) / (2 * std::tanh(3.0))).epsilon(1e-12));
-  CHECK_THROWS_WITH_AS(make("smooth_degradation", "stretch_min = 0.3\nstretch = 0.3"), doctest::Contains("must be below `stretch`"), InputError);
+  CHECK_THROWS_WITH_AS(make("smooth_degradation", "stretch_min = 0.3\nstretch = 0.3"),
+                       doctest::Contains("found 0.3; allowed: below stretch = 0.3"), InputError);
 }

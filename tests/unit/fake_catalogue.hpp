@@ -63,8 +63,8 @@ class FakeCatalogue final : public PartCatalogue {
     const auto found = parts_.find({kind, std::string(name)});
     if (found != parts_.end()) return found->second;
     const auto all = names(kind);
-    throw InputError(
-        fmt::format("unknown {} '{}'{} known: {}", perikit::name(kind), name, did_you_mean(name, all), fmt::join(all, ", ")));
+    throw InputError(fmt::format("found the unknown {} '{}'; allowed: {}{}", perikit::name(kind), name, fmt::join(all, ", "),
+                                 did_you_mean(name, all)));
   }
   std::vector<std::string> names(Kind kind) const override {
     std::vector<std::string> all;

@@ -265,7 +265,7 @@ TEST_CASE("a scan reads manifests alone; a library that changed since then is tr
     folder.write("good.so", other);
     registry.add_folder(folder.path);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
-    CHECK(error_of([&] { registry.describe(Kind::influence, "promised"); }).find("unknown influence 'promised'") == 0);
+    CHECK(error_of([&] { registry.describe(Kind::influence, "promised"); }).find("found the unknown influence 'promised'") == 0);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
     CHECK(registry.refused().empty());
   }
@@ -322,9 +322,10 @@ TEST_CASE("an unknown name gets the nearest, the known ones and the refused libr
   Registry registry;
   registry.add_folder(folder.path);
   const std::string message = error_of([&] { registry.describe(Kind::influence, "sund"); });
-  CHECK(message.find("unknown influence 'sund'; did you mean 'sound'? known: sound; ") == 0);
+  CHECK(message.find("found the unknown influence 'sund'; allowed: sound; did you mean 'sound'?; refused libraries") == 0);
   CHECK(message.find("text.so (not a shared library (ELF magic missing))") != std::string::npos);
-  CHECK(error_of([&] { Registry().library_of(Kind::material, "steel"); }) == "unknown material 'steel'; known: none");
+  CHECK(error_of([&] { Registry().library_of(Kind::material, "steel"); }) ==
+        "found the unknown material 'steel'; allowed: none, no library brings any");
 }
 
 TEST_CASE("a factory that throws or returns null names part and library") {

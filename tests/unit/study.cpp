@@ -197,7 +197,7 @@ TEST_CASE("the table holds values, quantities, errors and what went wrong; a fai
   CHECK_FALSE(table.number(table.rows[5], "top").has_value());
   CHECK(table.rows[6].status == "refused");
   CHECK(
-      contains(table.rows[6].reason, "study.toml:5:19: values.kinematics.type: unknown kinematics 'bapq'; did you mean 'baqp'?"));
+      contains(table.rows[6].reason, "study.toml:5:19: values.kinematics.type: found the unknown kinematics 'bapq'; allowed: "));
   const std::string csv = content(folder.path / "out" / "table.csv");
   CHECK(csv.starts_with(
       "run,kinematics.type,constants.k,top,top_error,cost,status,reason\n0,conventional,1,1.5,0.25,0.25,done,\n"));

@@ -19,6 +19,7 @@ double centred(std::mt19937_64& random) { return static_cast<double>(random() >>
 
 void check_cloud(const Scene& scene, std::size_t points, double ratio) {
   check_index(scene, static_cast<double>(points));
+  check_horizon(scene, ratio);
   check_memory(scene, static_cast<double>(points), ratio, true);
 }
 
@@ -39,7 +40,14 @@ Body::Body(const Scene& scene, bool lists) : dimension_(scene.body.dimension), s
     check_cloud(scene, cloud.volume.size(), horizon_ / spacing_);
     place_cloud(std::move(cloud.position), std::move(cloud.volume));
   }
-  if (internal_.empty()) throw InputError(scene.body.position, "body", "no point is left; `inside` or the box keeps none");
+  if (internal_.empty()) {
+    throw InputError(scene.body.lattice->position, "body.lattice.inside",
+                     "found an expression that keeps no point of the lattice; allowed: one that is true at one point or more");
+  }
+  if (horizon_ < spacing_ && !scene.body.lattice) {
+    throw InputError(scene.body.position, "family.horizon",
+                     fmt::format("found {}; allowed: at least the mean spacing of the points, {:.6g}", horizon_, spacing_));
+  }
   collect_sets(scene);
 }
 
@@ -50,6 +58,7 @@ void Body::place_lattice(const Scene& scene, bool lists) {
   const bool jittered = description.jitter > 0;
   // What `inside` leaves is known after it was asked for every cell.
   check_index(scene, estimate);
+  check_horizon(scene, horizon_ / spacing_);
   if (!description.inside) check_memory(scene, estimate, horizon_ / spacing_, jittered);
   Lattice lattice = make_lattice(dimension_, spacing_, description.lower, description.upper, horizon_);
   std::array<std::int64_t, 3> cells{1, 1, 1}, along{};
@@ -59,7 +68,9 @@ void Body::place_lattice(const Scene& scene, bool lists) {
   }
   for (int a = 0; a < dimension_; ++a) {
     if (cells[static_cast<std::size_t>(a)] < 1) {
-      throw InputError(scene.body.position, "body.lattice", fmt::format("no point fits between lower and upper along {}", "xyz"[a]));
+      throw InputError(
+          description.position, "body.lattice",
+          fmt::format("found no room for a point along {}; allowed: upper - lower of half a spacing or more", "xyz"[a]));
     }
   }
   internal_.reserve(static_cast<std::size_t>(cells[0] * cells[1] * cells[2]));
@@ -158,12 +169,19 @@ void Body::collect_sets(const Scene& scene) {
     } else {
       for (const std::int64_t p : description.points) {
         if (p < 0 || static_cast<std::size_t>(p) >= internal_.size()) {
-          throw InputError(description.position, key, fmt::format("point {} does not exist; allowed: 0 ... {}", p, internal_.size() - 1));
+          throw InputError(description.position, key,
+                           fmt::format("found the point {}; allowed: 0 to {}", p, internal_.size() - 1));
         }
-        members.push_back(internal_[static_cast<std::size_t>(p)]);
+        const std::int32_t index = internal_[static_cast<std::size_t>(p)];
+        if (std::find(members.begin(), members.end(), index) != members.end()) {
+          throw InputError(description.position, key, fmt::format("found the point {} twice; allowed: each point once", p));
+        }
+        members.push_back(index);
       }
     }
-    if (members.empty()) throw InputError(description.position, key, "the set has no points");
+    if (members.empty())
+      throw InputError(description.position, key,
+                       "found a condition that holds at no point; allowed: one that holds at one point or more");
   }
   if (scene.regions.empty()) return;
   material_ids_.assign(stride_, 0);

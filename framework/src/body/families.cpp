@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 #include "perikit/body/body.hpp"
 #include "perikit/core/parallel.hpp"
@@ -109,7 +110,8 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
   });
   if (const std::int64_t p = coincident; p >= 0) {
     const auto at = static_cast<std::size_t>(4 * p);
-    throw InputError(fmt::format("body: two points coincide at ({:.6g}, {:.6g}, {:.6g})", rows[at], rows[at + 1], rows[at + 2]));
+    throw std::domain_error(fmt::format("found two points at ({:.6g}, {:.6g}, {:.6g}); allowed: points at different places",
+                                        rows[at], rows[at + 1], rows[at + 2]));
   }
   return lists;
 }

@@ -33,10 +33,10 @@ struct Fault {
 std::optional<Fault> fault_of(const Row& row, int dimension) {
   for (int c = 0; c < 4; ++c) {
     const double value = row[static_cast<std::size_t>(c)];
-    if (!std::isfinite(value)) return Fault{c, fmt::format("found {}; must be finite", value)};
-    if (c == volume_column && value <= 0) return Fault{c, fmt::format("found {}; must be > 0", value)};
+    if (!std::isfinite(value)) return Fault{c, fmt::format("found {}; allowed: a finite number", value)};
+    if (c == volume_column && value <= 0) return Fault{c, fmt::format("found {}; allowed: a number > 0", value)};
     if (c < volume_column && c >= dimension && value != 0) {
-      return Fault{c, fmt::format("found {}; must be 0 (or no column at all) in a body of dimension {}", value, dimension)};
+      return Fault{c, fmt::format("found {}; allowed: 0 (or no column at all) in a body of dimension {}", value, dimension)};
     }
   }
   return {};
@@ -79,11 +79,11 @@ class CsvReader {
   }
 
   PointCloud read() {
-    if (!next_line()) refuse(line_start(), "", fmt::format("found no header line; must be {}", wanted_columns(dimension_)), 0);
+    if (!next_line()) refuse(line_start(), "", fmt::format("found no header line; allowed: {}", wanted_columns(dimension_)), 0);
     read_header();
     PointCloud cloud;
     while (next_line()) add(cloud, read_row());
-    if (cloud.volume.empty()) refuse(line_start(), "", "found no points behind the header line", 0);
+    if (cloud.volume.empty()) refuse(line_start(), "", "found no points behind the header line; allowed: one or more", 0);
     return cloud;
   }
 
@@ -125,20 +125,20 @@ class CsvReader {
       if (cell.size() > 1 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
       const auto known = std::find(column_names.begin(), column_names.end(), cell);
       if (known == column_names.end()) {
-        refuse(where, "", fmt::format("found column '{}'; allowed are x,y,z,volume{}", cell, did_you_mean(cell, column_names)),
+        refuse(where, "", fmt::format("found column '{}'; allowed: x,y,z,volume{}", cell, did_you_mean(cell, column_names)),
                line_);
       }
       const int column = static_cast<int>(known - column_names.begin());
       if (std::find(order_.begin(), order_.end(), column) != order_.end()) {
-        refuse(where, "", fmt::format("column '{}' appears twice", cell), line_);
+        refuse(where, "", fmt::format("found column '{}' twice; allowed: each once", cell), line_);
       }
       order_.push_back(column);
     }
     for (int c = 0; c < 4; ++c) {
       if (required(c, dimension_) && std::find(order_.begin(), order_.end(), c) == order_.end()) {
         refuse(line_start(), "",
-               fmt::format("no column '{}' in '{}'; must be {}", column_names[static_cast<std::size_t>(c)], trimmed(content_),
-                           wanted_columns(dimension_)),
+               fmt::format("found no column '{}' in '{}'; allowed: {}", column_names[static_cast<std::size_t>(c)],
+                           trimmed(content_), wanted_columns(dimension_)),
                line_);
       }
     }
@@ -157,7 +157,8 @@ class CsvReader {
       row[column] = number(cell, column_names[column]);
     }
     if (cells != order_.size()) {
-      refuse(line_start(), "", fmt::format("found {} cells; the header has {} columns", cells, order_.size()), line_);
+      refuse(line_start(), "",
+             fmt::format("found {} cells; allowed: {}, as many as the header has columns", cells, order_.size()), line_);
     }
     if (const std::optional<Fault> fault = fault_of(row, dimension_)) {
       const auto column = static_cast<std::size_t>(fault->column);
@@ -172,9 +173,9 @@ class CsvReader {
     double value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error == std::errc::result_out_of_range)
-      refuse(cell.data(), column, fmt::format("found {}; beyond double precision", cell), line_);
+      refuse(cell.data(), column, fmt::format("found {}; allowed: numbers in double precision", cell), line_);
     if (error != std::errc() || end != digits.data() + digits.size()) {
-      refuse(cell.data(), column, fmt::format("found '{}'; must be a number", cell), line_);
+      refuse(cell.data(), column, fmt::format("found '{}'; allowed: a number", cell), line_);
     }
     return value;
   }
@@ -201,13 +202,14 @@ PointCloud read_hdf5(const std::filesystem::path& file, int dimension) {
     if (source.contains(name)) {
       column = source.read(name).data;
     } else if (required(c, dimension)) {
-      refuse(c, fmt::format("no such dataset; must be {}", wanted_columns(dimension)));
+      refuse(c, fmt::format("found no such dataset; allowed: {}", wanted_columns(dimension)));
     } else {
       column.assign(volume.size(), 0.0);
     }
-    if (column.size() != volume.size()) refuse(c, fmt::format("found {} values; volume has {}", column.size(), volume.size()));
+    if (column.size() != volume.size())
+      refuse(c, fmt::format("found {} values; allowed: {}, as many as volume has", column.size(), volume.size()));
   }
-  if (volume.empty()) refuse(volume_column, "found no points");
+  if (volume.empty()) refuse(volume_column, "found no points; allowed: one or more");
   PointCloud cloud;
   for (std::size_t i = 0; i < volume.size(); ++i) {
     const Row row{columns[0][i], columns[1][i], columns[2][i], volume[i]};

@@ -8,10 +8,12 @@ namespace perikit {
 /// Memory that this process may fill [bytes]: the least of the machine's, the container's and the shell's limit.
 double memory_limit() noexcept;
 
-/// Both throw InputError, before anything of the body's size is allocated.
+/// All throw InputError, before anything of the body's size is allocated.
 /// cells: of the lattice, or points of the cloud. More than indices can tell apart are refused.
 void check_index(const Scene& scene, double cells);
-/// Refuses what the memory of this machine cannot hold, whatever the kinematics. ratio: horizon over spacing.
+/// Refuses families of more than 1e7 points, also where the body has fewer. ratio: horizon over spacing.
+void check_horizon(const Scene& scene, double ratio);
+/// Refuses what the memory of this machine cannot hold, whatever the kinematics.
 void check_memory(const Scene& scene, double cells, double ratio, bool cloud);
 
 }  // namespace perikit

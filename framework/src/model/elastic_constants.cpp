@@ -9,11 +9,11 @@ namespace perikit {
 namespace {
 
 [[noreturn]] void refuse(std::string_view name, double value, std::string_view allowed) {
-  throw std::domain_error(fmt::format("{} is {}; {}", name, value, allowed));
+  throw std::domain_error(fmt::format("found {} = {}; allowed: {}", name, value, allowed));
 }
 
 double positive(std::string_view name, double value) {
-  if (!(value > 0)) refuse(name, value, "must be > 0");
+  if (!(value > 0)) refuse(name, value, "a value > 0");
   return value;
 }
 
@@ -32,7 +32,7 @@ Moduli from_young_and_lambda(double E, double lambda) {
 
 Moduli from_poisson_and_lambda(double nu, double lambda) {
   if (nu == 0 || lambda / nu <= 0)
-    refuse("lame_lambda", lambda, fmt::format("with poisson_ratio = {} it must have the sign of poisson_ratio, not zero", nu));
+    refuse("lame_lambda", lambda, fmt::format("not zero, and with poisson_ratio = {} of the same sign", nu));
   return {lambda, lambda * (1 - 2 * nu) / (2 * nu)};
 }
 
@@ -47,16 +47,16 @@ Moduli elastic_constants(const MaterialInput& input) {
     if ((has[i] = input.has(names[i]))) {
       value[i] = input.value(names[i]);
       ++given;
-      if (!std::isfinite(value[i])) refuse(names[i], value[i], "must be finite");
+      if (!std::isfinite(value[i])) refuse(names[i], value[i], "a finite value");
     }
   if (given != 2)
     throw std::domain_error(
-        fmt::format("{} elastic constants are given; exactly two of youngs_modulus, poisson_ratio, shear_modulus, "
-                    "bulk_modulus, lame_lambda are needed",
+        fmt::format("found {} elastic constants; allowed: exactly two of youngs_modulus, poisson_ratio, shear_modulus, "
+                    "bulk_modulus, lame_lambda",
                     given));
   const auto [E, nu, mu, bulk, lambda] = value;
   if (has[0]) positive(names[0], E);
-  if (has[1] && !(nu > -1 && nu < 0.5)) refuse(names[1], nu, "must lie in (-1, 1/2)");
+  if (has[1] && !(nu > -1 && nu < 0.5)) refuse(names[1], nu, "a value > -1 and < 0.5");
   if (has[2]) positive(names[2], mu);
   if (has[3]) positive(names[3], bulk);
 
@@ -82,9 +82,9 @@ Moduli elastic_constants(const MaterialInput& input) {
   else
     m = {lambda, 1.5 * (bulk - lambda)};
 
-  if (!(m.mu > 0) || !std::isfinite(m.mu)) refuse("shear_modulus", m.mu, "(from the two constants given) must be > 0 and finite");
+  if (!(m.mu > 0) || !std::isfinite(m.mu)) refuse("shear_modulus", m.mu, "a finite value > 0 from the two constants given");
   if (!(m.bulk() > 0) || !std::isfinite(m.bulk()))
-    refuse("bulk_modulus", m.bulk(), "(from the two constants given) must be > 0 and finite");
+    refuse("bulk_modulus", m.bulk(), "a finite value > 0 from the two constants given");
   return m;
 }
 

@@ -151,9 +151,9 @@ struct Registry::Implementation {
 
   [[noreturn]] void unknown(Kind kind, std::string_view part) const {
     const auto known = names(kind);
-    std::string message =
-        fmt::format("unknown {} '{}'{}{} known: {}", name(kind), part, did_you_mean(part, known),
-                    nearest(part, known).empty() ? ";" : "", known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")));
+    std::string message = fmt::format("found the unknown {} '{}'; allowed: {}{}", name(kind), part,
+                                      known.empty() ? "none, no library brings any" : fmt::format("{}", fmt::join(known, ", ")),
+                                      did_you_mean(part, known));
     const char* separator = "; refused libraries, one of which may hold it: ";
     for (const RefusedLibrary& r : refused) {
       message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/recorder.hpp"
@@ -18,13 +19,21 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   const KinematicsTraits traits = kinematics_->traits();
   const bool stress = body_.space() == Space::plane_stress || body_.space() == Space::line_stress;
   if (traits.selective && stress) {
-    throw InputError(scene_.body.position, "body", fmt::format("{} needs the strain across the body; allowed: plane = \"strain\", line = \"strain\"", scene_.kinematics->type));
+    throw InputError(
+        scene_.body.position, "body",
+        fmt::format(
+            "found a state of stress with kinematics \"{}\", which needs the strain across the body; allowed: {} = \"strain\"",
+            scene_.kinematics->type, dimension() == 2 ? "plane" : "line"));
   }
   read_materials(factory);
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());
   read_damage(quasi_static);
-  model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, damage_.get()});
+  try {
+    model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, damage_.get()});
+  } catch (const std::domain_error& error) {
+    throw InputError(scene_.body.position, scene_.body.lattice ? "body.lattice" : "body.points", error.what());
+  }
   prepare_history(quasi_static);
   read_initial();
   read_constraints(quasi_static);
@@ -58,7 +67,13 @@ std::span<const double> BodyProblem::mass() {
   for (const std::int32_t p : body_.internal()) {
     const double density = laws_->density(static_cast<std::size_t>(p));
     if (!(density > 0)) {
-      throw InputError(scene_.material->values.position("density"), "material.density", "missing; a dynamic run needs it [kg/m^3]");
+      const std::size_t id = body_.material_ids().empty() ? 0 : body_.material_ids()[static_cast<std::size_t>(p)];
+      const ParameterValues& values = (id == 0 ? scene_.material : scene_.regions[id - 1].material)->values;
+      const Point x = body_.position(static_cast<std::size_t>(p));
+      throw values.error("density", values.has("density")
+                                        ? fmt::format("found {} at ({:.6g}, {:.6g}, {:.6g}); allowed: a density > 0 [kg/m^3]",
+                                                      density, x[0], x[1], x[2])
+                                        : "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs need");
     }
     mass_[static_cast<std::size_t>(p)] = density * body_.volume(static_cast<std::size_t>(p));
   }
@@ -178,7 +193,7 @@ class ByteReader {
   explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
   void take(void* to, std::size_t size) {
     if (size > bytes_.size()) throw InputError("the saved state is too short");
-    std::memcpy(to, bytes_.data(), size);
+    if (size > 0) std::memcpy(to, bytes_.data(), size);   // an empty span may point nowhere
     bytes_ = bytes_.subspan(size);
   }
   template <class T>

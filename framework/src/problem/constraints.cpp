@@ -18,7 +18,7 @@ void BodyProblem::read_constraints(bool quasi_static) {
   std::vector<std::int32_t> governor(stride() * static_cast<std::size_t>(dimension()), -1);
   for (const BoundaryDescription& boundary : scene_.boundaries) {
     if (boundary.velocity && quasi_static) {
-      throw InputError(boundary.position, "boundary.velocity", "found a velocity in a quasi-static run; allowed: displacement");
+      throw InputError(boundary.position, "boundary.velocity", "found in a quasi-static run; allowed: displacement");
     }
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
@@ -177,7 +177,9 @@ std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::v
     }
   }
   if (shares.empty()) {
-    throw InputError(load.position, "load.face", fmt::format("no point of set '{}' lies on the face {}", load.set, load.face));
+    throw InputError(
+        load.position, "load.face",
+        fmt::format("found \"{}\", on which no point of the set \"{}\" lies; allowed: a face of the set", load.face, load.set));
   }
   points.clear();
   std::vector<double> share;

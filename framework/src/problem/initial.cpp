@@ -35,8 +35,12 @@ void BodyProblem::read_materials(const PartFactory& factory) {
       try {
         record.material->constants(input, out);
       } catch (const std::domain_error& error) {
-        throw InputError(part.values.position("type"), part.values.path(),
-                         record.uniform ? std::string(error.what()) : fmt::format("{} at ({:.6g}, {:.6g}, {:.6g})", error.what(), x[0], x[1], x[2]));
+        // The law speaks of the parameter as it knows it: "found NAME = ...".
+        const std::string text = record.uniform ? std::string(error.what())
+                                                : fmt::format("{}, at ({:.6g}, {:.6g}, {:.6g})", error.what(), x[0], x[1], x[2]);
+        for (const auto& [key, value] : values)
+          if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
+        throw InputError(part.values.position("type"), part.values.path(), text);
       }
     };
     const auto count = static_cast<std::size_t>(record.traits.constants);

@@ -3,6 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <sstream>
+
 #include "core/fingerprint.hpp"
 #include "output/atomic_file.hpp"
 #include "output/hdf5_file.hpp"
@@ -27,11 +32,48 @@ std::string body_fingerprint(const ReferenceData& body) {
   return fingerprint.text();
 }
 
+namespace {
+
+std::string fingerprint_of(std::span<const std::byte> bytes) {
+  Fingerprint fingerprint;
+  fingerprint.add(bytes);
+  return fingerprint.text();
+}
+
+/// File names of libraries that only one of the two lists holds as they are.
+std::set<std::string> other_libraries(const std::string& before, const std::string& now) {
+  const auto lines = [](const std::string& text) {
+    std::istringstream stream(text);
+    std::set<std::string> all;
+    for (std::string line; std::getline(stream, line);) all.insert(line);
+    return all;
+  };
+  const std::set<std::string> a = lines(before), b = lines(now);
+  std::vector<std::string> differing;
+  std::ranges::set_symmetric_difference(a, b, std::back_inserter(differing));
+  std::set<std::string> names;
+  for (const std::string& line : differing) names.insert(line.substr(0, line.rfind(' ')));
+  return names;
+}
+
+}  // namespace
+
+std::string library_fingerprints(const Registry& registry) {
+  std::set<std::string> lines;
+  for (const fs::path& library : registry.opened()) {
+    const std::string bytes = read_text(library);
+    lines.insert(fmt::format("{} {}", library.filename().string(), fingerprint_of(std::as_bytes(std::span(bytes)))));
+  }
+  return fmt::format("{}", fmt::join(lines, "\n"));
+}
+
 void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   hdf5::Image image;
   image.attribute("perikit_version", checkpoint.perikit_version);
   image.attribute("scene", checkpoint.scene);
   image.attribute("body", checkpoint.body);
+  image.attribute("libraries", checkpoint.libraries);
+  image.attribute("state_fingerprint", fingerprint_of(checkpoint.state));
   image.attribute("step", checkpoint.step);
   image.attribute("time", checkpoint.time);
   image.attribute("frames", checkpoint.output.frames);
@@ -51,6 +93,7 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.perikit_version = source.text("/", "perikit_version");
   checkpoint.scene = source.text("/", "scene");
   checkpoint.body = source.text("/", "body");
+  checkpoint.libraries = source.text("/", "libraries");
   checkpoint.step = source.integer("/", "step");
   checkpoint.time = source.real("/", "time");
   checkpoint.output.frames = source.integer("/", "frames");
@@ -61,6 +104,10 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.output.end_time = source.real("/", "end_time");
   checkpoint.output.initial_energy = source.real("/", "initial_energy");
   checkpoint.state = source.read_bytes("state");
+  if (source.text("/", "state_fingerprint") != fingerprint_of(checkpoint.state)) {
+    throw InputError({checkpoint_file(folder).string()}, "state",
+                     "found other bytes than were written; allowed: an undamaged checkpoint, or a run without --resume");
+  }
   return checkpoint;
 }
 
@@ -71,13 +118,21 @@ void check_same_scene(const std::string& before, const Scene& scene, const fs::p
                                folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
 }
 
-void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const fs::path& folder) {
+void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
+                      const fs::path& folder) {
   const auto refuse = [&](const std::string& message) { throw InputError({checkpoint_file(folder).string()}, "", message); };
   if (checkpoint.perikit_version != PERIKIT_VERSION) {
     refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits", checkpoint.perikit_version, PERIKIT_VERSION));
   }
   check_same_scene(checkpoint.scene, scene, folder);
   if (checkpoint.body != body) refuse("found the checkpoint of another body: the files that the scene reads have changed");
+  // Runs of a study keep no list.
+  const auto others = other_libraries(checkpoint.libraries, libraries);
+  if (!checkpoint.libraries.empty() && !others.empty()) {
+    refuse(fmt::format(
+        "found libraries that are not those that the run began with: {}; allowed: the same files, or a run without --resume",
+        fmt::join(others, ", ")));
+  }
 }
 
 }  // namespace perikit

@@ -14,6 +14,7 @@ struct Checkpoint {
   std::string perikit_version;
   std::string scene;             ///< resolved
   std::string body;              ///< fingerprint of points, volumes, materials and sets
+  std::string libraries;         ///< of parts that are used: a line "name fingerprint" for each
   OutputProgress output;
   std::int64_t step = 0;
   double time = 0;
@@ -25,11 +26,12 @@ std::string body_fingerprint(const ReferenceData& body);
 
 /// Replaces the checkpoint of the folder. Throws RunError; an earlier one is then untouched.
 void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& checkpoint);
-/// Throws InputError where it cannot be read.
+/// Throws InputError where it cannot be read, or where its state is not what was written.
 Checkpoint read_checkpoint(const std::filesystem::path& folder);
 
-/// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body and version.
-void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::filesystem::path& folder);
+/// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body, version and libraries.
+void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
+                      const std::filesystem::path& folder);
 
 /// Throws InputError naming the keys where the scene of an earlier run in `folder` was another.
 void check_same_scene(const std::string& before, const Scene& scene, const std::filesystem::path& folder);

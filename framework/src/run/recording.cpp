@@ -54,9 +54,15 @@ std::vector<std::string> history_columns(const Scene& scene) {
   return columns;
 }
 
-RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start)
-    : simulation_(simulation), folder_(std::move(folder)), show_progress_(show_progress),
-      fields_(simulation.problem(), simulation.dynamic()), start_(std::chrono::steady_clock::now()), shown_(start_) {
+RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start,
+                         std::string libraries)
+    : simulation_(simulation),
+      folder_(std::move(folder)),
+      show_progress_(show_progress),
+      fields_(simulation.problem(), simulation.dynamic()),
+      libraries_(std::move(libraries)),
+      start_(std::chrono::steady_clock::now()),
+      shown_(start_) {
   const Scene& scene = simulation.scene();
   frame_fields_ = scene.output.fields;
   if (frame_fields_.empty()) {
@@ -90,8 +96,12 @@ void RunRecorder::start_fresh(RunStart start) {
 
 void RunRecorder::start_from_checkpoint() {
   const Checkpoint checkpoint = read_checkpoint(folder_);
-  check_checkpoint(checkpoint, simulation_.scene(), body_, folder_);
-  simulation_.problem().restore(checkpoint.state);
+  check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+  try {
+    simulation_.problem().restore(checkpoint.state);
+  } catch (const InputError& error) {
+    throw InputError({checkpoint_file(folder_).string()}, "state", error.what());
+  }
   done_ = checkpoint.output;
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
@@ -161,6 +171,10 @@ void RunRecorder::step_done(const StepReport& report) {
   done_.history_rows += row;
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
+  if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
+    log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
+                    report.end_time));
+  }
   if (report.step == 0) done_.initial_energy = simulation_.problem().energies().strain + simulation_.problem().energies().kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
@@ -170,7 +184,8 @@ void RunRecorder::step_done(const StepReport& report) {
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
   history_->sync();   // frames are on the disk already
-  write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, done_, report.step, report.time, simulation_.problem().snapshot()});
+  write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
+                             simulation_.problem().snapshot()});
 }
 
 void RunRecorder::write_frame(const StepReport& report) {

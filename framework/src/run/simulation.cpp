@@ -12,6 +12,12 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   traits_ = integrator_->traits();
   problem_ = std::make_unique<BodyProblem>(scene_, factory, traits_.quasi_static);
   if (traits_.dynamic) problem_->mass();
+  if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
+    throw InputError(
+        scene_.initial_velocity_position, "initial.velocity",
+        fmt::format("found with integrator \"{}\", which knows no velocities; allowed: with integrators of dynamic runs",
+                    scene_.integrator->type));
+  }
   if (!problem_->model().has_gradients()) refuse_gradients();
 }
 

@@ -82,6 +82,13 @@ std::size_t assignment_in(const std::string& text) {
   return std::string::npos;
 }
 
+/// As written; muParser adds a blank.
+std::string text_of(const mu::Parser& parser) {
+  std::string text = parser.GetExpr();
+  while (text.ends_with(' ')) text.pop_back();
+  return text;
+}
+
 std::string reason(const mu::ParserError& error) {
   const std::string where = error.GetPos() >= 0 ? fmt::format(" at character {}", error.GetPos() + 1) : "";
   switch (error.GetCode()) {
@@ -161,7 +168,7 @@ Expression::Expression(const std::string& text, const Constants& constants, bool
     uses_position_ |= name.text == "x" || name.text == "y" || name.text == "z";
   }
   if (const std::size_t at = assignment_in(text); at != std::string::npos) {
-    throw refuse(fmt::format("'=' at character {}; a comparison is written ==, <=, >= or !=", at + 1));
+    throw refuse(fmt::format("'=' at character {}; allowed: comparisons, which are written ==, <=, >= or !=", at + 1));
   }
   try {
     parser.SetExpr(text);
@@ -180,12 +187,13 @@ double Expression::operator()(const std::array<double, 3>& x, double t) const {
     value = parser_->parser.Eval();
   } catch (const mu::ParserError& error) {
     throw InputError(parser_->position, parser_->key,
-                     fmt::format("the expression \"{}\" fails: {}", parser_->parser.GetExpr(), reason(error)));
+                     fmt::format("found the expression \"{}\", which fails: {}; allowed: finite values", text_of(parser_->parser),
+                                 reason(error)));
   }
   if (!std::isfinite(value)) {
     throw InputError(parser_->position, parser_->key,
-                     fmt::format("the expression \"{}\" is {} at x = ({}, {}, {}), t = {}; allowed: finite values",
-                                 parser_->parser.GetExpr(), value, x[0], x[1], x[2], t));
+                     fmt::format("found the expression \"{}\", which is {} at x = ({}, {}, {}), t = {}; allowed: finite values",
+                                 text_of(parser_->parser), value, x[0], x[1], x[2], t));
   }
   return value;
 }

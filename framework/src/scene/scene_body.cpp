@@ -69,6 +69,7 @@ void SceneReader::read_lattice(const toml::table& body) {
   if (reader_.dimension == 0 || !values.has("spacing") || !values.has("lower") || !values.has("upper")) return;
 
   LatticeDescription lattice;
+  lattice.position = values.position("inside");
   lattice.spacing = values.number("spacing");
   lattice.lower = coordinates(values.numbers("lower"));
   lattice.upper = coordinates(values.numbers("upper"));

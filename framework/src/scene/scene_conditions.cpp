@@ -21,6 +21,7 @@ void SceneReader::read_initial(const toml::table& root) {
   };
   fill("displacement", scene_.initial_displacement);
   fill("velocity", scene_.initial_velocity);
+  scene_.initial_velocity_position = values.position("velocity");
   scene_.initial_from = existing_file(values, "from");
   writer_.header("initial");
   writer_.lines(table, values);

@@ -1,9 +1,12 @@
+#include "perikit/sdk/plugin.hpp"
+
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
 #include "perikit/core/simd.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 
@@ -32,7 +35,11 @@ class CriticalStretch final : public Damage {
     // Bonds whose energy grows with their length (bond_based) are those of omega = xi: 4/5, 3/4, 2/3 of the horizon.
     const double d = dimension(x.space), mean_length = consistent_ ? x.mean_length : (d + 1) / (d + 2) * x.horizon;
     const double s = stretch_of(energy_release_rate_, x, mean_length);
-    if (!(s > 0) || !std::isfinite(s)) throw std::domain_error("energy_release_rate gives no positive stretch for this material and influence function");
+    if (!(s > 0) || !std::isfinite(s))
+      throw std::domain_error(
+          fmt::format("found energy_release_rate = {}, which gives a critical stretch of {} with this material and influence "
+                      "function; allowed: one that gives a finite stretch > 0",
+                      energy_release_rate_, s));
     return {s, s};
   }
 

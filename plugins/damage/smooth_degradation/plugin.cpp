@@ -1,7 +1,10 @@
+#include "perikit/sdk/plugin.hpp"
+
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "perikit/core/simd.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 
@@ -48,7 +51,7 @@ PartDescription description() {
 PERIKIT_PLUGIN(registrar) {
   registrar.damage(description(), [](const ParameterValues& values, const PartFactory&) {
     const double onset = values.number("stretch_min"), failure = values.number("stretch");
-    if (onset >= failure) throw values.error("stretch_min", "must be below `stretch`");
+    if (onset >= failure) throw values.error("stretch_min", fmt::format("found {}; allowed: below stretch = {}", onset, failure));
     return std::make_unique<SmoothDegradation>(onset, failure, values.number("beta"));
   });
 }

@@ -49,7 +49,7 @@ class Formula final : public InfluenceFunction {
       r_ = r;
       const double value = parser_.Eval();
       if (parser_.GetNumResults() != 1) return fmt::format("it has {} values; allowed: one", parser_.GetNumResults());
-      if (r_ != r) return "it assigns to r; a comparison is written ==, <= or >=";
+      if (r_ != r) return "it assigns to r; allowed: comparisons, which are written ==, <= or >=";
       if (!std::isfinite(value) || value < 0.0) return fmt::format("it is {} at r = {}; allowed: finite values >= 0 on (0, 1]", value, r);
       positive |= value > 0.0;
     }

@@ -49,7 +49,10 @@ PERIKIT_PLUGIN(registrar) {
         // A local base passes its force state on.
         const ForceState wanted = values.given("force_state") ? force_state(values) : traits.force_state;
         if (wanted == ForceState::local && (traits.at != EvaluationPoints::weighted || base->parts(3) != 0)) {
-          throw values.error("force_state", "found 'local' over '" + values.part("base").type + "'; allowed over a base with a domain for each bond (bond_associated, non_spherical)");
+          throw values.error(
+              "force_state",
+              "found 'local' over '" + values.part("base").type +
+                  "'; allowed: 'variational', or a base with a domain for each bond (bond_associated, non_spherical)");
         }
         return std::make_unique<Selective>(std::move(base), wanted);
       });

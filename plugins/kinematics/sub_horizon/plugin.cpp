@@ -28,9 +28,9 @@ class SubHorizon final : public Kinematics {
     const int orthants = 1 << dimension;
     if (!options_.has("parts") || options_.integer("parts") == orthants) return orthants;
     if (dimension == 1 && options_.integer("parts") == 4) return 4;
-    throw options_.error("parts", std::to_string(options_.integer("parts")) + "; a body of dimension " +
-                                      std::to_string(dimension) + " has " +
-                                      (dimension == 1 ? "2 or 4" : std::to_string(orthants)) + " parts");
+    throw options_.error("parts", "found " + std::to_string(options_.integer("parts")) + " in a body of dimension " +
+                                      std::to_string(dimension) +
+                                      "; allowed: " + (dimension == 1 ? "2 or 4" : std::to_string(orthants)));
   }
 
   void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {

@@ -102,7 +102,7 @@ struct FamilyLists {
   std::vector<std::int32_t> neighbour;
 };
 
-/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions as rows of 4. Throws InputError for coincident points.
+/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws std::domain_error for coincident points.
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon);
 
 /// Order of points along a space-filling (Morton) curve of boxes of size `cell`.

@@ -67,6 +67,13 @@ inline Pack from_bits(Bits b) noexcept {
   return {reinterpret_cast<Lanes>(b)};
 }
 
+/// a - b modulo 2^64: lanes that hold no positive number, and whose result is not used, may run over.
+inline Bits difference(Bits a, Bits b) noexcept {
+  typedef std::uint64_t Words __attribute__((vector_size(8 * pack_width)));
+  return reinterpret_cast<Bits>(reinterpret_cast<Words>(a) - reinterpret_cast<Words>(b));
+}
+inline Bits difference(Bits a, std::int64_t b) noexcept { return difference(a, b - Bits{}); }
+
 inline constexpr std::int64_t one_bits = 0x3ff0000000000000;        // 1.0
 inline constexpr std::int64_t sqrt_half_bits = 0x3fe6a09e667f3bcd;  // sqrt(1/2)
 inline constexpr std::int64_t shifter_bits = 0x4338000000000000;    // 1.5 * 2^52: its last bits count units
@@ -92,9 +99,9 @@ inline Pack power_of_two(Pack k) noexcept {
 inline Pack log_positive(Pack x, Pack correction) noexcept {
   const PackMask subnormal = x < std::numeric_limits<double>::min();
   const Pack scaled = select(subnormal, x * 0x1p54, x);
-  const Bits exponent = (bits(scaled) - sqrt_half_bits) >> 52;
+  const Bits exponent = difference(bits(scaled), sqrt_half_bits) >> 52;
   const Pack k = to_double(exponent) + select(subnormal, Pack(-54.0), Pack(0.0));
-  const Pack f = from_bits(bits(scaled) - (exponent << 52)) - 1.0;  // 1 + f in [sqrt(1/2), sqrt 2)
+  const Pack f = from_bits(difference(bits(scaled), exponent << 52)) - 1.0;  // 1 + f in [sqrt(1/2), sqrt 2)
   // log(1 + f) = 2 artanh(s), s = f / (2 + f), z = s^2 < 0.0295
   const Pack s = f / (2.0 + f), z = s * s;
   Pack series = 2.0 / 23;
@@ -159,8 +166,8 @@ inline bool needs_no_scaling(Pack x) noexcept {
 
 /// x = m 2^(3 third) with m in [1/2, 4), for normal x > 0.
 inline Pack scaled_by_thirds(Pack x, Pack& third) noexcept {
-  const Bits exponent = (bits(x) - one_bits) >> 52;
-  const Pack e = to_double(exponent), mantissa = from_bits(bits(x) - (exponent << 52));
+  const Bits exponent = difference(bits(x), one_bits) >> 52;
+  const Pack e = to_double(exponent), mantissa = from_bits(difference(bits(x), exponent << 52));
   third = nearest_integer(e * (1.0 / 3.0));
   return mantissa * power_of_two(e - 3.0 * third);
 }

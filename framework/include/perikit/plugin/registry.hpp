@@ -39,7 +39,7 @@ class Registry final : public PartFactory, public PartCatalogue {
 
   /// Parts in hand: registered, or named by a manifest. Sorted.
   std::vector<std::string> names(Kind kind) const override;
-  /// Opens the library that has it if need be. Throws InputError "unknown material 'x'; did you mean 'y'? known: ..." - with
+  /// Opens the library that has it if need be. Throws InputError "found the unknown material 'x'; allowed: ...; did you mean 'y'?" - with
   /// the refused libraries appended when one of them might have held it.
   const PartDescription& describe(Kind kind, std::string_view name) override;
   /// The library that brings this part.

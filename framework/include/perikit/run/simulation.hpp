@@ -44,6 +44,9 @@ class Simulation {
 /// The columns of history.csv: the standard ones, then those that the scene asks for.
 std::vector<std::string> history_columns(const Scene& scene);
 
+/// The libraries that a registry has opened, a line "file name, fingerprint of the bytes" for each.
+std::string library_fingerprints(const Registry& registry);
+
 enum class RunStart {
   fresh,   ///< from the initial state; what an earlier run left in the folder is replaced
   resume,  ///< from checkpoint.h5 in the folder; from the initial state where there is none
@@ -63,8 +66,9 @@ struct OutputProgress {
 class RunRecorder final : public Observer {
  public:
   /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into the
-  /// problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or body.
-  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh);
+  /// problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or body, or of
+  /// other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
+  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh, std::string libraries = {});
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -104,7 +108,7 @@ class RunRecorder final : public Observer {
   std::vector<double> frame_times_;
   OutputProgress done_;
   std::int64_t resumed_step_ = -1;
-  std::string body_;               ///< fingerprint
+  std::string body_, libraries_;   ///< fingerprints
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;

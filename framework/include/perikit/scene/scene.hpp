@@ -23,6 +23,7 @@ struct LatticeDescription {
   std::optional<Expression> inside;         ///< kept where nonzero
   double jitter = 0;                        ///< fraction of the spacing
   std::int64_t seed = 1;
+  SourcePosition position;                  ///< of `inside` where it is given, else of the table
 };
 
 struct BodyDescription {
@@ -102,6 +103,7 @@ struct Scene {
   std::vector<std::string> no_fail;          ///< [damage] no_fail
   std::vector<std::optional<Expression>> initial_displacement, initial_velocity;   ///< empty or `dimension` long
   std::optional<std::filesystem::path> initial_from;
+  SourcePosition initial_velocity_position;
   std::vector<BoundaryDescription> boundaries;
   std::vector<LoadDescription> loads;
   OutputDescription output;
