@@ -12,11 +12,12 @@ using namespace perikit::validation;
 
 namespace {
 
-/// High-frequency part of u_x along AB: root mean square of (u_(k-1) - 2 u_k + u_(k+1))/4, which keeps a sawtooth and drops what is smooth, over
-/// the displacement of the edges.
+/// High-frequency part of u_x along AB: root mean square of (u_(k-1) - 2 u_k + u_(k+1))/4, which keeps a sawtooth and drops what
+/// is smooth, over the displacement of the edges.
 double roughness(const std::string& kinematics, double ratio, int points) {
-  const auto simulation = load("chowdhury/diamond_hole.toml", {"kinematics.type=" + kinematics, fmt::format("family.horizon_ratio={}", ratio),
-                                                               fmt::format("constants.n={}", points)});
+  const auto simulation = load(
+      "chowdhury/diamond_hole.toml",
+      {"kinematics.type=" + kinematics, fmt::format("family.horizon_ratio={}", ratio), fmt::format("constants.n={}", points)});
   CHECK(run(*simulation).reports.back().residual <= 1e-8);
   const double* u = simulation->problem().displacement().component(0);
   const std::vector<std::int32_t>& line = simulation->problem().body().set("AB");
@@ -37,7 +38,8 @@ TEST_CASE("diamond hole: sub_horizon is smooth along AB, conventional is not") {
   };
   for (const Row row : {Row{1.1, 0.0015, 0.008}, Row{2.1, 0.005, 0.5}, Row{3.1, 0.005, 0.5}}) {
     INFO("horizon over the diagonal of a cell ", row.ratio);
-    const double sub = roughness("sub_horizon", row.ratio * std::sqrt(2.0), 40), conventional = roughness("conventional", row.ratio * std::sqrt(2.0), 40);
+    const double sub = roughness("sub_horizon", row.ratio * std::sqrt(2.0), 40),
+                 conventional = roughness("conventional", row.ratio * std::sqrt(2.0), 40);
     CHECK_MESSAGE(sub < row.smooth, "sub_horizon ", sub);
     CHECK_MESSAGE(conventional > row.oscillates, "conventional ", conventional);
   }
