@@ -18,9 +18,13 @@ class FactorisedEquations final : public LinearisedProblem {
   bool exact() const noexcept override { return true; }
 
  private:
+  static constexpr double far = 1e-3;   ///< residuals above it are not yet those of an equilibrium
+  bool assemble(Equilibrium& equilibrium, bool convex, std::string& failure);
+
   BlockMatrix tangent_;
   SparseSolver solver_;
-  ConstFieldView u_;   ///< where the equations are linearised
+  ConstFieldView u_;      ///< where the equations are linearised
+  bool convex_ = false;   ///< without the negative curvatures of evaluation points
 };
 
 /// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "free_matrix.hpp"
+#include "perikit/core/memory.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
@@ -95,7 +96,17 @@ struct SparseSolver::Implementation {
     common.postorder = 1;
     cholesky = order.empty() ? nullptr : cholmod_l_analyze_p(&A, as_long(order), nullptr, 0, &common);
     if (!cholesky) failure = fmt::format("CHOLMOD cannot analyse a matrix of {} unknowns: {}", free.unknowns(), common.status == CHOLMOD_OUT_OF_MEMORY ? "not enough memory" : "an internal error");
+    if (cholesky && !affordable(failure)) cholmod_l_free_factor(&cholesky, &common);
     return cholesky != nullptr;
+  }
+
+  /// Memory that a system promises and does not have ends a program without a word: the factor is refused while it is a pattern.
+  bool affordable(std::string& failure) const {
+    const double numbers = cholesky->is_super ? static_cast<double>(cholesky->xsize) : common.lnz, limit = memory_limit();
+    if (numbers * sizeof(double) <= limit) return true;
+    failure = fmt::format("the Cholesky factor of {} unknowns needs {:.3g} GB; this machine offers {:.3g} GB", free.unknowns(),
+                          numbers * sizeof(double) / 1e9, limit / 1e9);
+    return false;
   }
 
   bool factorise_symmetric(const BlockMatrix& K, std::string& failure) {
@@ -132,7 +143,7 @@ struct SparseSolver::Implementation {
 SparseSolver::SparseSolver() : implementation_(std::make_unique<Implementation>()) {}
 SparseSolver::~SparseSolver() = default;
 
-bool SparseSolver::factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
+bool SparseSolver::factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
   Implementation& own = *implementation_;
   if (!own.analysed) {
     own.free = FreeMatrix(K, free);
@@ -144,9 +155,12 @@ bool SparseSolver::factorise(const BlockMatrix& K, ConstFieldView free, std::str
   own.ready = own.free.unknowns() == 0;
   if (own.ready) return true;
   failure.clear();
-  if (K.symmetric && own.factorise_symmetric(K, failure)) return own.ready = true;
-  if (!failure.empty()) return false;
-  return own.ready = own.factorise_general(K, failure);
+  return own.ready = K.symmetric && own.factorise_symmetric(K, failure);
+}
+
+bool SparseSolver::factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
+  if (factorise_definite(K, free, failure)) return true;
+  return failure.empty() && (implementation_->ready = implementation_->factorise_general(K, failure));
 }
 
 void SparseSolver::solve(ConstFieldView b, FieldView x) {

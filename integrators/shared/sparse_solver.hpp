@@ -22,6 +22,8 @@ class SparseSolver {
   /// False where K is singular to working accuracy or memory is short; `failure` says so. `free`: 1 on free components, K.dimension
   /// components. The pattern of K and the mask must be those of the first call.
   bool factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure);
+  /// The same, but where K is not symmetric and positive definite there is no factorisation, and `failure` stays empty.
+  bool factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure);
   /// x <- K^-1 b on free components, 0 elsewhere. b and x may be the same field.
   void solve(ConstFieldView b, FieldView x);
 

@@ -255,6 +255,33 @@ TEST_CASE("cli: a signal ends a run in order") {
   CHECK_MESSAGE(frames.back().step >= 8, "the state at the end is not kept");
 }
 
+TEST_CASE("cli: newton refuses a tangent that memory does not hold, with the numbers") {
+  const Desk desk(R"(format = 1
+[body]
+dimension = 2
+plane = "strain"
+lattice = { spacing = 1, lower = [0, 0], upper = [300, 300] }
+[family]
+horizon_ratio = 6.015
+[kinematics]
+type = "baqp"
+[material]
+type = "neo_hookean"
+shear_modulus = 1.0
+bulk_modulus = 2.0
+[[load]]
+set = "all"
+force = [0, 1]
+[integrator]
+type = "newton"
+)");
+  const Result failed = desk.perikit("run scene.toml -o out --threads 1", "ulimit -v 1000000;");
+  INFO(failed.err);
+  CHECK(failed.status == 1);
+  CHECK(contains(failed.err, "newton: the assembled tangent of "));
+  CHECK(contains(failed.err, "this machine offers 1.02 GB"));
+}
+
 TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and what is left") {
   const Desk every(replaced(plate, "frames = 5", "every = 1") + "\n[initial]\nvelocity = [\"-60*(x > 4)\", 0]\n");
   const Result failed = every.perikit("run scene.toml -o out");

@@ -21,8 +21,8 @@ k = 1e-7
 dimension = 2
 plane = "strain"
 [body.lattice]
-spacing = 1.1
-lower = [0, 0]
+spacing = "w/40 - 0.1"
+lower = [0, "w - 48"]
 upper = [48, 60]
 inside = "y > x*44/w && y < 44 + x*16/w"
 [sets]
@@ -108,6 +108,8 @@ TEST_CASE("a whole scene is read") {
   CHECK(scene.constants.at("w") == 48.0);
   CHECK(scene.body.space == Space::plane_strain);
   CHECK(scene.body.section == 1.0);
+  CHECK(scene.body.lattice->spacing == doctest::Approx(1.1).epsilon(1e-15));
+  CHECK(scene.body.lattice->lower == std::array<double, 3>{0, 0, 0});
   CHECK(scene.body.lattice->upper == std::array<double, 3>{48, 60, 0});
   CHECK((*scene.body.lattice->inside)({24, 30, 0}) == 1.0);
   CHECK(scene.sets.size() == 4);

@@ -36,3 +36,13 @@ TEST_CASE("cantilever: ten planned load steps, without stabilisation") {
   CHECK(protocol.reports.back().iterations <= 5);
   CHECK(protocol.reports.back().residual <= 1e-10);
 }
+
+TEST_CASE("simply supported beam: deflection, and residuals that fall quadratically") {
+  const auto simulation = load("hashim/simply_supported_beam.toml", {"constants.n=3"});
+  const Protocol protocol = run(*simulation);
+  const double error = -mean(*simulation, "middle", 1) / 5.08e-3 / 0.98075 - 1;
+  CHECK_MESSAGE(std::abs(error - 0.019) < 0.001, "error ", error);
+  CHECK(protocol.reports.size() == 11);
+  CHECK(protocol.reports.back().iterations <= 4);
+  CHECK(protocol.most_iterations() <= 6);
+}

@@ -1,15 +1,14 @@
 #include "size_check.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numbers>
+
+#include "perikit/core/memory.hpp"
 
 namespace perikit {
 
@@ -31,17 +30,6 @@ double ball(int dimension, double ratio) {
 const char* key_of(const Scene& scene) { return scene.body.lattice ? "body.lattice" : "body.points"; }
 
 }  // namespace
-
-double memory_limit() noexcept {
-  double limit = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (std::ifstream file("/sys/fs/cgroup/memory.max"); file) {
-    double bytes = 0;
-    if (file >> bytes) limit = std::min(limit, bytes);   // "max": no limit
-  }
-  rlimit shell{};
-  if (getrlimit(RLIMIT_AS, &shell) == 0 && shell.rlim_cur != RLIM_INFINITY) limit = std::min(limit, static_cast<double>(shell.rlim_cur));
-  return limit;
-}
 
 void check_index(const Scene& scene, double cells) {
   if (cells > most_points) {

@@ -5,9 +5,6 @@
 
 namespace perikit {
 
-/// Memory that this process may fill [bytes]: the least of the machine's, the container's and the shell's limit.
-double memory_limit() noexcept;
-
 /// All throw InputError, before anything of the body's size is allocated.
 /// cells: of the lattice, or points of the cloud. More than indices can tell apart are refused.
 void check_index(const Scene& scene, double cells);

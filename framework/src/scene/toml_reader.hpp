@@ -49,7 +49,9 @@ class TomlReader {
   std::vector<std::string> check_group(const ParameterGroup& group, const ParameterTable& parameters, const toml::table& table,
                                        const SourcePosition& at, const std::string& path);
   void refuse_value(const Parameter& parameter, const toml::node& node, const std::string& path);
+  /// A number, or the value of an expression in `constants`.
   std::optional<double> number(const Parameter& parameter, const toml::node& node, const std::string& path);
+  std::optional<double> of_constants(const std::string& text, const toml::node& node, const std::string& path) const;
   std::optional<std::int64_t> integer(const Parameter& parameter, const toml::node& node, const std::string& path);
   std::optional<std::string> text(const Parameter& parameter, const toml::node& node, const std::string& path);
   std::optional<std::variant<double, std::string>> expression(const Parameter& parameter, const toml::node& node,

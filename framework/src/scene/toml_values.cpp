@@ -55,9 +55,21 @@ std::optional<double> TomlReader::number(const Parameter& parameter, const toml:
   std::optional<double> number;  // toml++'s value<double>() would take more than these two
   if (const auto* v = node.as_floating_point()) number = v->get();
   if (const auto* v = node.as_integer()) number = static_cast<double>(v->get());
+  const auto* text = constants.empty() ? nullptr : node.as_string();
+  if (text) number = of_constants(text->get(), node, path);
   if (number && std::isfinite(*number) && in_range(parameter, *number)) return number;
-  refuse_value(parameter, node, path);
+  const std::string value = number && text ? fmt::format(" = {}", toml_number(*number)) : "";
+  refuse(node, path, fmt::format("found {}{}; allowed: {}{}", found(node), value, allowed(parameter), text ? ", or an expression in [constants]" : ""));
   return std::nullopt;
+}
+
+std::optional<double> TomlReader::of_constants(const std::string& text, const toml::node& node, const std::string& path) const {
+  try {
+    const Expression expression(text, constants, false, position(node), path);
+    return expression.depends_on_position() ? std::nullopt : std::optional(expression({}));
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 std::optional<std::int64_t> TomlReader::integer(const Parameter& parameter, const toml::node& node, const std::string& path) {

@@ -13,6 +13,7 @@ namespace perikit {
 struct BlockMatrix {
   int dimension = 0;                      ///< of the blocks: displacement components
   bool symmetric = true;                  ///< in values too, to rounding
+  bool convex = false;                    ///< asked for: without the negative curvatures of evaluation points, so that K is semidefinite
   std::vector<std::int32_t> point;        ///< field index of each block row, ascending
   std::vector<std::int64_t> row_first;    ///< point.size() + 1 entries
   std::vector<std::int32_t> column;       ///< block rows, not field indices

@@ -12,6 +12,7 @@ Assembly::Assembly(const ModelParts& parts, int steps)
     : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), steps_(steps) {}
 
 EvaluationStatus Assembly::assemble(ConstFieldView u, BlockMatrix& K) {
+  convex_ = K.convex;
   if (!K.has_pattern()) make_pattern(families_, steps_, K);
   constexpr std::size_t piece = 1 << 16;
   parallel_for((K.values.size() + piece - 1) / piece, [&](std::size_t b) {

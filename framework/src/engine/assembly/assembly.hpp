@@ -26,10 +26,13 @@ class Assembly {
   /// Kept from one assembly to the next.
   virtual std::size_t work_bytes() const noexcept { return 0; }
   const PointFamilies& families() const noexcept { return families_; }
+  /// Of the matrix that is being filled: see BlockMatrix.
+  bool convex() const noexcept { return convex_; }
 
  private:
   PointFamilies families_;
   int steps_;
+  bool convex_ = false;
 };
 
 /// A model with an assembled tangent. By default that of the correspondence shapes.

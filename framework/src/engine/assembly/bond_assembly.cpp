@@ -190,7 +190,7 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, Con
   m.bond_of_lane.clear();
   m.row_of_lane.clear();
   const auto finish = [&]() -> std::int64_t {
-    const int bad = m.batch.evaluate();
+    const int bad = m.batch.evaluate(convex());
     if (bad >= 0) return m.batch.owner(bad);
     for (int lane = 0; lane < m.batch.lanes(); ++lane) {
       const auto at = static_cast<std::size_t>(lane);

@@ -87,7 +87,7 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
     m.of_row.push_back(families().whole(r) ? &*whole_ : &own);
     add_lanes(r, *m.of_row.back(), u, m);
   }
-  const int bad = m.batch.evaluate();
+  const int bad = m.batch.evaluate(convex());
   if (bad >= 0) return m.batch.owner(bad);
   int lane = 0;
   for (std::size_t r = first; r < last; ++r) {

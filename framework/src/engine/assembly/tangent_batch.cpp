@@ -1,6 +1,9 @@
 #include "engine/assembly/tangent_batch.hpp"
 
 #include <algorithm>
+#include <type_traits>
+
+#include <Eigen/Eigenvalues>
 
 #include "engine/assembly/selective_tangent.hpp"
 #include "engine/selective_map.hpp"
@@ -43,7 +46,7 @@ int TangentBatch<D>::add(std::int32_t owner, double weight, bool owner_has_gradi
 }
 
 template <int D>
-int TangentBatch<D>::evaluate() {
+int TangentBatch<D>::evaluate(bool convex) {
   for (int first = 0; first < lanes_; first += batch_points) {
     const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
     for (int lane = first + n; lane < last; ++lane) {  // padding at rest
@@ -56,7 +59,33 @@ int TangentBatch<D>::evaluate() {
     const int bad = selective_ ? evaluate_selective(first, n) : evaluate_plain(first, n);
     if (bad >= 0) return first + bad;
   }
+  for (int lane = 0; convex && lane < lanes_; ++lane) remove_negative_curvature(lane);
   return -1;
+}
+
+template <int D>
+void TangentBatch<D>::remove_negative_curvature(int lane) {
+  using Block = Eigen::Matrix<double, components, components, Eigen::RowMajor>;
+  const auto at = static_cast<std::size_t>(lane) * entries;
+  Eigen::Map<Block> own(own_.data() + at);
+  const auto project = [](auto& A) {
+    const Eigen::SelfAdjointEigenSolver<std::remove_reference_t<decltype(A)>> modes(A);
+    if (modes.eigenvalues()(0) >= 0) return false;
+    A = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() * modes.eigenvectors().transpose();
+    return true;
+  };
+  if (!selective_) {
+    Eigen::Matrix<double, components, components> A = own;
+    if (project(A)) own = A;
+    return;
+  }
+  Eigen::Map<Block> mixed(mixed_.data() + at), bar(bar_.data() + at);
+  Eigen::Matrix<double, 2 * components, 2 * components> A;
+  A << own, mixed, mixed.transpose(), bar;
+  if (!project(A)) return;
+  own = A.template topLeftCorner<components, components>();
+  mixed = A.template topRightCorner<components, components>();
+  bar = A.template bottomRightCorner<components, components>();
 }
 
 template <int D>

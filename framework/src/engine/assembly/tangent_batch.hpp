@@ -24,8 +24,8 @@ class TangentBatch {
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
-  /// Returns the first inadmissible lane or -1.
-  int evaluate();
+  /// Returns the first inadmissible lane or -1. convex: the matrices of each lane together lose their negative eigenvalues.
+  int evaluate(bool convex = false);
   int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
   /// W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar.
   double* own(int lane) noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
@@ -40,6 +40,7 @@ class TangentBatch {
   }
   int evaluate_plain(int first, int n);
   int evaluate_selective(int first, int n);
+  void remove_negative_curvature(int lane);
 
   const Laws& laws_;
   bool selective_;
