@@ -75,8 +75,7 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
         const double w = value[k] * position[j][3];
         whole += w;
         normaliser[p] += kind == BondWeight::kernel ? w : position[j][3];
-        const Row xi = position[j] - position[p];
-        if (near_crack) add_shape<D>(w, xi, whole_shape.data());
+        if (near_crack) add_shape<D>(w, position[j] - position[p], whole_shape.data());
         if (near_crack && body.cut(x, body.position(static_cast<std::size_t>(j)))) {
           value[k] = cut_bond;
           any_cut = true;
@@ -84,7 +83,9 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
           continue;
         }
         intact += w;
-        add_shape<D>(w, xi, K);
+        const Row xi = position[j] - position[p];
+        for (int a = 0; a < D; ++a)
+          for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
       }
       if (any_cut) {
         const std::lock_guard lock(guard);
@@ -157,7 +158,10 @@ double CloudFamilies::changed_point(std::size_t p) {
     omega[k] = (*bonds_)[k] * whole_[k];
     const double w = omega[k] * position[j][3];
     intact += w;
-    add_shape<D>(w, position[j] - position[p], K);
+    // As in `measure`: mended families are bitwise what they were.
+    const Row xi = position[j] - position[p];
+    for (int a = 0; a < D; ++a)
+      for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
   }
   invert_shape<D>(K, &inverse[6 * p], condition.data() + p);
   const double share = total_[p] > 0 ? intact / total_[p] : 0.0;
