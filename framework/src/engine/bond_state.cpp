@@ -1,6 +1,7 @@
 #include "bond_state.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace perikit {
 
@@ -12,26 +13,42 @@ bool before(const BondChange& a, const BondChange& b) noexcept { return a.point 
 
 BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy& energy, const Changed& changed) {
   ++updates_;
-  const std::vector<BondChange> changes = monitor_->find(u);
+  std::vector<BondChange> changes = monitor_->find(u);
   if (changes.empty()) return {};
-  std::vector<std::int32_t> ends;
-  for (const BondChange& c : changes) {
-    ends.push_back(c.point);
-    ends.push_back(c.far);
-  }
-  std::sort(ends.begin(), ends.end());
-  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-  GroupMarks marks(body_.stride() / padding, 0);
-  state_.mark_families(ends, marks);
   if (motion) {
     if (end_.size() == 0) end_ = body_.make_field(u.components);
     motion(end_);
   }
-  const double here = energy(u, marks), there = motion ? energy(end_, marks) : here;
-  changed(state_.lower(changes));
-  remember(changes);
-  const double left = energy(u, marks);
-  return {changes.size(), here - left, motion ? there - energy(end_, marks) : here - left};
+  BondUpdate update;
+  while (!changes.empty()) {
+    std::vector<std::int32_t> ends;
+    for (const BondChange& c : changes) {
+      ends.push_back(c.point);
+      ends.push_back(c.far);
+    }
+    std::sort(ends.begin(), ends.end());
+    ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+    GroupMarks marks(body_.stride() / padding, 0);
+    state_.mark_families(ends, marks);
+    const double here = energy(u, marks), there = motion ? energy(end_, marks) : here;
+    std::vector<BondChange> next = allowed(changed(state_.lower(changes)));
+    remember(changes);
+    const double left = energy(u, marks);
+    update.changed += changes.size();
+    update.released += here - left;
+    update.dissipated += motion ? there - energy(end_, marks) : here - left;
+    changes = std::move(next);
+  }
+  return update;
+}
+
+std::vector<BondChange> Fracture::allowed(std::vector<BondChange> changes) const {
+  const auto& limit = damage_.last();
+  std::erase_if(changes, [&](const BondChange& c) { return !std::isfinite(limit.data()[c.point] + limit.data()[c.far]); });
+  std::sort(changes.begin(), changes.end(), before);
+  changes.erase(std::unique(changes.begin(), changes.end(), [](const BondChange& a, const BondChange& b) { return a.point == b.point && a.bond == b.bond; }),
+                changes.end());
+  return changes;
 }
 
 std::vector<BondChange> Fracture::changes() const {

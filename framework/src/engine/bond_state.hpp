@@ -29,12 +29,13 @@ class BondState {
 class Fracture {
  public:
   Fracture(const Body& body, const BodyDamage& damage, BondState& state, bool skip)
-      : body_(body), state_(state), monitor_(state.make_monitor(damage, skip)) {}
+      : body_(body), damage_(damage), state_(state), monitor_(state.make_monitor(damage, skip)) {}
 
   /// energy(u, marks): strain energy of the evaluation points of the marked groups; changed(points): what follows from the
-  /// bonds of these points is to be computed anew.
+  /// bonds of these points is to be computed anew; returns the bonds of fragments, in any order. They fail
+  /// too, but for those that must not.
   using Energy = std::function<double(ConstFieldView, const GroupMarks&)>;
-  using Changed = std::function<void(std::span<const std::int32_t>)>;
+  using Changed = std::function<std::vector<BondChange>(std::span<const std::int32_t>)>;
   BondUpdate update(ConstFieldView u, const Motion& motion, const Energy& energy, const Changed& changed);
 
   /// The bonds that are not as they were at the set-up, for checkpoints.
@@ -45,8 +46,11 @@ class Fracture {
 
  private:
   void remember(std::span<const BondChange> changes);
+  /// Those of the changes that may happen, each once, ascending.
+  std::vector<BondChange> allowed(std::vector<BondChange> changes) const;
 
   const Body& body_;
+  const BodyDamage& damage_;
   BondState& state_;
   std::unique_ptr<BondMonitor> monitor_;
   std::vector<BondChange> log_;      ///< every change in its order, now and then only the last one of each bond

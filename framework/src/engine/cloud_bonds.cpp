@@ -129,12 +129,17 @@ std::unique_ptr<BondMonitor> CloudBonds::make_monitor(const BodyDamage& damage, 
   return std::make_unique<CloudMonitor>(body_, lists_, *this, damage, skip);
 }
 
+std::int64_t CloudBonds::index(std::int32_t point, std::int32_t far) const noexcept {
+  const auto p = static_cast<std::size_t>(point);
+  const auto begin = lists_.neighbour.begin() + lists_.first[p], end = lists_.neighbour.begin() + lists_.first[p + 1];
+  return std::lower_bound(begin, end, far) - lists_.neighbour.begin();
+}
+
 std::vector<std::int32_t> CloudBonds::lower(std::span<const BondChange> changes) {
   std::vector<std::int32_t> ends;
   for (const BondChange& c : changes) {
-    const auto begin = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(c.far)], end = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(c.far) + 1];
     integrity_[static_cast<std::size_t>(c.bond)] = c.integrity;
-    integrity_[static_cast<std::size_t>(std::lower_bound(begin, end, c.point) - lists_.neighbour.begin())] = c.integrity;
+    integrity_[static_cast<std::size_t>(index(c.far, c.point))] = c.integrity;
     ends.push_back(c.point);
     ends.push_back(c.far);
   }

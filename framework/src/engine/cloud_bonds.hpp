@@ -9,6 +9,8 @@ class CloudBonds final : public BondState {
   CloudBonds(const Body& body, const FamilyLists& lists) : body_(body), lists_(lists), integrity_(lists.neighbour.size(), 1.0) {}
 
   double operator[](std::size_t bond) const noexcept { return integrity_[bond]; }
+  /// Of the bond from `point` to `far`, which is one.
+  std::int64_t index(std::int32_t point, std::int32_t far) const noexcept;
   std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip) const override;
   std::vector<std::int32_t> lower(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend() override;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 
 #include "cloud_rows.hpp"
 #include "perikit/core/parallel.hpp"
@@ -14,6 +15,13 @@ namespace perikit {
 namespace {
 
 constexpr double cut_bond = -1;  ///< in place of the influence, until the lists are compacted
+
+/// K += w xi (x) xi.
+template <int D>
+void add_shape(double w, const Row& xi, double* K) noexcept {
+  for (int a = 0; a < D; ++a)
+    for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+}
 
 }  // namespace
 
@@ -44,6 +52,7 @@ template <int D>
 void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind) {
   const Row* position = reinterpret_cast<const Row*>(body.rows().data());
   std::atomic<std::size_t> cut{0}, irregular{0};
+  std::mutex guard;
   parallel_for(cloud_blocks(body.points()), [&](std::size_t b) {
     std::vector<double> r;
     for (std::size_t p = b * cloud_block_points; p < std::min(body.points(), (b + 1) * cloud_block_points); ++p) {
@@ -59,13 +68,17 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
       const bool near_crack =
           std::any_of(body.cracks().begin(), body.cracks().end(), [&](const Crack& c) { return c.near(x, body.horizon()); });
       double K[6] = {}, whole = 0, intact = 0;
+      std::array<double, 6> whole_shape{};
+      bool any_cut = false;
       for (std::size_t k = 0; k < family.size(); ++k) {
         const std::int32_t j = family[k];
         const double w = value[k] * position[j][3];
         whole += w;
         normaliser[p] += kind == BondWeight::kernel ? w : position[j][3];
+        if (near_crack) add_shape<D>(w, position[j] - position[p], whole_shape.data());
         if (near_crack && body.cut(x, body.position(static_cast<std::size_t>(j)))) {
           value[k] = cut_bond;
+          any_cut = true;
           ++cut;
           continue;
         }
@@ -73,6 +86,10 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
         const Row xi = position[j] - position[p];
         for (int a = 0; a < D; ++a)
           for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+      }
+      if (any_cut) {
+        const std::lock_guard lock(guard);
+        cracked_shape_.emplace_back(static_cast<std::int32_t>(p), whole_shape);
       }
       if (!invert_shape<D>(K, &inverse[6 * p], condition.data() + p)) ++irregular;
       const double share = whole > 0 ? intact / whole : 0.0;
@@ -105,19 +122,34 @@ BondState& CloudFamilies::bond_state() {
   if (bonds_) return *bonds_;
   bonds_.emplace(body, lists);
   whole_ = omega;
-  total_.resize(body.points());
-  for (std::size_t p = 0; p < body.points(); ++p) {
-    double intact = 0;
-    for (std::int64_t k = lists.first[p]; k < lists.first[p + 1]; ++k) {
-      intact += omega[static_cast<std::size_t>(k)] * body.volume(static_cast<std::size_t>(lists.neighbour[static_cast<std::size_t>(k)]));
-    }
-    total_[p] = intact > 0 ? intact / (1 - damage.data()[p]) : 0.0;
+  switch (body.dimension()) {
+    case 1: measure_whole<1>(); break;
+    case 2: measure_whole<2>(); break;
+    default: measure_whole<3>();
   }
   return *bonds_;
 }
 
 template <int D>
-void CloudFamilies::changed_point(std::size_t p) {
+void CloudFamilies::measure_whole() {
+  const Row* position = reinterpret_cast<const Row*>(body.rows().data());
+  total_.resize(body.points());
+  whole_shape_.assign(6 * body.points(), 0.0);
+  for (std::size_t p = 0; p < body.points(); ++p) {
+    double intact = 0;
+    for (std::int64_t k = lists.first[p]; k < lists.first[p + 1]; ++k) {
+      const std::int32_t j = lists.neighbour[static_cast<std::size_t>(k)];
+      const double w = omega[static_cast<std::size_t>(k)] * position[j][3];
+      intact += w;
+      add_shape<D>(w, position[j] - position[p], &whole_shape_[6 * p]);
+    }
+    total_[p] = intact > 0 ? intact / (1 - damage.data()[p]) : 0.0;
+  }
+  for (const auto& [p, K] : cracked_shape_) std::copy(K.begin(), K.end(), &whole_shape_[6 * static_cast<std::size_t>(p)]);
+}
+
+template <int D>
+double CloudFamilies::changed_point(std::size_t p) {
   const Row* position = reinterpret_cast<const Row*>(body.rows().data());
   double K[6] = {}, intact = 0;
   for (std::int64_t at = lists.first[p]; at < lists.first[p + 1]; ++at) {
@@ -126,6 +158,7 @@ void CloudFamilies::changed_point(std::size_t p) {
     omega[k] = (*bonds_)[k] * whole_[k];
     const double w = omega[k] * position[j][3];
     intact += w;
+    // As in `measure`: mended families are bitwise what they were.
     const Row xi = position[j] - position[p];
     for (int a = 0; a < D; ++a)
       for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
@@ -134,16 +167,23 @@ void CloudFamilies::changed_point(std::size_t p) {
   const double share = total_[p] > 0 ? intact / total_[p] : 0.0;
   weight[p] = position[p][3] * share;
   damage.data()[p] = total_[p] > 0 ? 1 - share : 1.0;
+  return shape_support<D>(K, &whole_shape_[6 * p]);
 }
 
-void CloudFamilies::changed(std::span<const std::int32_t> points) {
+std::vector<BondChange> CloudFamilies::changed(std::span<const std::int32_t> points) {
+  std::vector<BondChange> left;
   for (const std::int32_t p : points) {
-    switch (body.dimension()) {
-      case 1: changed_point<1>(static_cast<std::size_t>(p)); break;
-      case 2: changed_point<2>(static_cast<std::size_t>(p)); break;
-      default: changed_point<3>(static_cast<std::size_t>(p));
+    const auto at = static_cast<std::size_t>(p);
+    const double support = body.dimension() == 1 ? changed_point<1>(at) : body.dimension() == 2 ? changed_point<2>(at) : changed_point<3>(at);
+    if (support >= least_support) continue;
+    for (std::int64_t k = lists.first[at]; k < lists.first[at + 1]; ++k) {
+      if ((*bonds_)[static_cast<std::size_t>(k)] == 0) continue;
+      const std::int32_t far = lists.neighbour[static_cast<std::size_t>(k)];
+      if (p < far) left.push_back({p, far, k, 0.0});
+      else left.push_back({far, p, bonds_->index(far, p), 0.0});
     }
   }
+  return left;
 }
 
 void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
@@ -168,7 +208,7 @@ void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
 std::size_t CloudFamilies::bytes() const noexcept {
   return lists.neighbour.size() * sizeof(std::int32_t) + lists.first.size() * sizeof(std::int64_t) +
          (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes() +
-         (whole_.size() + total_.size()) * sizeof(double) + (bonds_ ? bonds_->bytes() : 0);
+         (whole_.size() + total_.size() + whole_shape_.size()) * sizeof(double) + cracked_shape_.size() * sizeof(cracked_shape_[0]) + (bonds_ ? bonds_->bytes() : 0);
 }
 
 }  // namespace perikit

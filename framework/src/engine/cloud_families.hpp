@@ -1,9 +1,12 @@
 #pragma once
 /// Families of a cloud: lists of intact bonds, their influence, and what point gradients and weights need of them.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "cloud_bonds.hpp"
 #include "local_stencil.hpp"
@@ -35,15 +38,19 @@ struct CloudFamilies {
   /// b of a bond.
   double integrity(std::size_t bond) const noexcept { return bonds_ ? (*bonds_)[bond] : 1.0; }
   bool fails() const noexcept { return bonds_.has_value(); }
-  /// Shape tensors, weights and damage of points whose bonds have changed.
-  void changed(std::span<const std::int32_t> points);
+  /// Shape tensors, weights and damage of points whose bonds have changed. Returns the bonds left to those of them that are
+  /// fragments, bonds between two of them twice.
+  std::vector<BondChange> changed(std::span<const std::int32_t> points);
   /// The family of p as arrays over its bonds.
   void load(std::size_t p, FamilyArrays& out) const;
   std::size_t bytes() const noexcept;
 
  private:
+  /// Returns the support of the family.
   template <int D>
-  void changed_point(std::size_t p);
+  double changed_point(std::size_t p);
+  template <int D>
+  void measure_whole();
   template <int D>
   void measure(const InfluenceFunction& influence, BondWeight kind);
   /// Takes the bonds that are marked as cut out of the lists.
@@ -51,7 +58,9 @@ struct CloudFamilies {
 
   std::optional<CloudBonds> bonds_;
   AlignedVector<double> whole_;       ///< with damage: omega by bond at the set-up,
-  AlignedVector<double> total_;       ///< and sum omega V_j of the whole family by point
+  AlignedVector<double> total_;       ///< sum omega V_j of the whole family by point,
+  AlignedVector<double> whole_shape_; ///< and its K, rows of 6
+  std::vector<std::pair<std::int32_t, std::array<double, 6>>> cracked_shape_;   ///< K of the whole family of points with cut bonds, in any order
 };
 
 }  // namespace perikit

@@ -399,12 +399,12 @@ BondUpdate CloudModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
   return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
     return run_energy(body_, laws_, traits_.selective, blocks(), at, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
-  }, [&](std::span<const std::int32_t> points) { families_.changed(points); });
+  }, [&](std::span<const std::int32_t> points) { return families_.changed(points); });
 }
 
 template <int D>
 void CloudModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { families_.changed(points); });
+  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { return families_.changed(points); });
 }
 
 template <int D>

@@ -114,17 +114,20 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
   const int d = lattice.dimension;
   for (int l = 0; l < chunk_points; ++l) {
     if (!(lanes >> l & 1)) continue;
-    double K[6] = {}, moment[3] = {}, live_omega = 0, intact_omega = 0, normaliser = 0, inverse[6] = {}, condition = 0;
+    double K[6] = {}, whole_shape[6] = {}, moment[3] = {}, live_omega = 0, intact_omega = 0, normaliser = 0, inverse[6] = {}, condition = 0;
     for (std::size_t s = 0; s < offsets.size(); ++s) {
       if (!(live_mask[s] >> l & 1)) continue;
       live_omega += omega[s];
       normaliser += weight_ == BondWeight::kernel ? omega[s] * volume : volume;
+      const auto add_shape = [&](double* shape) {
+        for (int a = 0; a < d; ++a)
+          for (int b = a; b < d; ++b) shape[symmetric_index(d, a, b)] += omega[s] * offsets[s][static_cast<std::size_t>(a)] * offsets[s][static_cast<std::size_t>(b)];
+      };
+      if (p.irregular >> l & 1) add_shape(whole_shape);
       if (!intact(p, s, l)) continue;
       intact_omega += omega[s];
-      for (int a = 0; a < d; ++a) {
-        moment[a] += omega[s] * offsets[s][static_cast<std::size_t>(a)];
-        for (int b = a; b < d; ++b) K[symmetric_index(d, a, b)] += omega[s] * offsets[s][static_cast<std::size_t>(a)] * offsets[s][static_cast<std::size_t>(b)];
-      }
+      for (int a = 0; a < d; ++a) moment[a] += omega[s] * offsets[s][static_cast<std::size_t>(a)];
+      add_shape(K);
     }
     const bool regular = d == 3 ? invert_shape<3>(K, inverse, &condition)
                        : d == 2 ? invert_shape<2>(K, inverse, &condition) : invert_shape<1>(K, inverse, &condition);
@@ -137,6 +140,8 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
     p.weight[l] = live ? volume * share : 0.0;
     p.scale[l] = live && normaliser > 0 ? volume / normaliser : 0.0;
     p.condition[l] = live ? condition : 0.0;
+    p.support[l] = !(p.irregular >> l & 1) ? 1.0
+                 : d == 3 ? shape_support<3>(K, whole_shape) : d == 2 ? shape_support<2>(K, whole_shape) : shape_support<1>(K, whole_shape);
   }
 }
 
@@ -260,6 +265,22 @@ std::vector<std::int32_t> LatticeFamilies::break_bonds(std::span<const BondChang
     singular += static_cast<std::size_t>(__builtin_popcount(p.singular));
   }
   return ends;
+}
+
+std::vector<BondChange> LatticeFamilies::fragment_bonds(std::span<const std::int32_t> points) const {
+  std::vector<BondChange> bonds;
+  for (const std::int32_t p : points) {
+    const LatticePattern& family = pattern(chunks[static_cast<std::size_t>(chunk_of(p))]);
+    const int lane = p % chunk_points;
+    if (family.support[lane] >= least_support) continue;
+    for (std::size_t s = 0; s < offsets.size(); ++s) {
+      if (!intact(family, s, lane)) continue;
+      const auto far = static_cast<std::int32_t>(p + shifts[s]);
+      if (s < half) bonds.push_back({p, far, static_cast<std::int64_t>(s), 0.0});
+      else bonds.push_back({far, p, static_cast<std::int64_t>(reverse(s)), 0.0});
+    }
+  }
+  return bonds;
 }
 
 std::vector<std::int32_t> LatticeFamilies::mend() {

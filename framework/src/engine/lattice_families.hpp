@@ -27,6 +27,7 @@ struct LatticePattern {
   alignas(64) double scale[chunk_points];      ///< V_i / N_i of the bond weights, N_i over the intact family
   alignas(64) double damage[chunk_points];     ///< D_i
   alignas(64) double condition[chunk_points];  ///< of K
+  alignas(64) double support[chunk_points];    ///< of K relative to that of the whole family; 1 where nothing is broken
   std::uint8_t live = 0xff;
   std::uint8_t irregular = 0;                  ///< lanes with broken bonds
   std::uint8_t singular = 0;                   ///< live lanes without a regular K
@@ -106,6 +107,8 @@ class LatticeFamilies {
   /// Breaks the bonds `slot` at `point` and their reverses. Chunks that they touch get patterns of their own; only the lanes that
   /// they touch are computed anew. Returns the ends, ascending.
   std::vector<std::int32_t> break_bonds(std::span<const BondChange> changes);
+  /// The intact bonds of those of the points that are fragments; bonds between two of them twice. After `break_bonds`.
+  std::vector<BondChange> fragment_bonds(std::span<const std::int32_t> points) const;
   /// The patterns of the set-up. Returns the points whose bonds had been broken.
   std::vector<std::int32_t> mend();
   /// Live cells among index ... index + 7.

@@ -460,12 +460,12 @@ BondUpdate LatticeModel<D>::update_bonds(ConstFieldView u, const Motion& motion)
   if (!fracture_) return {};
   return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
     return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), at, marks, *bonds_, [&](Pass& pass) { return run(pass); });
-  }, [](std::span<const std::int32_t>) {});
+  }, [&](std::span<const std::int32_t> points) { return families_.fragment_bonds(points); });
 }
 
 template <int D>
 void LatticeModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [](std::span<const std::int32_t>) {});
+  if (fracture_) fracture_->restore(changes, [](std::span<const std::int32_t>) { return std::vector<BondChange>(); });
 }
 
 template <int D>

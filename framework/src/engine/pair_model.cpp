@@ -137,8 +137,9 @@ void PairModel<D>::set_moduli() {
 }
 
 template <int D>
-void PairModel<D>::bonds_changed(std::span<const std::int32_t> points) {
+std::vector<BondChange> PairModel<D>::bonds_changed(std::span<const std::int32_t> points) {
   loop_->families_of(points, [&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& one) { set_moduli_of(bonds, one, fields_.modulus); });
+  return {};
 }
 
 template <int D>
@@ -156,12 +157,12 @@ double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
 template <int D>
 BondUpdate PairModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
-  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks); }, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks); }, [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
 }
 
 template <int D>
 void PairModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
 }
 
 template <int D>

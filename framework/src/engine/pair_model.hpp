@@ -30,7 +30,7 @@ class PairModel final : public AssemblingModel {
   void set_moduli();
   /// Moduli and damage of points with the same family; false where it has no intact bond.
   bool set_moduli_of(const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points, Field& modulus);
-  void bonds_changed(std::span<const std::int32_t> points);
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points);
   /// Strain energy of the marked groups: half of each of their bonds, and their dilatation.
   double energy_of(ConstFieldView u, const GroupMarks& marks);
   void set_correction(const InfluenceFunction& influence);

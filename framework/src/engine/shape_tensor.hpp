@@ -2,6 +2,7 @@
 /// Symmetric d x d shape tensors K and their inverses, stored as xx | xx yy xy | xx yy zz xy xz yz.
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <limits>
 
 namespace perikit {
@@ -44,5 +45,19 @@ bool invert_shape(const double* k, double* inverse, double* condition = nullptr)
     for (int b = a; b < D; ++b) inverse[symmetric_index(D, a, b)] = m(a, b);
   return regular;
 }
+
+/// What broken bonds leave of the shape tensor of a whole family, in its weakest direction: the smallest eigenvalue of K relative to
+/// `whole`, in [0, 1]. 0 where either is singular.
+template <int D>
+double shape_support(const double* k, const double* whole) {
+  double inverse[6];
+  if (!invert_shape<D>(k, inverse) || !invert_shape<D>(whole, inverse)) return 0;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Square<D>> eigen(symmetric_matrix<D>(k), symmetric_matrix<D>(whole), Eigen::EigenvaluesOnly);
+  return std::clamp(eigen.eigenvalues()(0), 0.0, 1.0);
+}
+
+/// A point whose family is left with less support than this is a fragment: it loses its other bonds too. The family of a corner keeps 1/4 in
+/// a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure.
+inline constexpr double least_support = 0.1;
 
 }  // namespace perikit
