@@ -146,3 +146,16 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     CHECK(balance.dissipated > 0);
   }
 }
+
+TEST_CASE("rubber sheet: the crack of a stretched, nearly incompressible sheet runs on along its middle") {
+  const auto simulation = load("fracture/rubber_sheet.toml", {"integrator.end_time=1.6e-3", "run.threads=1"});
+  BodyProblem& problem = simulation->problem();
+  const contract::Watch watch = contract::run(*simulation);
+  const Energies first = watch.energies.front(), last = watch.energies.back();
+  const double before = first.strain + first.kinetic;
+  CHECK(last.dissipated > 0);
+  CHECK_MESSAGE(std::abs(before + last.external_work - last.strain - last.kinetic - last.dissipated) <= 0.02 * before, "of ", before, " J: ",
+                last.strain + last.kinetic + last.dissipated - last.external_work, " J at the end");
+  CHECK(most_damage(problem, [](const Point& x) { return x[0] > 0.025; }) > 0.25);
+  CHECK(most_damage(problem, [](const Point& x) { return std::abs(x[1]) > 0.01; }) < 0.1);
+}
