@@ -20,7 +20,7 @@ const std::vector<Lie> lies{
     {"wrong_tangent", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
     {"wrong_stress", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
     {"forgotten_lane", "material", {"material: a batch is its points one at a time, writes all of its outputs and nothing else"}},
-    {"one_sided", "kinematics", {"kinematics: bitwise the same for one and two threads, and to rounding without savings"}},
+    {"one_sided", "kinematics", {"kinematics: bitwise the same for one, two and three threads, and to rounding without savings"}},
     {"opposite_force", "kinematics", {"kinematics: force = -dE/du, tangent = dF/du, symmetric"}},
     {"company", "influence", {"influence: bitwise the same for one point, for many, and again"}},
     {"forgetful", "integrator", {"integrator: a run that continues from a saved state is bitwise the run without a stop"}},
