@@ -55,11 +55,11 @@ class LawMaterial final : public Material {
       case Space::solid:
         return run<Solid, false>(batch);
       case Space::plane_strain:
-        return batch.confined && !batch.A ? run<ConfinedPlane, false>(batch) : run<Plane, false>(batch);
+        return strain<ConfinedPlane, Plane>(batch);
       case Space::plane_stress:
         return run<Plane, true>(batch);
       case Space::line_strain:
-        return batch.confined && !batch.A ? run<ConfinedLine, false>(batch) : run<Line, false>(batch);
+        return strain<ConfinedLine, Line>(batch);
       case Space::line_stress:
         return run<Line, true>(batch);
     }
@@ -68,6 +68,16 @@ class LawMaterial final : public Material {
 
  private:
   static constexpr bool small_strain_law = !Law::traits.objective;
+
+  /// A law that is an energy alone gets its lateral stress by differentiating with respect to lateral components: it keeps them.
+  template <class Confined, class Open>
+  Status strain(const MaterialBatch& b) const noexcept {
+    if constexpr (HasHistory<Law> || HasStress<Law, Pack, Confined, Constants>) {
+      if (b.confined && !b.A) return run<Confined, false>(b);
+    }
+    return run<Open, false>(b);
+  }
+
   using Constants = std::array<Pack, Law::traits.constants>;
 
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
