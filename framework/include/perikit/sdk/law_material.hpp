@@ -55,11 +55,11 @@ class LawMaterial final : public Material {
       case Space::solid:
         return run<Solid, false>(batch);
       case Space::plane_strain:
-        return batch.confined && !batch.A ? run<ConfinedPlane, false>(batch) : run<Plane, false>(batch);
+        return batch.confined && !batch.A && own_stress ? run<ConfinedPlane, false>(batch) : run<Plane, false>(batch);
       case Space::plane_stress:
         return run<Plane, true>(batch);
       case Space::line_strain:
-        return batch.confined && !batch.A ? run<ConfinedLine, false>(batch) : run<Line, false>(batch);
+        return batch.confined && !batch.A && own_stress ? run<ConfinedLine, false>(batch) : run<Line, false>(batch);
       case Space::line_stress:
         return run<Line, true>(batch);
     }
@@ -69,6 +69,9 @@ class LawMaterial final : public Material {
  private:
   static constexpr bool small_strain_law = !Law::traits.objective;
   using Constants = std::array<Pack, Law::traits.constants>;
+  /// The lateral stress of a confined state is a derivative along components that a confined tensor does not have: a law with an energy alone
+  /// is differentiated among all components.
+  static constexpr bool own_stress = !HasEnergy<Law, Pack, Plane, Constants> || HasStress<Law, Pack, Plane, Constants>;
 
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
     Constants k;
