@@ -38,16 +38,22 @@ double most_damage(BodyProblem& problem, Inside&& inside) {
 }  // namespace
 
 TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
-  for (const char* kinematics : {"bond_based", "ordinary"}) {
+  struct Run {
+    const char *kinematics, *influence, *consistent;
+    double lip;   ///< less than the damage of a point beside a crack: far bonds count for less in the cubic kernel
+  };
+  for (const auto& [kinematics, influence, consistent, lip] :
+       {Run{"bond_based", "constant", "false", 0.35}, Run{"ordinary", "constant", "false", 0.35}, Run{"baqp", "cubic_spline", "true", 0.3}}) {
     INFO(kinematics);
     // Ten times faster than in the paper, so that the run is short.
-    const auto simulation = load("partmann/mode_I.toml", {fmt::format("kinematics={}", kinematics), "body.lattice.spacing=4e-5", "constants.dx=4e-5", "integrator.end_time=1.6e-5",
+    const auto simulation = load("partmann/mode_I.toml", {fmt::format("kinematics={}", kinematics), fmt::format("family.influence={}", influence),
+                                                          fmt::format("damage.consistent={}", consistent), "body.lattice.spacing=4e-5", "constants.dx=4e-5", "integrator.end_time=1.6e-5",
                                                           "boundary=[{set=\"top\", velocity=[\"free\", 0.5, \"free\"]}, {set=\"bottom\", velocity=[\"free\", -0.5, \"free\"]}]"});
     BodyProblem& problem = simulation->problem();
     const double before = most_damage(problem, [](const Point& x) { return x[0] > 0.2e-3; });
     const Balance balance = run(*simulation);
     CHECK(before == 0);
-    CHECK(most_damage(problem, [](const Point& x) { return x[0] > 0.46e-3; }) > 0.35);
+    CHECK(most_damage(problem, [](const Point& x) { return x[0] > 0.46e-3; }) > lip);
     CHECK(most_damage(problem, [](const Point& x) { return std::abs(x[1]) > 0.25e-3; }) < 0.1);
     CHECK(balance.dissipated > 0);
     CHECK_MESSAGE(std::abs(balance.missing) <= 0.03 * balance.dissipated, balance.missing, " J missing, ", balance.dissipated, " J dissipated");
