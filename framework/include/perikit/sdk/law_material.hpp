@@ -79,9 +79,6 @@ class LawMaterial final : public Material {
   }
 
   using Constants = std::array<Pack, Law::traits.constants>;
-  /// The lateral stress of a confined state is a derivative along components that a confined tensor does not have: a law with an energy alone
-  /// is differentiated among all components.
-  static constexpr bool own_stress = !HasEnergy<Law, Pack, Plane, Constants> || HasStress<Law, Pack, Plane, Constants>;
 
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
     Constants k;
