@@ -276,3 +276,16 @@ TEST_CASE("every section has a table, and every default of it is allowed") {
   }
   CHECK(load);
 }
+
+TEST_CASE("run.seed is the seed of the lattice that has none of its own") {
+  const std::string text = cook;
+  CHECK(parse(text).body.lattice->seed == 1);
+  std::string with_run = text;
+  with_run.replace(with_run.find("[run]\n"), 6, "[run]\nseed = 7\n");
+  const Scene scene = parse(with_run);
+  CHECK(scene.body.lattice->seed == 7);
+  CHECK(parse(scene.resolved).body.lattice->seed == 7);
+  std::string own = with_run;
+  own.replace(own.find("lower = ["), 0, "seed = 3\n");
+  CHECK(parse(own).body.lattice->seed == 3);
+}

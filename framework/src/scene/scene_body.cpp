@@ -74,7 +74,8 @@ void SceneReader::read_lattice(const toml::table& body) {
   lattice.lower = coordinates(values.numbers("lower"));
   lattice.upper = coordinates(values.numbers("upper"));
   if (values.has("jitter")) lattice.jitter = values.number("jitter");
-  if (values.has("seed")) lattice.seed = values.integer("seed");
+  lattice_seed_ = values.has("seed");
+  if (lattice_seed_) lattice.seed = values.integer("seed");
   if (values.has("inside")) {
     lattice.inside =
         Expression(values.expression("inside"), scene_.constants, false, values.position("inside"), "body.lattice.inside");

@@ -163,7 +163,9 @@ void SceneReader::read_run(const toml::table& root) {
   writer_.lines(table, values);
   if (values.has("skip")) scene_.skip = values.boolean("skip");
   if (values.has("threads")) scene_.threads = static_cast<int>(values.integer("threads"));
-  if (values.has("seed")) scene_.seed = values.integer("seed");
+  if (!values.has("seed")) return;
+  scene_.seed = values.integer("seed");
+  if (scene_.body.lattice && !lattice_seed_) scene_.body.lattice->seed = scene_.seed;
 }
 
 }  // namespace perikit

@@ -52,6 +52,7 @@ class SceneReader {
 
   PartCatalogue& parts_;
   TomlReader reader_;
+  bool lattice_seed_ = false;   ///< body.lattice has a seed of its own
   ResolvedWriter writer_;
   Scene scene_;
   std::vector<std::string> set_names_;

@@ -72,7 +72,7 @@ ParameterTable lattice_parameters() {
       .at_least(0)
       .at_most(0.5)
       .by_default("0.0");
-  table.integer("seed", "Seed of the random shift.").at_least(0).by_default("1");
+  table.integer("seed", "Seed of the random shift; default: run.seed.").at_least(0);
   return table;
 }
 
@@ -179,7 +179,7 @@ ParameterTable run_parameters() {
   ParameterTable table;
   table.boolean("skip", "Skip work that the scene does not need; false only to compare.").by_default("true");
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
-  table.integer("seed", "Seed of everything random in the run.").at_least(0).by_default("1");
+  table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;
 }
 
