@@ -32,9 +32,7 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
   Solution solution;
   Problem& problem = equilibrium.problem();
   const FieldView u = equilibrium.displacement();
-  if (extrapolated) {
-    equilibrium.impose(u);
-  } else if (!predict_by_tangent(equilibrium)) {
+  if (!predict_by_tangent(equilibrium, extrapolated)) {
     solution.failure = equilibrium.failure();
     return solution;
   }

@@ -162,9 +162,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   callback_failure_.clear();
   Problem& problem = equilibrium.problem();
   const FieldView u = equilibrium.displacement();
-  if (extrapolated) {
-    equilibrium.impose(u);
-  } else if (!predict_by_tangent(equilibrium)) {
+  if (!predict_by_tangent(equilibrium, extrapolated)) {
     solution.failure = equilibrium.failure();
     return solution;
   }

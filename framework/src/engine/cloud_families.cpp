@@ -16,9 +16,9 @@ namespace {
 
 constexpr double cut_bond = -1;  ///< in place of the influence, until the lists are compacted
 
-/// K += w xi (x) xi.
+/// K += w xi (x) xi. One piece of machine code for all who sum: mended families are bitwise what they were.
 template <int D>
-void add_shape(double w, const Row& xi, double* K) noexcept {
+[[gnu::noinline]] void add_shape(double w, const Row& xi, double* K) noexcept {
   for (int a = 0; a < D; ++a)
     for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
 }
@@ -83,9 +83,7 @@ void CloudFamilies::measure(const InfluenceFunction& influence, BondWeight kind)
           continue;
         }
         intact += w;
-        const Row xi = position[j] - position[p];
-        for (int a = 0; a < D; ++a)
-          for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+        add_shape<D>(w, position[j] - position[p], K);
       }
       if (any_cut) {
         const std::lock_guard lock(guard);
@@ -158,10 +156,7 @@ double CloudFamilies::changed_point(std::size_t p) {
     omega[k] = (*bonds_)[k] * whole_[k];
     const double w = omega[k] * position[j][3];
     intact += w;
-    // As in `measure`: mended families are bitwise what they were.
-    const Row xi = position[j] - position[p];
-    for (int a = 0; a < D; ++a)
-      for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+    add_shape<D>(w, position[j] - position[p], K);
   }
   invert_shape<D>(K, &inverse[6 * p], condition.data() + p);
   const double share = total_[p] > 0 ? intact / total_[p] : 0.0;

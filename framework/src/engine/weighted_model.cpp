@@ -216,6 +216,20 @@ void WeightedModel<D>::keep_owner_gradients(int points, Memory& m, BatchScratch&
 }
 
 template <int D>
+void WeightedModel<D>::add_pressures(int lanes, const BatchScratch& s, bool tangent, double (&pressure)[2][8]) {
+  for (int l = 0; l < lanes; ++l) {
+    pressure[0][l % 8] += s.pressure[l];
+    if (tangent) pressure[1][l % 8] += s.pressure_rate[l];
+  }
+}
+
+template <int D>
+void WeightedModel<D>::owner_stresses(const Memory& m, bool tangent, const double (&pressure)[2][8], BatchScratch& s) const noexcept {
+  for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
+  add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+}
+
+template <int D>
 std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
   const std::int32_t p = members_[g.first];
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
@@ -320,18 +334,14 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
     if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
-    for (int l = 0; l < slots * 8 && traits_.selective && !sample; ++l) {
-      pressure[0][l % 8] += s.pressure[l];
-      if (tangent) pressure[1][l % 8] += s.pressure_rate[l];
-    }
+    if (traits_.selective && !sample) add_pressures(slots * 8, s, tangent, pressure);
     slots = 0;
     for (; begin != end; slots += begin++->size)
       if (!sample) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
   }
   if (sample) return -1;
   if (traits_.selective) {
-    for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
-    add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+    owner_stresses(m, tangent, pressure, s);
     orbit_stresses<D>(orbits.front(), s.P, 0, m.m.data());
   }
   m.t.assign(bonds * D * 8, 0.0);
@@ -375,15 +385,11 @@ std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memor
       pass.work.add_samples(8 * n, s, *pass.sums);
       continue;
     }
-    for (int l = 0; l < 8 * n && traits_.selective; ++l) {
-      pressure[0][l % 8] += s.pressure[l];
-      if (tangent) pressure[1][l % 8] += s.pressure_rate[l];
-    }
+    if (traits_.selective) add_pressures(8 * n, s, tangent, pressure);
     scatter(first, n);
   }
   if (sample || !traits_.selective) return -1;
-  for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
-  add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], s.P, batch_points);
+  owner_stresses(m, tangent, pressure, s);
   scatter(0, 1);
   return -1;
 }

@@ -80,6 +80,12 @@ class WeightedModel final : public AssemblingModel {
   /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
   void keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
 
+  /// Of eight owners side by side (selective map): pressure on their gradients and its rate += those of the lanes, owner l at lanes
+  /// l, l + 8, ...
+  static void add_pressures(int lanes, const BatchScratch& s, bool tangent, double (&pressure)[2][8]);
+  /// s.P of lanes 0 ... 7 <- the stress that these pressures are on the kept gradients of the owners.
+  void owner_stresses(const Memory& m, bool tangent, const double (&pressure)[2][8], BatchScratch& s) const noexcept;
+
   const Body& body_;
   const Laws& laws_;
   std::shared_ptr<const Kinematics> kinematics_;

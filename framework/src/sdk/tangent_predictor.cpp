@@ -4,7 +4,11 @@
 
 namespace perikit {
 
-bool predict_by_tangent(Equilibrium& equilibrium) {
+bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated) {
+  if (extrapolated) {
+    equilibrium.impose(equilibrium.displacement());
+    return true;
+  }
   constexpr int most = 300;
   constexpr double accuracy = 1e-2;
   Problem& problem = equilibrium.problem();

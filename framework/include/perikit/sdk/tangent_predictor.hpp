@@ -5,9 +5,9 @@
 
 namespace perikit {
 
-/// Sets the prescribed components of equilibrium.displacement() and moves the free ones by about K(u)^-1 (r(u) - K(u) w), w the change of
+/// Sets the prescribed components of equilibrium.displacement(). Where its free ones are extrapolated already they stay; else they move by about K(u)^-1 (r(u) - K(u) w), w the change of
 /// the prescribed ones: conjugate gradients on tangent actions, to 1 % or 300 iterations, ended where the tangent is not positive.
 /// For solvers that would otherwise start from a torn rim. False where u or its tangent is inadmissible.
-bool predict_by_tangent(Equilibrium& equilibrium);
+bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated);
 
 }  // namespace perikit
