@@ -132,6 +132,9 @@ std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
 }  // namespace
 
 void bench(Registry& registry, const BenchOptions& options) {
+  std::ofstream file;
+  const auto refuse = [&] { throw RunError(fmt::format("{}: cannot be written", options.json)); };
+  if (!options.json.empty() && (file.open(options.json), !file)) refuse();   // before minutes of measuring, not after
   const MachineLimits limits = measure_machine_limits();
   fmt::print("machine: triad {:.1f} GB/s, multiply-add {:.1f} GFLOP/s, gather of 32-byte rows {:.1f} GB/s (one thread); {} threads: {:.1f}, {:.1f}, {:.1f}\n\n",
              limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
@@ -155,9 +158,8 @@ void bench(Registry& registry, const BenchOptions& options) {
           std::fflush(stdout);
         }
   if (options.json.empty()) return;
-  std::ofstream file(options.json);
   file << json_of(limits, rows);
-  if (!file.flush()) throw RunError(fmt::format("{}: cannot be written", options.json));
+  if (!file.flush()) refuse();
 }
 
 }  // namespace perikit::app
