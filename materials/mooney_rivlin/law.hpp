@@ -50,14 +50,13 @@ struct MooneyRivlin {
   template <class T, class S, class K>
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), G = cofactor_minus_identity(H);
+    const Tensor<T, S> e = left_cauchy_green_minus_identity(H);
     const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j));
     const T scale = root * root, inverse_J = scale * root;  // J^(-2/3), 1/J
-    const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale);
-    const Tensor<T, S> shear = subtract_cofactor((first + second) * e, second, e);
-    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - trace(shear) * (1.0 / 3.0);
-    const Tensor<T, S> tau = inverse_J * add_diagonal(shear, pressure);
-    return tau + tau * G;
+    const T second = 2.0 * C2 * (scale * scale), both = 2.0 * C1 * scale + second;
+    const T I2 = second_invariant_of_strain(e, j);
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - (both * trace(e) - second * I2) * (1.0 / 3.0);
+    return three_term_stress(both, second, pressure, e, I2, H, j, inverse_J);
   }
 
   /// dP = (dtau - P dF^T) F^-T, dtau from db = 2 sym(dF F^T) and dJ/J = F^-T : dF.

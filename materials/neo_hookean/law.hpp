@@ -9,8 +9,7 @@ namespace perikit {
 /// Compressible neo-Hookean rubber [Scabbia et al. 2025, eq. 5].
 ///   psi = mu/2 (J^(-2/3) tr C - 3) + psi_vol(kappa, J)
 ///   P = mu J^(-2/3) (F - tr(C)/3 F^-T) + J psi_vol'(J) F^-T
-/// Written in H = F - I: with m = tr(C - I)/3, j = J - 1, G = cof F - I,
-///   J (F - tr(C)/3 F^-T) = J H + (j - m) I - (1 + m) G,  every term of the order of H.
+/// Written in H = F - I with m = tr(C - I)/3: F - tr(C)/3 F^-T = (F - F^-T) - m F^-T, every term of the order of H.
 struct NeoHookean {
   static constexpr MaterialTraits traits{.constants = 2};
   Volumetric volumetric = Volumetric::quadratic;
@@ -43,17 +42,9 @@ struct NeoHookean {
   template <class T, class S, class K>
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [mu, kappa] = k;
-    const T m = mean_strain(H), j = jacobian_minus_one(H), J = 1.0 + j;
-    const Tensor<T, S> G = cofactor_minus_identity(H);
-    const T root = reciprocal_cbrt(J), inverse_J = root * (root * root);
-    const T shear = mu * (root * root);                                              // mu J^(-2/3)
-    const T cofactor_part = volumetric_kirchhoff(volumetric, kappa, j) * inverse_J;  // factor of cof F from psi_vol
-    const T on_cofactor = cofactor_part - shear * (inverse_J * (1.0 + m));
-    const T on_identity = shear * (inverse_J * (j - m)) + cofactor_part;
-    return Tensor<T, S>::build([&](int i, int l) {
-      const T off = shear * H(i, l) + on_cofactor * G(i, l);
-      return i == l ? T(off + on_identity) : off;
-    });
+    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), shear = mu * (root * root);
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - shear * mean_strain(H);
+    return two_term_stress(shear, pressure, H, cofactor_minus_identity(H), j, T(root * (root * root)));
   }
 
   /// With P = a F + c F^-T, a = mu J^(-2/3), c = J psi_vol' - a (1 + m):

@@ -241,18 +241,6 @@ T jacobian_minus_one(const Tensor<T, S>& H) noexcept {
     return trace(H) + (second_invariant(H) + determinant(H));
 }
 
-/// a - s cof(e) of a symmetric strain e.
-template <class T, class S>
-Tensor<T, S> subtract_cofactor(Tensor<T, S> a, const T& s, const Tensor<T, S>& e) noexcept {
-  if constexpr (S::confined) {
-    if constexpr (S::dimension == 2) a(2, 2) = a(2, 2) - s * (e(0, 0) * e(1, 1) - e(0, 1) * e(1, 0));
-    return a;
-  } else {
-    const Tensor<T, S> c = cofactor(e);
-    return Tensor<T, S>::build_symmetric([&](int i, int j) { return a(i, j) - s * c(i, j); });
-  }
-}
-
 /// cof(I + H) - I = tr(H) I - H^T + cof(H).
 template <class T, class S>
 Tensor<T, S> cofactor_minus_identity(const Tensor<T, S>& H) noexcept {
@@ -265,6 +253,46 @@ Tensor<T, S> cofactor_minus_identity(const Tensor<T, S>& H) noexcept {
     if (i != j) return quadratic(i, j) - H(j, i);
     return quadratic(i, i) + (H((i + 1) % 3, (i + 1) % 3) + H((i + 2) % 3, (i + 2) % 3));
   });
+}
+
+/// Second invariant of e = F F^T - I, with j = det F - 1. In plane strain it is the determinant of the block in the plane, and
+/// det(I + e) = (1 + j)^2 = 1 + tr(e) + I2(e).
+template <class T, class S>
+T second_invariant_of_strain(const Tensor<T, S>& e, const T& j) noexcept {
+  if constexpr (S::confined)
+    return S::dimension == 2 ? T(j * (2.0 + j) - trace(e)) : T(0.0);
+  else
+    return second_invariant(e);
+}
+
+/// a (F - F^-T) + p F^-T of F = I + H, from G = cof F - I and j = det F - 1: every term of the order of H, a and p.
+template <class T, class S>
+Tensor<T, S> two_term_stress(const T& a, const T& p, const Tensor<T, S>& H, const Tensor<T, S>& G, const T& j, const T& inverse_J) noexcept {
+  const T on_cofactor = (p - a) * inverse_J, on_identity = (a * j + p) * inverse_J;
+  return Tensor<T, S>::build([&](int i, int k) {
+    const T off = a * H(i, k) + on_cofactor * G(i, k);
+    return i == k ? T(off + on_identity) : off;
+  });
+}
+
+/// (a e - s cof(e) + p I) F^-T of F = I + H, e = F F^T - I, with second = I2(e). In plane strain cof(e) = I2(e) in the direction
+/// across and zero in the plane, and e F^-T = F - F^-T saves the product.
+template <class T, class S>
+Tensor<T, S> three_term_stress(const T& a, const T& s, const T& p, const Tensor<T, S>& e, const T& second, const Tensor<T, S>& H, const T& j,
+                               const T& inverse_J) noexcept {
+  const Tensor<T, S> G = cofactor_minus_identity(H);
+  if constexpr (S::confined) {
+    Tensor<T, S> P = two_term_stress(a, p, H, G, j, inverse_J);
+    if constexpr (S::dimension == 2) P(2, 2) = p - s * second;
+    return P;
+  } else {
+    const Tensor<T, S> c = cofactor(e);
+    const Tensor<T, S> tau = Tensor<T, S>::build_symmetric([&](int i, int k) {
+      const T off = a * e(i, k) - s * c(i, k);
+      return (i == k ? T(off + p) : off) * inverse_J;
+    });
+    return tau + tau * G;
+  }
 }
 
 }  // namespace perikit
