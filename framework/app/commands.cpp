@@ -70,7 +70,7 @@ void run(const Options& options) {
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
-  const std::string closing = simulation.problem().fracture_summary() + recorder.closing(set_up);
+  const std::string closing = simulation.problem().fracture_summary() + simulation.problem().quiet_summary() + recorder.closing(set_up);
   log_end(recorder, closing);
   if (!options.quiet) fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {

@@ -70,7 +70,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
     const double z = 0.5013 * o.scale * cells[2], x = 0.45 * o.scale * cells[0], y = o.scale * (cells[1] + 1);
     text += fmt::format("[[crack]]\npolygon = [[-1.0, -1.0, {0:.17g}], [{1:.17g}, -1.0, {0:.17g}], [{1:.17g}, {2:.17g}, {0:.17g}], [-1.0, {2:.17g}, {0:.17g}]]\n", z, x, y);
   }
-  text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\n", o.skip) + o.conditions;
+  text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\nshare = {}\n", o.skip, o.share) + o.conditions;
   return text;
 }
 

@@ -43,7 +43,7 @@ struct BodyOptions {
   double scale = 1.0;         ///< of all lengths
   double modulus = 1.0;       ///< of all moduli
   int cells = 0;              ///< along the longest axis; 0: small
-  bool skip = true;
+  bool skip = true, share = true;   ///< [run]
   double horizon_ratio = 2.515;
   std::string plane = "strain";
   std::string integrator = "type = \"evaluate\"";

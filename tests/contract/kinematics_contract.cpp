@@ -311,7 +311,7 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
       CHECK_MESSAGE(same, "the result is another one with ", count, " threads");
     }
     set_thread_count(threads);
-    body.skip = false;
+    body.skip = body.share = false;
     const auto plain = build(scene_text(body, kinematics_table(c.example)));
     std::copy_n(problem.displacement().data, problem.displacement().size(), plain->problem().displacement().data);
     const Field full = force_of(plain->problem(), plain->problem().displacement());

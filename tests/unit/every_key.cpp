@@ -79,6 +79,7 @@ component = "x"
 reduce = "mean"
 [run]
 skip = true
+share = true
 threads = 1
 seed = 1
 )";

@@ -16,17 +16,19 @@ namespace perikit {
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.skip && !laws_.history()),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.share && !laws_.history()),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
   if (parts.damage) fracture_.emplace(body_, *parts.damage, families_.bond_state(), parts.skip);
+  const BlockReach reach = cloud_reach(families_.lists, n);
+  if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(reach);
   u_.resize(n);
   flux_.resize(D * n);
   if (traits_.at == EvaluationPoints::bonds) {
     gradient_.resize(D * n);
     force_.resize(n);
-    colouring_ = colour_cloud(families_.lists, n);
+    colouring_ = Colouring(reach);
     upper_.resize(n);
     scale_.resize(n);
     for (std::size_t p = 0; p < n; ++p) {
@@ -343,36 +345,52 @@ template <int D>
 EvaluationStatus CloudModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   mirror_rows(pass.u, body_.points(), u_);
-  const bool alone = pass.alone();
-  if (pass.work.tangent()) mirror_rows(pass.w, body_.points(), w_);
-  const auto over_points = [&](auto&& body) {
-    parallel_for(blocks(), [&](std::size_t b) {
-      for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) body(p);
-    });
+  const bool alone = pass.alone(), tangent = pass.work.tangent(), points = traits_.at == EvaluationPoints::points;
+  const int last = points ? 2 : 3;
+  if (tangent) mirror_rows(pass.w, body_.points(), w_);
+  if (alone || tangent) quiet_.wake();
+  else quiet_.look(last, [&](std::size_t b) { return QuietBlocks::moves(pass.u, b * block_points, std::min(body_.points(), (b + 1) * block_points)); });
+  const auto over_points = [&](std::size_t b, auto&& body) {
+    for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) body(p);
   };
-  if (traits_.at == EvaluationPoints::points) {
-    parallel_for(blocks(), [&](std::size_t b) { points_block(b, pass); });
+  const auto awake = [&](int number, auto&& block) { return [&, number](std::size_t b) { if (quiet_.awake(b, number)) block(b); }; };
+  const auto first_pass = [&](auto&& block) {
+    parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) block(b); });
+  };
+  if (points) {
+    first_pass([&](std::size_t b) { points_block(b, pass); });
   } else {
-    if (pass.work.tangent()) direction_.resize(D * body_.points());
-    over_points([&](std::size_t p) {
-      if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
-      gradient_rows(p, u_, gradient_);
-      if (pass.work.tangent()) gradient_rows(p, w_, direction_);
-      force_[p] = Row{};
-      for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
-      if (traits_.selective) pressure_[p] = Row{};
+    if (tangent) direction_.resize(D * body_.points());
+    first_pass([&](std::size_t b) {
+      over_points(b, [&](std::size_t p) {
+        if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
+        gradient_rows(p, u_, gradient_);
+        if (tangent) gradient_rows(p, w_, direction_);
+        force_[p] = Row{};
+        for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
+        if (traits_.selective) pressure_[p] = Row{};
+      });
+      if (traits_.selective) volumes_block(b, tangent);
     });
-    if (traits_.selective) parallel_for(blocks(), [&](std::size_t b) { volumes_block(b, pass.work.tangent()); });
-    if (alone) parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
-    else colouring_.for_each([&](std::size_t b) { bonds_block(b, pass); });
-    if (traits_.selective && !alone) parallel_for(blocks(), [&](std::size_t b) { pressures_block(b, pass.work.tangent()); });
-    if (stencil_.empty() && !alone) over_points([&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); });
-    else if (!alone) colouring_.for_each([&](std::size_t b) { scatter_block(b); });
+    if (alone) {
+      parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
+    } else {
+      colouring_.for_each(awake(2, [&](std::size_t b) { bonds_block(b, pass); }));
+      if (traits_.selective) parallel_for(blocks(), awake(2, [&](std::size_t b) { pressures_block(b, tangent); }));
+      if (stencil_.empty()) {
+        parallel_for(blocks(), awake(2, [&](std::size_t b) { over_points(b, [&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); }); }));
+      } else {
+        colouring_.for_each(awake(2, [&](std::size_t b) { scatter_block(b); }));
+      }
+    }
   }
   if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
-  over_points([&](std::size_t p) {
-    if (stencil_.empty()) return divergence(p, pass.out);
-    for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
+  parallel_for(blocks(), [&](std::size_t b) {
+    const bool gather = stencil_.empty() && quiet_.awake(b, last);
+    over_points(b, [&](std::size_t p) {
+      if (gather) return divergence(p, pass.out);
+      for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_.empty() ? 0.0 : force_[p][c];
+    });
   });
   return {};
 }

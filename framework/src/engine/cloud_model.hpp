@@ -7,6 +7,7 @@
 #include "bond_kernel.hpp"
 #include "cloud_families.hpp"
 #include "cloud_rows.hpp"
+#include "quiet_blocks.hpp"
 #include "engine/assembly/assembly.hpp"
 
 namespace perikit {
@@ -24,6 +25,7 @@ class CloudModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return families_.condition; }
   Field damage() override { return families_.damage; }
   ModelReport report() const override;
+  QuietCounts quiet_counts() const override { return quiet_.counts(); }
   BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
   std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) override;
@@ -67,6 +69,7 @@ class CloudModel final : public AssemblingModel {
   AlignedVector<double> stencil_;              ///< g[D * bond + e] of point gradients of order 2 and more
   std::size_t fallbacks_ = 0;                  ///< points of a lower order than asked for
   Colouring colouring_;
+  QuietBlocks quiet_;
   AlignedVector<Row> u_, w_;                   ///< mirrors
   AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point
   AlignedVector<Row> flux_;                    ///< S, then Q; likewise

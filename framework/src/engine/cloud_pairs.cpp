@@ -121,7 +121,9 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
   lists_.first = std::move(first);
   lists_.neighbour.resize(static_cast<std::size_t>(kept));
   if (keep_omega) omega_.resize(static_cast<std::size_t>(kept));
-  colouring_ = colour_cloud(lists_, n);
+  const BlockReach reach = cloud_reach(lists_, n);
+  colouring_ = Colouring(reach);
+  if (parts.quiet) watch(reach);
 }
 
 template <int D>
@@ -304,6 +306,7 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
 template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
+  look(pass, [&](std::size_t b) { return QuietBlocks::moves(pass.u, b * cloud_block_points, std::min(body_.points(), (b + 1) * cloud_block_points)); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
   mirror_rows(pass.u, body_.points(), u_);
   if (pass.w.data) mirror_rows(pass.w, body_.points(), w_);
@@ -326,6 +329,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
     else pass.out.data[p] = 0;
   });
   auto block = [&](std::size_t b) {
+    if (!awake(b)) return;
     switch (pass.work) {
       case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
       case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);

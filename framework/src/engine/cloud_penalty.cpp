@@ -5,6 +5,7 @@
 #include "cloud_model.hpp"
 #include "family_point.hpp"
 #include "penalty_matrix.hpp"
+#include "quiet_blocks.hpp"
 #include "zero_energy_penalty.hpp"
 
 namespace perikit {
@@ -22,18 +23,20 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
       : model_(model), families_(model.families()), position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
         points_(parts.body->points()), M_(columns * points_, Column{}), flux_(D * points_) {
-    over_points([&](std::size_t p) { set_matrix(parts, p); });
+    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists, points_));
+    over_points(everywhere, [&](std::size_t p) { set_matrix(parts, p); });
   }
 
   void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
     mirror_rows(u, points_, u_);
     std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
-    over_points([&](std::size_t p) {
+    quiet_.look(2, [&](std::size_t b) { return QuietBlocks::moves(u, b * cloud_block_points, std::min(points_, (b + 1) * cloud_block_points)); });
+    over_points([&](std::size_t b) { return quiet_.begins(b); }, [&](std::size_t p) {
       model_.gradient_rows(p, u_, flux_);
       if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
       for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
     });
-    over_points([&](std::size_t p) {
+    over_points([&](std::size_t b) { return quiet_.awake(b, 2); }, [&](std::size_t p) {
       const Row f = factor * position_[p][3] * force_of_point(p);
       for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
     });
@@ -42,7 +45,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 
   void add_density(ConstFieldView u, double* density) override {
     mirror_rows(u, points_, u_);
-    over_points([&](std::size_t p) {
+    quiet_.wake();
+    over_points(everywhere, [&](std::size_t p) {
       model_.gradient_rows(p, u_, flux_);
       density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
     });
@@ -51,9 +55,13 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   std::size_t bytes() const noexcept override { return M_.size() * sizeof(Column) + (flux_.size() + u_.size()) * sizeof(Row); }
 
  private:
-  template <class Body>
-  void over_points(Body&& body) const {
+  static constexpr auto everywhere = [](std::size_t) { return true; };
+
+  /// body(p) for the points of the blocks with wanted(b).
+  template <class Wanted, class Body>
+  void over_points(Wanted&& wanted, Body&& body) const {
     parallel_for(cloud_blocks(points_), [&](std::size_t b) {
+      if (!wanted(b)) return;
       for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) body(p);
     });
   }
@@ -129,6 +137,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   std::size_t points_;
   AlignedVector<Column> M_;
   AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns
+  QuietBlocks quiet_;
 };
 
 }  // namespace

@@ -15,21 +15,24 @@ void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows)
   });
 }
 
-Colouring colour_cloud(const FamilyLists& families, std::size_t points) {
-  std::vector<std::vector<std::int32_t>> touches(cloud_blocks(points));
-  for (std::size_t b = 0; b < touches.size(); ++b) {
-    std::vector<std::int32_t>& units = touches[b];
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points) {
+  BlockReach reach;
+  reach.units = (points + block_points - 1) / block_points;
+  reach.touches.resize(reach.units);
+  for (std::size_t b = 0; b < reach.units; ++b) {
+    reach.own.push_back(static_cast<std::int32_t>(b));
+    std::vector<std::int32_t>& units = reach.touches[b];
     units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / cloud_block_points);
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
         if (unit != units.back()) units.push_back(unit);
       }
     }
     std::sort(units.begin(), units.end());
     units.erase(std::unique(units.begin(), units.end()), units.end());
   }
-  return Colouring(touches, touches.size());
+  return reach;
 }
 
 }  // namespace perikit

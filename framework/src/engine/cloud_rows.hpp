@@ -17,7 +17,7 @@ constexpr std::size_t cloud_blocks(std::size_t points) noexcept { return (points
 /// rows[p] <- components of u at p, zero in the rest.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows);
 
-/// Blocks that scatter to all neighbours of their points.
-Colouring colour_cloud(const FamilyLists& families, std::size_t points);
+/// Blocks of so many points, and those that hold neighbours of them.
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points = cloud_block_points);
 
 }  // namespace perikit

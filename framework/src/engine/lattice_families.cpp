@@ -1,5 +1,7 @@
 #include "lattice_families.hpp"
 
+#include "quiet_blocks.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -89,25 +91,36 @@ void LatticeFamilies::make_blocks() {
         blocks.push_back(block);
         boxes.push_back(box);
       }
-  // Units for colouring: tiles themselves. A block touches every tile that its box, grown by the reach, meets.
-  std::array<std::int64_t, 3> reach{};
+  // Units are tiles. A block touches every tile that its box, grown by the reach of a family, meets.
+  std::array<std::int64_t, 3> grow{};
   for (const auto& d : offsets)
-    for (std::size_t a = 0; a < 3; ++a) reach[a] = std::max<std::int64_t>(reach[a], std::abs(d[a]));
-  reach[0] = (reach[0] + chunk_points - 1) / chunk_points;
+    for (std::size_t a = 0; a < 3; ++a) grow[a] = std::max<std::int64_t>(grow[a], std::abs(d[a]));
+  grow[0] = (grow[0] + chunk_points - 1) / chunk_points;
   const std::int64_t size[3] = {length, tile1, tile2};
   const std::int64_t count[3] = {(row_chunks + length - 1) / length, (n[1] + tile1 - 1) / tile1, (n[2] + tile2 - 1) / tile2};
-  std::vector<std::vector<std::int32_t>> touches(boxes.size());
+  const auto tile = [&](std::int64_t e, std::int64_t d, std::int64_t c) { return static_cast<std::int32_t>(e + count[0] * (d + count[1] * c)); };
+  reach.units = static_cast<std::size_t>(count[0] * count[1] * count[2]);
+  reach.touches.resize(boxes.size());
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     std::int64_t low[3], high[3];
     for (int a = 0; a < 3; ++a) {
-      low[a] = std::max<std::int64_t>(0, boxes[b].low[a] - reach[a]) / size[a];
-      high[a] = std::min(count[a] - 1, (boxes[b].high[a] + reach[a]) / size[a]);
+      low[a] = std::max<std::int64_t>(0, boxes[b].low[a] - grow[a]) / size[a];
+      high[a] = std::min(count[a] - 1, (boxes[b].high[a] + grow[a]) / size[a]);
     }
     for (std::int64_t c = low[2]; c <= high[2]; ++c)
       for (std::int64_t d = low[1]; d <= high[1]; ++d)
-        for (std::int64_t e = low[0]; e <= high[0]; ++e) touches[b].push_back(static_cast<std::int32_t>(e + count[0] * (d + count[1] * c)));
+        for (std::int64_t e = low[0]; e <= high[0]; ++e) reach.touches[b].push_back(tile(e, d, c));
+    reach.own.push_back(tile(boxes[b].low[0] / size[0], boxes[b].low[1] / size[1], boxes[b].low[2] / size[2]));
   }
-  colouring = Colouring(touches, static_cast<std::size_t>(count[0] * count[1] * count[2]));
+  colouring = Colouring(reach);
+}
+
+bool LatticeFamilies::moves(std::size_t b, ConstFieldView u) const noexcept {
+  return std::any_of(rows.begin() + static_cast<std::ptrdiff_t>(blocks[b].row_begin), rows.begin() + static_cast<std::ptrdiff_t>(blocks[b].row_end),
+                     [&](const LatticeRow& row) {
+                       const auto first = static_cast<std::size_t>(row.first);
+                       return QuietBlocks::moves(u, first, first + static_cast<std::size_t>(row.chunks) * chunk_points);
+                     });
 }
 
 void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, unsigned lanes) const {

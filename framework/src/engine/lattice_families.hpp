@@ -83,6 +83,7 @@ class LatticeFamilies {
   std::vector<LatticeChunk> chunks;            ///< live ones, block by block, along rows
   std::vector<LatticeRow> rows;
   std::vector<LatticeBlock> blocks;
+  BlockReach reach;
   Colouring colouring;
   std::size_t bonds = 0, broken = 0, singular = 0;   ///< directed intact bonds; broken ones; points
   std::size_t failed = 0;                      ///< of the broken ones those of `break_bonds`
@@ -111,6 +112,8 @@ class LatticeFamilies {
   std::vector<BondChange> fragment_bonds(std::span<const std::int32_t> points) const;
   /// The patterns of the set-up. Returns the points whose bonds had been broken.
   std::vector<std::int32_t> mend();
+  /// Whether a point of block b moves.
+  bool moves(std::size_t b, ConstFieldView u) const noexcept;
   /// Live cells among index ... index + 7.
   std::uint8_t live_bits(std::int64_t index) const noexcept;
   /// K^-1 of a lane with the components of the input axes and the volumes in K [1/m^2 per volume]: what a FamilyView holds.

@@ -34,11 +34,12 @@ const LaneFactors& lane_factors() {
 
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()), skip_(parts.skip && !laws_.history()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && skip_),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
+      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.share && !laws_.history()),
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)),
       slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
-  if (parts.damage) fracture_.emplace(body_, *parts.damage, bonds_.emplace(families_), skip_);
+  if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(families_.reach);
+  if (parts.damage) fracture_.emplace(body_, *parts.damage, bonds_.emplace(families_), parts.skip);
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
     for (int c = 0; c < row.chunks; ++c) {
@@ -386,10 +387,11 @@ void LatticeModel<D>::finish_stress(std::size_t b, Pass& pass) {
   }
 }
 
-/// Adds the adjoint of the point gradient: of Q, or of the stress on Hbar for stored stencils.
+/// Adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
 template <int D>
-void LatticeModel<D>::divergence(Pass& pass) const {
+void LatticeModel<D>::divergence(Pass& pass, int number) const {
   const auto chunks_of = [&](std::size_t b, auto&& each) {
+    if (!quiet_.awake(b, number)) return;
     for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) each(families_.chunks[c]);
   };
   if (stencils_) {
@@ -397,6 +399,7 @@ void LatticeModel<D>::divergence(Pass& pass) const {
     return;
   }
   families_.colouring.for_each([&](std::size_t b) {
+    if (!quiet_.awake(b, number)) return;
     for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
   });
   if (families_.broken == 0) return;
@@ -419,20 +422,27 @@ template <int D>
 EvaluationStatus LatticeModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   const std::size_t blocks = families_.blocks.size();
-  const bool alone = pass.alone();
-  if (traits_.at == EvaluationPoints::points) {
-    parallel_for(blocks, [&](std::size_t b) { points_block(b, pass); });
+  const bool alone = pass.alone(), points = traits_.at == EvaluationPoints::points;
+  const int last = points ? 2 : 3;
+  if (alone || pass.work.tangent()) quiet_.wake();
+  else quiet_.look(last, [&](std::size_t b) { return families_.moves(b, pass.u); });
+  const auto first_pass = [&](auto&& block) {
+    parallel_for(blocks, [&](std::size_t b) { quiet_.begins(b) ? block(b) : zero_rows(families_.blocks[b], pass.out); });
+  };
+  if (points) {
+    first_pass([&](std::size_t b) { points_block(b, pass); });
   } else {
-    parallel_for(blocks, [&](std::size_t b) { gradient_block(b, pass); });
+    first_pass([&](std::size_t b) { gradient_block(b, pass); });
     if (alone) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
-      families_.colouring.for_each([&](std::size_t b) { bonds_block(b, pass); });
-      parallel_for(blocks, [&](std::size_t b) { finish_stress(b, pass); });
+      const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
+      families_.colouring.for_each(awake([&](std::size_t b) { bonds_block(b, pass); }));
+      parallel_for(blocks, awake([&](std::size_t b) { finish_stress(b, pass); }));
     }
   }
   if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
-  divergence(pass);
+  divergence(pass, last);
   clean(pass.out);
   return {};
 }

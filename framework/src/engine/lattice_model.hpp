@@ -8,6 +8,7 @@
 #include "lattice_bonds.hpp"
 #include "lattice_kernels.hpp"
 #include "lattice_stencils.hpp"
+#include "quiet_blocks.hpp"
 #include "engine/assembly/assembly.hpp"
 
 namespace perikit {
@@ -27,6 +28,7 @@ class LatticeModel final : public AssemblingModel {
   Field shape_tensor_condition() override;
   Field damage() override;
   ModelReport report() const override;
+  QuietCounts quiet_counts() const override { return quiet_.counts(); }
   BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
   std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) override;
@@ -49,13 +51,12 @@ class LatticeModel final : public AssemblingModel {
   void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   OwnerGradients owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept;
   void finish_stress(std::size_t b, Pass& pass);
-  void divergence(Pass& pass) const;
+  void divergence(Pass& pass, int number) const;
 
   const Body& body_;
   const Laws& laws_;
   std::shared_ptr<const Kinematics> kinematics_;
   KinematicsTraits traits_;
-  bool skip_;
   bool pairs_;                       ///< each bond evaluated once for both ends
   LatticeFamilies families_;
   LatticeOperator<D> operator_;      ///< order 1
@@ -69,6 +70,7 @@ class LatticeModel final : public AssemblingModel {
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
+  QuietBlocks quiet_;
   std::optional<LatticeBonds> bonds_;              ///< only with damage
   std::optional<Fracture> fracture_;
   ScratchPool scratch_;

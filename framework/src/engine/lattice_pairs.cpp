@@ -21,6 +21,7 @@ class LatticePairs final : public PairLoop {
   explicit LatticePairs(const PairLoopParts& parts)
       : law_(parts.law), fields_(parts.fields), dilatation_(parts.law.traits().dilatation), half_(parts.half),
         families_(parts.body, parts.influence, BondWeight::volume), squared_volume_(families_.volume * families_.volume) {
+    if (parts.quiet) watch(families_.reach);
     for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
       const auto xi = families_.bond(s);
       const double length = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
@@ -44,6 +45,7 @@ class LatticePairs final : public PairLoop {
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
+    look(pass, [&](std::size_t b) { return families_.moves(b, pass.u); });
     if (!pass.only) parallel_for(blocks(), [&](std::size_t b) {
       for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) {
         const LatticeRow& row = families_.rows[r];
@@ -53,6 +55,7 @@ class LatticePairs final : public PairLoop {
       }
     });
     auto block = [&](std::size_t b) {
+      if (!awake(b)) return;
       switch (pass.work) {
         case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
         case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);

@@ -23,6 +23,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
       : model_(model), families_(model.families()), operator_(families_), M_(parts.body->make_field(Matrix::components)),
         B_(parts.body->make_field(Matrix::components)), flux_(parts.body->make_field(D * D)), source_(parts.body->make_field(D)) {
+    if (parts.skip) quiet_ = QuietBlocks(families_.reach);
     const std::size_t blocks = families_.blocks.size();
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(parts, chunk); }); });
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
@@ -30,7 +31,9 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 
   void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
     std::vector<double> energies(energy ? families_.blocks.size() : 0, 0.0);
+    quiet_.look(2, [&](std::size_t b) { return families_.moves(b, u); });
     parallel_for(families_.blocks.size(), [&](std::size_t b) {
+      if (!quiet_.begins(b)) return;
       for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
         own_forces(chunk, u, factor, H, sums, force);
         if (!energy) return;
@@ -40,11 +43,13 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       });
     });
     families_.colouring.for_each([&](std::size_t b) {
+      if (!quiet_.awake(b, 2)) return;
       for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
         operator_.divergence(families_.rows[r], flux_, source_, force);
     });
     if (families_.broken > 0) {
       parallel_for(families_.blocks.size(), [&](std::size_t b) {
+        if (!quiet_.awake(b, 2)) return;
         for_chunks(b, [&](const LatticeChunk& chunk) {
           if (families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, force, source_);
         });
@@ -183,6 +188,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   LatticeOperator<D> operator_;
   Field M_, B_;
   Field flux_, source_;   ///< Q, v
+  QuietBlocks quiet_;
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ template <int D>
 LocalForceModel<D>::LocalForceModel(const ModelParts& parts, std::unique_ptr<Model> variational)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
       variational_(std::move(variational)), families_(body_, *parts.influence, traits_.weight),
-      family_volume_(family_volumes(body_, *parts.influence)), colouring_(colour_cloud(families_.lists(), families_.rows())) {}
+      family_volume_(family_volumes(body_, *parts.influence)), colouring_(cloud_reach(families_.lists(), families_.rows())) {}
 
 /// H[(c * D + e) * stride] of a stencil.
 template <int D>

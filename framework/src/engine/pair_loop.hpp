@@ -14,6 +14,7 @@
 #include "perikit/core/simd.hpp"
 #include "perikit/engine/laws.hpp"
 #include "perikit/model/kinematics.hpp"
+#include "quiet_blocks.hpp"
 
 namespace perikit {
 
@@ -62,8 +63,19 @@ class PairLoop {
   /// `out` is fully overwritten. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;
   virtual PairCounts counts() const noexcept = 0;
+  QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
 
  protected:
+  /// Skips what no wave has reached from now on.
+  void watch(const BlockReach& reach) { quiet_ = QuietBlocks(reach); }
+  /// At the beginning of `run`. Dilatations, and forces without them, reach one family; forces from dilatations two.
+  template <class Moves>
+  void look(const PairPass& pass, const Moves& moves) {
+    reach_ = pass.q.data ? 2 : 1;
+    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation)) quiet_.look(reach_, moves);
+    else quiet_.wake();
+  }
+  bool awake(std::size_t b) const noexcept { return quiet_.awake(b, reach_); }
   void reset_bad() noexcept { bad_ = -1; }
   std::int64_t bad() const noexcept { return bad_; }
   /// Keeps the smallest index; from any thread.
@@ -74,6 +86,8 @@ class PairLoop {
 
  private:
   std::atomic<std::int64_t> bad_{-1};
+  QuietBlocks quiet_;
+  int reach_ = 1;
 };
 
 struct PairLoopParts {
@@ -82,6 +96,7 @@ struct PairLoopParts {
   const Kinematics& law;
   const PairFields& fields;
   bool half;                      ///< each bond once, for both ends
+  bool quiet;                     ///< without the parts that no wave has reached
 };
 
 template <int D>

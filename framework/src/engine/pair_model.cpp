@@ -71,15 +71,15 @@ std::vector<FamilyBond> regular_family(const Body& body, const InfluenceFunction
 
 template <int D>
 PairModel<D>::PairModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), law_(parts.kinematics), traits_(law_->traits()), skip_(parts.skip), damage_(body_.make_field(1)) {
-  const PairLoopParts loop{body_, *parts.influence, *law_, fields_, skip_};
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), law_(parts.kinematics), traits_(law_->traits()), share_(parts.share), damage_(body_.make_field(1)) {
+  const PairLoopParts loop{body_, *parts.influence, *law_, fields_, share_, parts.skip};
   loop_ = body_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (traits_.dilatation) {
     for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
   }
   set_moduli();
   if (traits_.surface_correction) set_correction(*parts.influence);
-  if (parts.damage) fracture_.emplace(body_, *parts.damage, loop_->bond_state(), skip_);
+  if (parts.damage) fracture_.emplace(body_, *parts.damage, loop_->bond_state(), parts.skip);
 }
 
 template <int D>
@@ -129,7 +129,7 @@ void PairModel<D>::set_moduli() {
   loop_->families([&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points) {
     if (!set_moduli_of(bonds, points, modulus)) lone_ += points.size();
   });
-  if (skip_ && laws_.single() && traits_.constant_moduli && !traits_.surface_correction) {
+  if (share_ && laws_.single() && traits_.constant_moduli && !traits_.surface_correction) {
     fields_.uniform = law_->pair_moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
   } else {
     fields_.modulus = std::move(modulus);
@@ -274,7 +274,7 @@ ModelReport PairModel<D>::report() const {
   report.bonds = counts.bonds;
   report.broken_bonds = counts.broken;
   report.singular_families = lone_;
-  report.evaluation_points = skip_ ? counts.bonds / 2 : counts.bonds;
+  report.evaluation_points = share_ ? counts.bonds / 2 : counts.bonds;
   report.bytes = counts.bytes;
   for (const Field* field : {&damage_, &scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
   if (fracture_) report.bytes += fracture_->bytes();
@@ -282,8 +282,8 @@ ModelReport PairModel<D>::report() const {
   report.skips.push_back({"bond vectors and lengths", body_.lattice() ? "lattice: neighbours lie at fixed shifts" : "recomputed from positions",
                           fmt::format("{:.3g} MB", static_cast<double>(counts.recomputed) / 1e6)});
   report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
-  if (skip_) report.skips.push_back({"second evaluation of each bond", "both ends feel opposite forces", fmt::format("{} of {} evaluations", counts.bonds / 2, counts.bonds)});
-  if (skip_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", fmt::format("{:.3g} MB", static_cast<double>(body_.stride()) * 8e-6)});
+  if (share_) report.skips.push_back({"second evaluation of each bond", "both ends feel opposite forces", fmt::format("{} of {} evaluations", counts.bonds / 2, counts.bonds)});
+  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", fmt::format("{:.3g} MB", static_cast<double>(body_.stride()) * 8e-6)});
   return report;
 }
 

@@ -20,6 +20,7 @@ class PairModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return body_.make_field(1); }
   Field damage() override { return damage_; }
   ModelReport report() const override;
+  QuietCounts quiet_counts() const override { return loop_->quiet_counts(); }
   BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
   std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) override;
@@ -43,7 +44,7 @@ class PairModel final : public AssemblingModel {
   const Laws& laws_;
   std::shared_ptr<const Kinematics> law_;
   KinematicsTraits traits_;
-  bool skip_;
+  bool share_;
   PairFields fields_;
   std::unique_ptr<PairLoop> loop_;
   Field damage_;

@@ -19,6 +19,7 @@ class StabilizedModel final : public Model {
   Field shape_tensor_condition() override { return base_->shape_tensor_condition(); }
   Field damage() override { return base_->damage(); }
   ModelReport report() const override;
+  QuietCounts quiet_counts() const override { return base_->quiet_counts(); }
 
  private:
   std::unique_ptr<Model> base_;

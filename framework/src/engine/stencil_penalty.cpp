@@ -2,6 +2,7 @@
 
 #include "cloud_rows.hpp"
 #include "engine/assembly/penalty_element.hpp"
+#include "quiet_blocks.hpp"
 #include "zero_energy_penalty.hpp"
 
 namespace perikit {
@@ -24,8 +25,10 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
  public:
   explicit StencilPenalty(const ModelParts& parts)
-      : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), colouring_(colour_cloud(families_.lists(), families_.rows())),
-        stencil_(families_.rows(), -1) {
+      : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), stencil_(families_.rows(), -1) {
+    const BlockReach reach = cloud_reach(families_.lists(), families_.rows());
+    colouring_ = Colouring(reach);
+    if (parts.skip) quiet_ = QuietBlocks(reach);
     PenaltyElement<D> element;
     const bool same_law = parts.laws->single();
     std::int32_t whole = -1;
@@ -45,7 +48,13 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     read(u);
     force_.assign(families_.rows(), Row{});
     std::vector<double> energies(cloud_blocks(families_.rows()), 0.0);
+    quiet_.look(1, [&](std::size_t b) {
+      bool any = false;
+      over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
+      return any;
+    });
     colouring_.for_each([&](std::size_t b) {
+      if (!quiet_.awake(b, 1)) return;
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) { energies[b] += 0.5 * pull(r, factor, t); });
     });
@@ -143,6 +152,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
   PointFamilies families_;
   Colouring colouring_;
+  QuietBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient
   std::vector<Stencil> stencils_;
   AlignedVector<Row> u_, force_;       ///< by row

@@ -21,7 +21,7 @@ WeightedModel<D>::WeightedModel(const ModelParts& parts)
       kinematics_(parts.kinematics),
       traits_(kinematics_->traits()),
       rules_{kinematics_.get(), traits_, body_.horizon()},
-      skip_(parts.skip),
+      share_(parts.share),
       owners_(traits_.selective ? 1 : 0),
       parts_(rules_.at_points() ? 1 : kinematics_->parts(D)),
       condition_(body_.make_field(1)),
@@ -30,12 +30,14 @@ WeightedModel<D>::WeightedModel(const ModelParts& parts)
     prepare_lattice(*parts.influence);
   else
     prepare_cloud(*parts.influence);
+  if (!parts.skip || laws_.history()) quiet_ = {};
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
 }
 
 template <int D>
 void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
   const LatticeFamilies& f = lattice_.emplace(body_, influence, traits_.weight);
+  quiet_ = QuietBlocks(f.reach);
   bonds_ = f.bonds;
   broken_ = f.broken;
   singular_ = f.singular;
@@ -75,7 +77,7 @@ std::vector<std::int32_t> WeightedModel<D>::store_stencils() {
     build(m, 0, nullptr);
     fallbacks_ += static_cast<std::size_t>(m.stencil.fallbacks()) * family.members;
     dropped_ += static_cast<std::size_t>(m.stencil.dropped()) * family.members;
-    if (!skip_ || bytes > stencil_bytes || (parts_ == 0 && family.members < fewest_together)) continue;
+    if (!share_ || bytes > stencil_bytes || (parts_ == 0 && family.members < fewest_together)) continue;
     stencil_of[k] = static_cast<std::int32_t>(stencils_.size());
     bytes += stencils_.emplace_back(m.family, m.stencil, owners_, parts_ == 0).bytes();
   }
@@ -150,16 +152,9 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
   });
   fallbacks_ = std::accumulate(fallbacks.begin(), fallbacks.end(), std::size_t{0});
   dropped_ = std::accumulate(dropped.begin(), dropped.end(), std::size_t{0});
-  std::vector<std::vector<std::int32_t>> touches(blocks);
-  for (std::size_t b = 0; b < blocks; ++b) {
-    touches[b].push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * cloud_block; p < std::min((b + 1) * cloud_block, body_.points()); ++p)
-      for (const std::int32_t j : f.neighbours(p))
-        touches[b].push_back(static_cast<std::int32_t>(static_cast<std::size_t>(j) / cloud_block));
-    std::sort(touches[b].begin(), touches[b].end());
-    touches[b].erase(std::unique(touches[b].begin(), touches[b].end()), touches[b].end());
-  }
-  cloud_colouring_ = Colouring(touches, blocks);
+  BlockReach reach = cloud_reach(f.lists, body_.points(), cloud_block);
+  cloud_colouring_ = Colouring(reach);
+  quiet_ = QuietBlocks(std::move(reach));
 }
 
 template <int D>
@@ -427,7 +422,14 @@ EvaluationStatus WeightedModel<D>::run(Pass& pass) {
   }
   for (int c = 0; c < D; ++c) std::memset(pass.out.component(c), 0, pass.out.stride * sizeof(double));
   if (singles_) out_rows_.assign(stride, Row{});
-  (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) { block(b, pass); });
+  if (pass.work.tangent()) quiet_.wake();
+  else quiet_.look(1, [&](std::size_t b) {
+    if (lattice_) return lattice_->moves(b, pass.u);
+    return QuietBlocks::moves(pass.u, b * cloud_block, std::min(body_.points(), (b + 1) * cloud_block));
+  });
+  (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) {
+    if (quiet_.awake(b, 1)) block(b, pass);
+  });
   if (singles_) {
     parallel_for(cloud_blocks(stride), [&](std::size_t b) {
       for (std::size_t p = b * cloud_block_points; p < std::min(stride, (b + 1) * cloud_block_points); ++p)

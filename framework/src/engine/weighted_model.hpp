@@ -12,6 +12,7 @@
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
 #include "mirrored_stencil.hpp"
+#include "quiet_blocks.hpp"
 #include "sparse_stencils.hpp"
 
 namespace perikit {
@@ -31,6 +32,7 @@ class WeightedModel final : public AssemblingModel {
   Field shape_tensor_condition() override { return condition_; }
   Field damage() override { return damage_; }
   ModelReport report() const override;
+  QuietCounts quiet_counts() const override { return quiet_.counts(); }
 
  private:
   static constexpr std::size_t cloud_block = 64;
@@ -91,7 +93,7 @@ class WeightedModel final : public AssemblingModel {
   std::shared_ptr<const Kinematics> kinematics_;
   KinematicsTraits traits_;
   StencilRules rules_;
-  bool skip_;
+  bool share_;
   int owners_;  ///< evaluation points without a share, for the selective map
   int parts_;   ///< evaluation points per point; 0: one per bond
   std::optional<LatticeFamilies> lattice_;
@@ -103,6 +105,7 @@ class WeightedModel final : public AssemblingModel {
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;
   Colouring cloud_colouring_;
+  QuietBlocks quiet_;
   Field condition_, damage_;
   std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows

@@ -30,7 +30,7 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   internal_force_ = body_.make_field(dimension());
   read_damage(quasi_static);
   try {
-    model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, damage_.get()});
+    model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, scene_.share, damage_.get()});
   } catch (const std::domain_error& error) {
     throw InputError(scene_.body.position, scene_.body.lattice ? "body.lattice" : "body.points", error.what());
   }
@@ -172,6 +172,13 @@ Field BodyProblem::reaction(bool dynamic, double t) {
     if (dynamic) r.data()[dof] += mass_[static_cast<std::size_t>(dof) % stride()] * a.data()[dof];
   }
   return r;
+}
+
+std::string BodyProblem::quiet_summary() const {
+  const QuietCounts counts = model_->quiet_counts();
+  if (counts.quiet == 0) return {};
+  return fmt::format("quiet blocks  {} of {} blocks of points left out of force evaluations ({:.2f} %): no wave had reached them\n", counts.quiet, counts.blocks,
+                     100.0 * static_cast<double>(counts.quiet) / static_cast<double>(counts.blocks));
 }
 
 std::size_t BodyProblem::bytes() const noexcept {

@@ -162,6 +162,7 @@ void SceneReader::read_run(const toml::table& root) {
   writer_.header("run");
   writer_.lines(table, values);
   if (values.has("skip")) scene_.skip = values.boolean("skip");
+  if (values.has("share")) scene_.share = values.boolean("share");
   if (values.has("threads")) scene_.threads = static_cast<int>(values.integer("threads"));
   if (!values.has("seed")) return;
   scene_.seed = values.integer("seed");

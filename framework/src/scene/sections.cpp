@@ -177,7 +177,10 @@ ParameterTable history_parameters() {
 
 ParameterTable run_parameters() {
   ParameterTable table;
-  table.boolean("skip", "Skip work that the scene does not need; false only to compare.").by_default("true");
+  table.boolean("skip", "Leave out work whose result is known: checks of bonds that cannot have failed, parts of the body that no wave has reached. "
+                        "false only to compare: the result is the same, bit for bit.").by_default("true");
+  table.boolean("share", "Compute what is equal once: bonds for both of their ends, stencils for equal families. false only to compare: the "
+                         "result is the same to rounding.").by_default("true");
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
   table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;

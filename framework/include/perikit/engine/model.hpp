@@ -45,6 +45,12 @@ struct ModelReport {
   std::vector<std::string> warnings;          ///< one line each
 };
 
+/// What was left out because no wave had arrived, over all evaluations of forces.
+struct QuietCounts {
+  std::int64_t blocks = 0;                    ///< of points, evaluated or left out
+  std::int64_t quiet = 0;                     ///< left out
+};
+
 class Model {
  public:
   virtual ~Model() = default;
@@ -68,6 +74,7 @@ class Model {
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
   virtual Field damage() = 0;
   virtual ModelReport report() const = 0;
+  virtual QuietCounts quiet_counts() const { return {}; }
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that u stretches too far, and recomputes what depends on them. To be called after every step.
@@ -84,7 +91,8 @@ struct ModelParts {
   std::shared_ptr<const InfluenceFunction> influence;
   const Laws* laws = nullptr;
   std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients of order 1
-  bool skip = true;                           ///< false: no savings by symmetry or uniformity
+  bool skip = true;                           ///< leave out work whose result is known; changes no bit
+  bool share = true;                          ///< savings by symmetry and uniformity; change rounding
   const BodyDamage* damage = nullptr;         ///< null: bonds never fail
 };
 

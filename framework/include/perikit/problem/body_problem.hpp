@@ -71,6 +71,8 @@ class BodyProblem final : public Problem {
   Field reaction(bool dynamic, double t);
   /// How bonds failed so far, in words; empty without [damage].
   std::string fracture_summary() const;
+  /// What was left out because no wave had arrived, in words; empty where nothing was.
+  std::string quiet_summary() const;
   /// Bytes held by body, model and state.
   std::size_t bytes() const noexcept;
 

@@ -107,7 +107,8 @@ struct Scene {
   std::vector<BoundaryDescription> boundaries;
   std::vector<LoadDescription> loads;
   OutputDescription output;
-  bool skip = true;
+  bool skip = true;                          ///< [run]: leave out work whose result is known
+  bool share = true;                         ///< [run]: compute what is equal once
   std::optional<int> threads;
   std::int64_t seed = 1;
 };

@@ -24,8 +24,8 @@ BondAssembly<D>::BondAssembly(const ModelParts& parts)
       laws_(*parts.laws),
       traits_(parts.kinematics->traits()),
       mean_(traits_.base == BondBase::mean),
-      symmetric_(traits_.pair_symmetric && !traits_.selective && parts.skip),
-      colouring_(colour_cloud(families().lists(), families().rows())) {
+      symmetric_(traits_.pair_symmetric && !traits_.selective && parts.share),
+      colouring_(cloud_reach(families().lists(), families().rows())) {
   read_bonds(parts);
 }
 

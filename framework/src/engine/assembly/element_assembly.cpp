@@ -9,7 +9,7 @@ namespace perikit {
 
 template <int D>
 ElementAssembly<D>::ElementAssembly(const ModelParts& parts)
-    : Assembly(parts, 2), parts_(parts), laws_(*parts.laws), colouring_(colour_cloud(families().lists(), families().rows())) {
+    : Assembly(parts, 2), parts_(parts), laws_(*parts.laws), colouring_(cloud_reach(families().lists(), families().rows())) {
   shape_ = {parts.kinematics, parts.kinematics->traits(), 1};
   if (shape_.traits.at == EvaluationPoints::weighted) shape_.parts = parts.kinematics->parts(D);
   for (std::size_t r = 0; r < families().rows() && !whole_; ++r) {

@@ -1,0 +1,220 @@
+/// What a scene does not need costs nothing: counted inside the program, not timed, and without changing a bit of the result.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <atomic>
+#include <string_view>
+
+#include "perikit/scene/scene.hpp"
+#include "tests/contract/integrator_fixture.hpp"
+#include "tests/validation/scenes.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+
+namespace {
+
+/// Evaluation points that asked for something, over a whole run.
+struct Work {
+  std::atomic<std::int64_t> energies{0}, stresses{0}, tangents{0}, outside{0};   ///< outside: of another space than plane strain
+};
+
+/// A law that counts what it is asked for.
+class CountedMaterial final : public Material {
+ public:
+  CountedMaterial(std::unique_ptr<Material> law, Work& work) : law_(std::move(law)), work_(work) {}
+  MaterialTraits traits() const noexcept override { return law_->traits(); }
+  void constants(const MaterialInput& input, double* out) const override { law_->constants(input, out); }
+  Moduli small_strain(const double* k) const noexcept override { return law_->small_strain(k); }
+  int state_components(Space space) const noexcept override { return law_->state_components(space); }
+  Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
+    if (batch.psi) work_.energies += batch.n;
+    if (batch.P) work_.stresses += batch.n;
+    if (batch.A) work_.tangents += batch.n;
+    if (space != Space::plane_strain) work_.outside += batch.n;
+    return law_->evaluate(space, batch);
+  }
+
+ private:
+  std::unique_ptr<Material> law_;
+  Work& work_;
+};
+
+/// The parts of this build, their laws counted.
+class Counting final : public PartFactory {
+ public:
+  std::unique_ptr<Kinematics> kinematics(const PartValues& part) const override { return registry().kinematics(part); }
+  std::unique_ptr<Stabilization> stabilization(const PartValues& part) const override { return registry().stabilization(part); }
+  std::unique_ptr<Material> material(const PartValues& part) const override {
+    return std::make_unique<CountedMaterial>(registry().material(part), work);
+  }
+  std::unique_ptr<Damage> damage(const PartValues& part) const override { return registry().damage(part); }
+  std::unique_ptr<InfluenceFunction> influence(const PartValues& part) const override { return registry().influence(part); }
+  std::unique_ptr<Integrator> integrator(const PartValues& part) const override { return registry().integrator(part); }
+  mutable Work work;
+};
+
+/// One simulation with its counts.
+struct Run {
+  Run(const std::string& text, std::vector<std::string> overrides) {
+    simulation = std::make_unique<Simulation>(parse_scene(text, "skipping.toml", registry(), {.overrides = std::move(overrides)}), counting);
+  }
+  BodyProblem& problem() { return simulation->problem(); }
+  std::vector<double> end() {
+    contract::run(*simulation);
+    return contract::state(*simulation);
+  }
+  Counting counting;
+  std::unique_ptr<Simulation> simulation;
+};
+
+/// A long bar whose left end is pushed.
+const std::string bar = R"toml(format = 1
+[body]
+dimension = 1
+[body.lattice]
+spacing = 1e-3
+lower = [0]
+upper = [4]
+[sets]
+left = "x < 3e-3"
+[family]
+horizon_ratio = 3.015
+influence = "gaussian"
+[kinematics]
+type = "baqp"
+[material]
+type = "neo_hookean"
+density = 1000.0
+shear_modulus = 1e6
+bulk_modulus = 2e6
+[[boundary]]
+set = "left"
+displacement = ["1e-4 * sin(1e3*t)"]
+[integrator]
+type = "verlet"
+end_time = 1.5e-3
+)toml";
+
+/// A strip that is pulled in equal load steps.
+const std::string strip = R"toml(format = 1
+[body]
+dimension = 2
+plane = "strain"
+[body.lattice]
+spacing = 0.1
+lower = [0, 0]
+upper = [2, 1]
+[sets]
+left = "x < 0.1"
+right = "x > 1.9"
+[family]
+horizon_ratio = 2.015
+influence = "gaussian"
+[kinematics]
+type = "projection"
+[material]
+type = "linear_elastic"
+youngs_modulus = 1.0
+poisson_ratio = 0.3
+[[boundary]]
+set = "left"
+displacement = [0, 0]
+[[boundary]]
+set = "right"
+displacement = [0.02, 0]
+[integrator]
+type = "newton"
+steps = 5
+)toml";
+
+}  // namespace
+
+TEST_CASE("skipping: points that no wave has reached are not evaluated, and the run is the same, bit for bit") {
+  for (const std::string kinematics : {"conventional", "baqp", "non_spherical", "ordinary"}) {
+    for (const std::string jitter : {"0.0", "0.2"}) {
+      INFO(kinematics, ", jitter ", jitter);
+      const std::vector<std::string> body = {"kinematics=" + kinematics, "body.lattice.jitter=" + jitter};
+      const auto run = [&](const char* skip) {
+        std::vector<std::string> all = body;
+        all.push_back(std::string("run.skip=") + skip);
+        return Run(bar, all);
+      };
+      Run some = run("true"), every = run("false");
+      const std::vector<double> end = some.end(), expected = every.end();
+      CHECK(end == expected);
+      const QuietCounts quiet = some.problem().model().quiet_counts();
+      CHECK_MESSAGE(quiet.quiet > quiet.blocks / 4, quiet.quiet, " of ", quiet.blocks, " blocks left out");
+      CHECK(every.problem().model().quiet_counts().blocks == 0);
+      if (kinematics != "ordinary")
+        CHECK_MESSAGE(some.counting.work.stresses < 0.75 * static_cast<double>(every.counting.work.stresses), some.counting.work.stresses.load(), " of ",
+                      every.counting.work.stresses.load(), " evaluation points");
+    }
+  }
+}
+
+TEST_CASE("skipping: energies are only summed where history samples") {
+  /// Samples one step in ten.
+  class Sparse final : public Observer {
+   public:
+    bool wants_sample(std::int64_t step, double) override { return step % 10 == 0; }
+    void step_done(const StepReport&) override {}
+    void log(std::string_view) override {}
+    bool cancelled() const noexcept override { return false; }
+  };
+  Run sparse(bar, {"body.lattice.upper=[0.2]"}), full(bar, {"body.lattice.upper=[0.2]"});
+  Sparse observer;
+  sparse.simulation->run(observer);
+  CHECK(contract::displacement(*sparse.simulation) == [&] { full.end(); return contract::displacement(*full.simulation); }());
+  CHECK(full.counting.work.energies > 0);
+  CHECK(sparse.counting.work.energies < 0.15 * static_cast<double>(full.counting.work.energies));
+}
+
+TEST_CASE("skipping: a bond of a symmetric kinematics is evaluated once for both ends") {
+  Run shared(bar, {"run.skip=false", "body.lattice.upper=[0.2]"}), plain(bar, {"run.skip=false", "run.share=false", "body.lattice.upper=[0.2]"});
+  const std::vector<double> end = shared.end(), expected = plain.end();
+  CHECK(contract::difference(end, expected) <= 1e-11 * contract::largest(expected));
+  CHECK(static_cast<double>(shared.counting.work.stresses) < 0.6 * static_cast<double>(plain.counting.work.stresses));
+}
+
+TEST_CASE("skipping: a constant stiffness is assembled and factorised once") {
+  Run linear(strip, {}), curved(strip, {"material.type=\"saint_venant_kirchhoff\""});
+  const std::size_t points = linear.problem().model().report().evaluation_points;
+  linear.end();
+  curved.end();
+  // `projection` gives W A of each evaluation point once; batches are padded.
+  CHECK(linear.counting.work.tangents > 0);
+  CHECK(linear.counting.work.tangents <= static_cast<std::int64_t>(2 * points));
+  CHECK(curved.counting.work.tangents > 5 * linear.counting.work.tangents);
+}
+
+TEST_CASE("skipping: a plane scene evaluates plane laws only, and statics have no velocity") {
+  Run run(strip, {});
+  run.end();
+  CHECK(run.counting.work.stresses + run.counting.work.tangents > 0);
+  CHECK(run.counting.work.outside == 0);
+  const std::vector<std::byte> state = run.problem().snapshot();
+  CHECK(std::string_view(reinterpret_cast<const char*>(state.data()), state.size()).find("velocity") == std::string_view::npos);
+}
+
+TEST_CASE("skipping: without damage there is no state of bonds, and lattices store no families") {
+  const auto bytes = [](const std::string& kinematics, const std::string& damage, double& per_point) {
+    std::vector<std::string> overrides = {"body.dimension=3", "body.lattice.lower=[0, 0, 0]", "body.lattice.upper=[0.064, 0.064, 0.064]",
+                                          "boundary=[]", "kinematics=" + kinematics};
+    if (!damage.empty()) overrides.push_back("damage=" + damage);
+    const Run run(bar, overrides);
+    const Body& body = run.simulation->problem().body();
+    run.simulation->problem().velocity();
+    run.simulation->problem().mass();
+    per_point = static_cast<double>(run.simulation->problem().bytes()) / static_cast<double>(body.points());
+    return run.simulation->problem().model().report();
+  };
+  double intact = 0, failing = 0;
+  const ModelReport report = bytes("conventional", "", intact);
+  bytes("conventional", "{ type = \"critical_stretch\", stretch = 0.1 }", failing);
+  CHECK_MESSAGE(intact < 400, intact, " bytes a point");
+  CHECK(failing - intact >= static_cast<double>(report.bonds) / 262144.0 / 8 / 2);
+  CHECK_MESSAGE((bytes("baqp", "", intact), intact < 600), intact, " bytes a point");
+  CHECK_MESSAGE((bytes("bond_based", "", intact), intact < 300), intact, " bytes a point");
+}
