@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -29,6 +30,12 @@ void assign(N_Vector z, Value&& value) {
   });
 }
 
+constexpr auto add = [](double a, double b) { return a + b; };
+constexpr auto least = [](double a, double b) { return std::min(a, b); };
+
+double over_ranks(double value, decltype(add)) { return communicator().sum(value); }
+double over_ranks(double value, decltype(least)) { return -communicator().largest(-value); }
+
 /// Sum or another associative reduction, by blocks in order.
 template <class Value, class Combine>
 double reduce(N_Vector x, double start, Value&& value, Combine&& join) {
@@ -39,11 +46,8 @@ double reduce(N_Vector x, double start, Value&& value, Combine&& join) {
     for (std::size_t k = b * block; k < std::min(n, (b + 1) * block); ++k) parts[b] = join(parts[b], value(k));
   });
   for (const double part : parts) start = join(start, part);
-  return start;
+  return over_ranks(start, join);
 }
-
-constexpr auto add = [](double a, double b) { return a + b; };
-constexpr auto least = [](double a, double b) { return std::min(a, b); };
 
 N_Vector clone_of(N_Vector w, bool with_memory) {
   N_Vector v = N_VNewEmpty(w->sunctx);

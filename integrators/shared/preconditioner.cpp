@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
 #include "sparse_solver.hpp"
@@ -118,7 +119,9 @@ void add_preconditioner_key(ParameterTable& table) {
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
   chosen = name;
-  if (name == "auto") {
+  if (name == "auto" && communicator().size() > 1) {
+    chosen = "none";   // the assembled tangent needs the whole body on one rank
+  } else if (name == "auto") {
     const auto bytes = static_cast<double>(problem.assembled_size().bytes);
     chosen = bytes <= (problem.dimension() == 3 ? 0.5e9 : 2e9) ? "factorisation" : bytes <= 4e9 ? "jacobi" : "none";
   }

@@ -51,6 +51,41 @@ Body::Body(const Scene& scene, bool lists) : dimension_(scene.body.dimension), s
   collect_sets(scene);
 }
 
+Body::Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material)
+    : dimension_(whole.dimension_), space_(whole.space_), section_(whole.section_), spacing_(whole.spacing_), horizon_(whole.horizon_),
+      margin_(whole.margin_), cracks_(whole.cracks_) {
+  std::vector<std::int32_t> place(whole.stride_, -1);   // by internal index of the whole body, kept points
+  if (whole.lattice_) {
+    for (std::size_t n = 0; n < kept.size(); ++n)
+      if (kept[n]) internal_.push_back(whole.internal_[n]);
+    number_lattice(*whole.lattice_, whole.uniform_volume_);
+    for (const std::int32_t p : internal_) place[static_cast<std::size_t>(p)] = p;
+  } else {
+    std::vector<Point> positions;
+    std::vector<double> volumes;
+    std::vector<std::int32_t> from;
+    for (std::size_t n = 0; n < kept.size(); ++n) {
+      if (!kept[n]) continue;
+      const auto p = static_cast<std::size_t>(whole.internal_[n]);
+      from.push_back(whole.internal_[n]);
+      positions.push_back(whole.position(p));
+      volumes.push_back(whole.volume(p));
+    }
+    place_cloud(std::move(positions), std::move(volumes));
+    for (std::size_t n = 0; n < from.size(); ++n) place[static_cast<std::size_t>(from[n])] = internal_[n];
+  }
+  const auto is_owned = [&](std::int32_t p) { return owned[static_cast<std::size_t>(whole.input_of(static_cast<std::size_t>(p)))]; };
+  for (const auto& [name, members] : whole.sets_)
+    for (const std::int32_t p : members)
+      if (is_owned(p)) sets_[name].push_back(place[static_cast<std::size_t>(p)]);
+      else sets_[name];
+  material_ids_.assign(stride_, ghost_material);
+  for (const std::int32_t p : whole.internal_) {
+    if (is_owned(p))
+      material_ids_[static_cast<std::size_t>(place[static_cast<std::size_t>(p)])] = whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
+  }
+}
+
 void Body::place_lattice(const Scene& scene, bool lists) {
   const LatticeDescription& description = *scene.body.lattice;
   double estimate = 1;
@@ -102,6 +137,11 @@ void Body::place_lattice(const Scene& scene, bool lists) {
     return;
   }
   check_memory(scene, static_cast<double>(lattice.cells), horizon_ / spacing_, false);
+  number_lattice(lattice, volume);
+}
+
+/// What follows from the lattice and the cells that are kept.
+void Body::number_lattice(const Lattice& lattice, double volume) {
   stride_ = static_cast<std::size_t>(lattice.cells);
   margin_ = padding;
   uniform_volume_ = volume;

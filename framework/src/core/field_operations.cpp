@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
@@ -19,11 +20,11 @@ double blocked_sum(std::size_t n, Term&& term) {
 }  // namespace
 
 double dot(ConstFieldView a, ConstFieldView b) {
-  return blocked_sum(a.size(), [&](std::size_t begin, std::size_t end) {
+  return communicator().sum(blocked_sum(a.size(), [&](std::size_t begin, std::size_t end) {
     double sum = 0;
     for (std::size_t k = begin; k < end; ++k) sum += a.data[k] * b.data[k];
     return sum;
-  });
+  }));
 }
 
 double norm(ConstFieldView a) { return std::sqrt(dot(a, a)); }
@@ -33,7 +34,7 @@ double largest_magnitude(ConstFieldView a) {
   parallel_for(most.size(), [&](std::size_t b) {
     for (std::size_t k = b * sum_block; k < std::min(a.size(), (b + 1) * sum_block); ++k) most[b] = std::max(most[b], std::abs(a.data[k]));
   });
-  return most.empty() ? 0.0 : *std::max_element(most.begin(), most.end());
+  return communicator().largest(most.empty() ? 0.0 : *std::max_element(most.begin(), most.end()));
 }
 
 void combine(double a, ConstFieldView x, double b, ConstFieldView y, FieldView sum) {

@@ -181,7 +181,8 @@ void PairModel<D>::set_correction(const InfluenceFunction& influence) {
       if (k == 0 || !laws_.single()) {
         G.fill(1.0);
         if (!bonds.empty()) {
-          const PairPoint x = point(p);
+          PairPoint x = point(p);
+          if (!(x.bulk() > 0)) x.moduli = {1, 1};   // ghosts: the correction is one of shape
           const auto own = stiffness(bonds, x), exact = stiffness(regular, x);
           for (std::size_t a = 0; a < D; ++a)
             if (own[a] > 0) G[a] = exact[a] / own[a];

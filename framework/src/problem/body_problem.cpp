@@ -7,13 +7,19 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/recorder.hpp"
 
 namespace perikit {
 
+static Body whole_body(const Scene& scene, const Damage* damage) { return Body(scene, damage && !damage->traits().bits); }
+
 BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static)
-    : scene_(scene), damage_law_(scene.damage ? factory.damage(*scene.damage) : nullptr), body_(scene, damage_law_ && !damage_law_->traits().bits) {
+    : scene_(scene), damage_law_(scene.damage ? factory.damage(*scene.damage) : nullptr),
+      partition_(communicator().size() > 1 ? std::make_unique<Partition>(whole_body(scene, damage_law_.get()), communicator().rank(), communicator().size()) : nullptr),
+      body_(partition_ ? partition_->part(static_cast<std::uint16_t>(scene.regions.size() + 1)) : whole_body(scene, damage_law_.get())) {
+  if (partition_) ghosts_.emplace(*partition_, body_);
   influence_ = factory.influence(*scene_.influence);
   kinematics_ = factory.kinematics(*scene_.kinematics);
   const KinematicsTraits traits = kinematics_->traits();
@@ -64,7 +70,7 @@ std::span<double> BodyProblem::declare_numbers(const std::string& name, std::siz
 std::span<const double> BodyProblem::mass() {
   if (!mass_.empty()) return mass_;
   mass_.assign(stride(), 0.0);
-  for (const std::int32_t p : body_.internal()) {
+  for (const std::int32_t p : body_.owned()) {
     const double density = laws_->density(static_cast<std::size_t>(p));
     if (!(density > 0)) {
       const std::size_t id = body_.material_ids().empty() ? 0 : body_.material_ids()[static_cast<std::size_t>(p)];
@@ -94,16 +100,32 @@ double BodyProblem::uniform_mass() {
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = laws_->history();
   if (history) history->set_time_step(time_step);
-  EvaluationStatus status = model_->forces(u, force, energy);
+  EvaluationStatus status = model_->forces(filled(u, with_ghosts_), force, energy);
+  if (energy) *energy = communicator().sum(*energy);
   if (history) history->set_time_step(0);
   if (!status.ok()) {
     const auto p = static_cast<std::size_t>(body_.internal()[static_cast<std::size_t>(status.point)]);
     const std::uint16_t id = body_.material_ids().empty() ? std::uint16_t{0} : body_.material_ids()[p];
-    const std::string& material = id == 0 ? scene_.material->type : scene_.regions[id - 1u].material->type;
+    const std::string& material = id == 0 || id > scene_.regions.size() ? scene_.material->type : scene_.regions[id - 1u].material->type;
     status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
                                      model_->has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length", status.description, scene_.kinematics->type, material);
   }
+  finish(force, status);
   return status;
+}
+
+ConstFieldView BodyProblem::filled(ConstFieldView u, Field& memory) const {
+  if (!ghosts_) return u;
+  if (memory.size() == 0) memory = body_.make_field(dimension());
+  std::copy_n(u.data, u.size(), memory.data());
+  ghosts_->forward(memory);
+  return memory;
+}
+
+void BodyProblem::finish(FieldView force, EvaluationStatus& status) const {
+  if (!ghosts_) return;
+  if (communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return ghosts_->accumulate(force);
+  if (status.ok()) status = {0, "inadmissible deformation on another rank"};
 }
 
 bool BodyProblem::advance_history(double time_step, ConstFieldView velocity) {
@@ -133,12 +155,31 @@ void BodyProblem::prepare_history(bool quasi_static) {
   history->allocate();
 }
 
-EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) { return model_->tangent(u, w, Kw); }
+EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  const ConstFieldView at = filled(u, with_ghosts_), along = filled(w, direction_with_ghosts_);
+  EvaluationStatus status = model_->tangent(at, along, Kw);
+  finish(Kw, status);
+  return status;
+}
+
+void BodyProblem::refuse_assembly() const {
+  if (partition_) throw RunError("an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers without a preconditioner");
+}
+
+EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
+  refuse_assembly();
+  return model_->assemble(u, K);
+}
+
+AssembledSize BodyProblem::assembled_size() {
+  refuse_assembly();
+  return model_->assembled_size();
+}
 
 double BodyProblem::kinetic_energy(ConstFieldView velocity) {
   const auto masses = mass();
   constexpr std::size_t block = 8192;
-  return ordered_sum((stride() + block - 1) / block, [&](std::size_t b) {
+  return communicator().sum(ordered_sum((stride() + block - 1) / block, [&](std::size_t b) {
     double sum = 0;
     for (std::size_t p = b * block; p < std::min(stride(), (b + 1) * block); ++p) {
       double v2 = 0;
@@ -146,7 +187,7 @@ double BodyProblem::kinetic_energy(ConstFieldView velocity) {
       sum += 0.5 * masses[p] * v2;
     }
     return sum;
-  });
+  }));
 }
 
 Field BodyProblem::acceleration(double t) {
@@ -154,7 +195,7 @@ Field BodyProblem::acceleration(double t) {
   const auto masses = mass();
   const FieldView external = any_load() ? external_force() : FieldView{};
   for (int c = 0; c < dimension(); ++c)
-    for (const std::int32_t index : body_.internal()) {
+    for (const std::int32_t index : body_.owned()) {
       const auto p = static_cast<std::size_t>(index);
       a.component(c)[p] = (internal_force_.component(c)[p] + (external.data ? external.component(c)[p] : 0.0)) / masses[p];
     }

@@ -51,7 +51,7 @@ ConstFieldView BodyProblem::free_mask() const noexcept {
   if (free_mask_.size() == 0) {
     free_mask_ = body_.make_field(dimension());
     for (int c = 0; c < dimension(); ++c)
-      for (const std::int32_t p : body_.internal()) free_mask_.component(c)[p] = 1.0;
+      for (const std::int32_t p : body_.owned()) free_mask_.component(c)[p] = 1.0;
     for (const std::int64_t dof : constrained_) free_mask_.data()[dof] = 0.0;
   }
   return free_mask_;
@@ -105,19 +105,21 @@ void BodyProblem::prescribe_displacement(double t, FieldView u) {
 }
 
 void BodyProblem::read_loads(bool quasi_static) {
+  const Body& body = whole();   // totals are those of all ranks
   for (const LoadDescription& description : scene_.loads) {
-    std::vector<std::int32_t> points = body_.set(description.set);
+    std::vector<std::int32_t> points = body.set(description.set);
     std::vector<double> share;
     if (description.type == LoadDescription::Type::traction) {
-      share = face_shares(description, points);
+      share = face_shares(body, description, points);
     } else {
       double total = 0;
-      for (const std::int32_t p : points) total += body_.volume(static_cast<std::size_t>(p));
+      for (const std::int32_t p : points) total += body.volume(static_cast<std::size_t>(p));
       for (const std::int32_t p : points) {
-        const double volume = body_.volume(static_cast<std::size_t>(p));
+        const double volume = body.volume(static_cast<std::size_t>(p));
         share.push_back(description.type == LoadDescription::Type::force ? volume / total : volume);
       }
     }
+    keep_owned(points, share);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;
@@ -126,12 +128,25 @@ void BodyProblem::read_loads(bool quasi_static) {
   }
 }
 
-std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const {
+void BodyProblem::keep_owned(std::vector<std::int32_t>& points, std::vector<double>& share) const {
+  if (!partition_) return;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::int32_t input = whole().input_of(static_cast<std::size_t>(points[k]));
+    if (!partition_->owns(input)) continue;
+    points[kept] = body_.internal()[static_cast<std::size_t>(partition_->place(input))];
+    share[kept++] = share[k];
+  }
+  points.resize(kept);
+  share.resize(kept);
+}
+
+std::vector<double> BodyProblem::face_shares(const Body& body, const LoadDescription& load, std::vector<std::int32_t>& points) const {
   const int axis = load.face[1] - 'x';
   const double outward = load.face[0] == '+' ? 1.0 : -1.0;
-  const double dx = body_.spacing();
+  const double dx = body.spacing();
   std::map<std::int32_t, double> shares;
-  if (const Lattice* lattice = body_.lattice()) {
+  if (const Lattice* lattice = body.lattice()) {
     // The face lies half a spacing beyond the last layer: 3/2 there and -1/2 one layer further in give the exact total and the
     // exact moment.
     std::array<int, 3> step{};
@@ -144,25 +159,25 @@ std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::v
         k[a] += sign * step[a];
         if (k[a] < 0 || k[a] >= lattice->extent[a]) return false;
       }
-      return body_.alive(static_cast<std::size_t>(p + sign * shift));
+      return body.alive(static_cast<std::size_t>(p + sign * shift));
     };
     for (const std::int32_t p : points) {
       if (alive(p, 1)) continue;
       const bool inner = alive(p, -1);
-      const double area = body_.uniform_volume() / dx;
+      const double area = body.uniform_volume() / dx;
       shares[p] += inner ? 1.5 * area : area;
       if (inner) shares[static_cast<std::int32_t>(p - shift)] -= 0.5 * area;
     }
   } else {
     // A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
     // the set holds a second layer, linear weights over both put the resultant on the face.
-    const auto along = [&](std::int32_t p) { return outward * body_.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)]; };
+    const auto along = [&](std::int32_t p) { return outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)]; };
     double extreme = -std::numeric_limits<double>::infinity();
     for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
     double total = 0, m0 = 0, m1 = 0, m2 = 0;
     bool second = false;
     for (const std::int32_t p : points) {
-      const double depth = extreme + 0.5 * dx - along(p), v = body_.volume(static_cast<std::size_t>(p));
+      const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
       if (depth > 2.2 * dx) continue;
       if (depth <= 1.2 * dx) total += v / dx;
       else second = true;
@@ -171,7 +186,7 @@ std::vector<double> BodyProblem::face_shares(const LoadDescription& load, std::v
       m2 += v * depth * depth;
     }
     for (const std::int32_t p : points) {
-      const double depth = extreme + 0.5 * dx - along(p), v = body_.volume(static_cast<std::size_t>(p));
+      const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
       if (depth > 2.2 * dx) continue;
       shares[p] = second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0;
     }

@@ -35,6 +35,7 @@ void BodyProblem::read_damage(bool quasi_static) {
     throw InputError(scene_.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   if (quasi_static) refuse(fmt::format("integrator \"{}\"", scene_.integrator->type), "integrators of dynamic runs, whose forces are not assembled");
+  if (partition_) refuse("a body on several ranks", "one rank");
   if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
   if (scene_.stabilization) refuse("kinematics.stabilization", "kinematics without one");

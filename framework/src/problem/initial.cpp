@@ -8,6 +8,38 @@
 
 namespace perikit {
 
+namespace {
+
+/// Ghosts store nothing: the energy of their evaluation points is that of the rank that owns them.
+class GhostMaterial final : public Material {
+ public:
+  MaterialTraits traits() const noexcept override { return {.constant_tangent = true}; }
+  void constants(const MaterialInput&, double*) const override {}
+  Moduli small_strain(const double*) const noexcept override { return {}; }
+  Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
+    const auto zero = [&](double* x, int components) {
+      for (int c = 0; x && c < components; ++c) std::fill_n(x + static_cast<std::size_t>(c) * batch.stride, batch.n, 0.0);
+    };
+    const int n = tensor_components(space);
+    zero(batch.psi, 1);
+    zero(batch.P, n);
+    zero(batch.dP, n);
+    zero(batch.A, n * n);
+    zero(batch.lateral, 1);
+    return {};
+  }
+};
+
+MaterialRecord ghost_record() {
+  MaterialRecord record;
+  record.material = std::make_shared<GhostMaterial>();
+  record.traits = record.material->traits();
+  record.constants.resize(1);
+  return record;
+}
+
+}  // namespace
+
 void BodyProblem::read_materials(const PartFactory& factory) {
   std::vector<MaterialRecord> records;
   std::vector<std::shared_ptr<const PartValues>> parts{scene_.material};
@@ -70,13 +102,14 @@ void BodyProblem::read_materials(const PartFactory& factory) {
     }
     records.push_back(std::move(record));
   }
+  if (partition_) records.push_back(ghost_record());
   laws_ = std::make_unique<Laws>(body_.space(), std::move(records), body_.material_ids(), stride());
 }
 
 void BodyProblem::read_initial() {
   const auto fill = [&](const std::vector<std::optional<Expression>>& values, FieldView field) {
     for (std::size_t c = 0; c < values.size(); ++c) {
-      for (const std::int32_t p : body_.internal()) {
+      for (const std::int32_t p : body_.owned()) {
         field.component(static_cast<int>(c))[p] = (*values[c])(body_.position(static_cast<std::size_t>(p)));
       }
     }
@@ -85,8 +118,11 @@ void BodyProblem::read_initial() {
     const LoadedFrame frame = read_last_frame(*scene_.initial_from, points());
     const auto copy = [&](const std::string& name, FieldView field) {
       const OutputField& from = frame.fields.at(name);
-      for (std::size_t p = 0; p < points(); ++p)
-        for (int c = 0; c < dimension(); ++c) field.component(c)[body_.internal()[p]] = from.data[3 * p + static_cast<std::size_t>(c)];
+      for (const std::int32_t p : body_.owned()) {
+        const auto place = static_cast<std::size_t>(body_.input_of(static_cast<std::size_t>(p)));
+        const std::size_t row = partition_ ? static_cast<std::size_t>(partition_->input(place)) : place;
+        for (int c = 0; c < dimension(); ++c) field.component(c)[p] = from.data[3 * row + static_cast<std::size_t>(c)];
+      }
     };
     if (!frame.fields.contains("displacement")) throw InputError(fmt::format("{}: the last frame has no displacement", scene_.initial_from->string()));
     copy("displacement", displacement_);

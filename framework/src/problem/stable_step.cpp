@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "perikit/body/lattice.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/problem/body_problem.hpp"
 #include "perikit/sdk/eigenvalue.hpp"
 
@@ -34,7 +35,7 @@ double BodyProblem::bond_based_time_step() const {
     sum += std::pow(dx, d) * section / (dx * std::sqrt(double(offset[0]) * offset[0] + double(offset[1]) * offset[1] + double(offset[2]) * offset[2]));
   }
   double least = 0;
-  for (const std::int32_t index : body_.internal()) {
+  for (const std::int32_t index : body_.owned()) {
     const auto p = static_cast<std::size_t>(index);
     const Moduli moduli = laws_->moduli(p);
     const double pi = std::numbers::pi, nu = moduli.poisson(), K = moduli.bulk();
@@ -45,7 +46,7 @@ double BodyProblem::bond_based_time_step() const {
     least = least > 0 ? std::min(least, dt) : dt;
     if (laws_->single() && laws_->record_of(p).densities.empty()) break;
   }
-  return least;
+  return -communicator().largest(-least);
 }
 
 }  // namespace perikit

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -27,12 +28,8 @@ double Equilibrium::missing(ConstFieldView u, FieldView w) {
   fill(0.0, w);
   if (!problem_.any_constraint()) return 0.0;
   problem_.prescribe_displacement(t_, w);
-  double most = 0;
-  for (const std::int64_t dof : problem_.constrained()) {
-    w.data[dof] -= u.data[dof];
-    most = std::max(most, std::abs(w.data[dof]));
-  }
-  return most;
+  for (const std::int64_t dof : problem_.constrained()) w.data[dof] -= u.data[dof];
+  return largest_magnitude(w);
 }
 
 bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
@@ -44,11 +41,12 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   }
   copy(internal, r);
   if (external_.data) combine(1, r, 1, external_, r);
-  double squares = external_.data ? dot(external_, external_) : 0.0;
+  double squares = external_.data ? dot(external_, external_) : 0.0, reactions = 0;
   for (const std::int64_t dof : problem_.constrained()) {
     const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
-    squares += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
+    reactions += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
   }
+  squares += communicator().sum(reactions);
   mask(free_, r);
   norm_ = norm(r);
   reference_ = std::sqrt(std::max(squares, 0.0));

@@ -40,11 +40,14 @@ class Body {
   /// Throws InputError for an empty body, an empty set, a horizon smaller than the spacing of all points, too many points.
   /// lists: a lattice is treated as a cloud, since every bond has a number of its own.
   explicit Body(const Scene& scene, bool lists = false);
+  /// The kept points of another body, by input number; those that are not owned are ghosts, with a material of their own. Sets keep
+  /// owned points.
+  Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material);
 
   int dimension() const noexcept { return dimension_; }
   Space space() const noexcept { return space_; }
   double section() const noexcept { return section_; }
-  std::size_t points() const noexcept { return internal_.size(); }
+  std::size_t points() const noexcept { return internal_.size(); }   ///< with ghosts
   std::size_t stride() const noexcept { return stride_; }
   double spacing() const noexcept { return spacing_; }   ///< of the lattice, or the mean one of a cloud [m]
   double horizon() const noexcept { return horizon_; }   ///< delta [m]
@@ -66,6 +69,8 @@ class Body {
   /// Bit p % 8 of byte p / 8.
   std::span<const std::uint8_t> alive_bits() const noexcept { return alive_; }
 
+  /// Points that belong to this body alone: all of them, but for ghosts.
+  const std::vector<std::int32_t>& owned() const noexcept { return sets_.at("all"); }
   /// Internal indices in input order. "all" exists.
   const std::vector<std::int32_t>& set(const std::string& name) const { return sets_.at(name); }
   const std::map<std::string, std::vector<std::int32_t>>& sets() const noexcept { return sets_; }
@@ -77,6 +82,7 @@ class Body {
 
  private:
   void place_lattice(const Scene& scene, bool lists);
+  void number_lattice(const Lattice& lattice, double volume);
   void place_cloud(std::vector<Point> positions, std::vector<double> volumes);
   void collect_sets(const Scene& scene);
 

@@ -1,5 +1,6 @@
 #pragma once
-/// Vector operations on whole fields, on all threads, with sums that do not depend on their number. Fields have equal shapes.
+/// Vector operations on whole fields, on all threads, with sums that do not depend on their number, over all
+/// ranks of the communicator. Fields have equal shapes.
 
 #include <algorithm>
 #include <cstddef>

@@ -7,19 +7,22 @@
 #include <string>
 #include <vector>
 
+#include "perikit/body/partition.hpp"
 #include "perikit/engine/model.hpp"
+#include "perikit/problem/ghosts.hpp"
 #include "perikit/problem/integrator.hpp"
 
 namespace perikit {
 
 class BodyProblem final : public Problem {
  public:
-  /// Builds everything that the scene describes, by parts from `factory`. Throws InputError.
+  /// Builds everything that the scene describes, by parts from `factory`. Where the communicator has several ranks: this rank's part
+  /// of it, whose fields are zero at ghosts. Throws InputError.
   BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static);
 
   int dimension() const noexcept override { return body_.dimension(); }
   std::size_t stride() const noexcept override { return body_.stride(); }
-  std::size_t points() const noexcept override { return body_.points(); }
+  std::size_t points() const noexcept override { return whole().points(); }
   double spacing() const noexcept override { return body_.spacing(); }
   Field make_field(int components) const override { return body_.make_field(components); }
 
@@ -40,14 +43,14 @@ class BodyProblem final : public Problem {
 
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
-  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return model_->assemble(u, K); }
-  AssembledSize assembled_size() override { return model_->assembled_size(); }
+  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
+  AssembledSize assembled_size() override;
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
   bool advance_history(double time_step, ConstFieldView velocity = {}) override;
 
-  bool any_constraint() const noexcept override { return !constrained_.empty(); }
+  bool any_constraint() const noexcept override { return !constraints_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
   ConstFieldView free_mask() const noexcept override;
   void prescribe_half_step_velocity(double t_begin, double t_end, FieldView v) override;
@@ -59,6 +62,8 @@ class BodyProblem final : public Problem {
   bool constant_stiffness() const noexcept override { return model_->has_gradients() && laws_->constant_tangent() && !damage_; }
 
   const Body& body() const noexcept { return body_; }
+  /// The body of all ranks.
+  const Body& whole() const noexcept { return partition_ ? partition_->whole() : body_; }
   Model& model() noexcept { return *model_; }
   const Model& model() const noexcept { return *model_; }
   const Laws& laws() const noexcept { return *laws_; }
@@ -108,11 +113,22 @@ class BodyProblem final : public Problem {
   void read_loads(bool quasi_static);
   /// Overwrites prescribed components with their acceleration at t: differences of what is prescribed.
   void prescribe_acceleration(double t, FieldView a) const;
-  std::vector<double> face_shares(const LoadDescription& load, std::vector<std::int32_t>& points) const;
+  std::vector<double> face_shares(const Body& body, const LoadDescription& load, std::vector<std::int32_t>& points) const;
+  /// What of these points of the whole body belongs to this rank, with its shares.
+  void keep_owned(std::vector<std::int32_t>& points, std::vector<double>& share) const;
+  /// Throws RunError where several ranks share the body.
+  void refuse_assembly() const;
+  /// u with the values of ghosts, in `memory`; u itself where there are none.
+  ConstFieldView filled(ConstFieldView u, Field& memory) const;
+  /// Ends an evaluation: forces on ghosts go to their owners; one status for all ranks.
+  void finish(FieldView force, EvaluationStatus& status) const;
 
   Scene scene_;
   std::shared_ptr<const Damage> damage_law_;   ///< null without [damage]
+  std::unique_ptr<const Partition> partition_;   ///< null where one rank has the whole body
   Body body_;
+  std::optional<Ghosts> ghosts_;
+  mutable Field with_ghosts_, direction_with_ghosts_;
   std::shared_ptr<const InfluenceFunction> influence_;
   std::shared_ptr<const Kinematics> kinematics_;
   std::unique_ptr<Laws> laws_;
