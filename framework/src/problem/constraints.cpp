@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "face_loads.hpp"
 #include "perikit/problem/body_problem.hpp"
 
 namespace perikit {
@@ -147,8 +148,9 @@ std::vector<double> BodyProblem::face_shares(const Body& body, const LoadDescrip
   const double dx = body.spacing();
   std::map<std::int32_t, double> shares;
   if (const Lattice* lattice = body.lattice()) {
-    // The face lies half a spacing beyond the last layer: 3/2 there and -1/2 one layer further in give the exact total and the
-    // exact moment.
+    // Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium point
+    // by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies half a spacing beyond the last
+    // layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
     std::array<int, 3> step{};
     for (std::size_t k = 0; k < 3; ++k) step[k] = lattice->axis[k] == axis ? static_cast<int>(outward) : 0;
     const std::int64_t shift = lattice->shift(step);
@@ -161,13 +163,31 @@ std::vector<double> BodyProblem::face_shares(const Body& body, const LoadDescrip
       }
       return body.alive(static_cast<std::size_t>(p + sign * shift));
     };
+    const KinematicsTraits traits = kinematics_->traits();
+    const bool exact = traits.at != EvaluationPoints::pairs && traits.force_state == ForceState::variational;
+    const Field areas = exact ? face_areas(body, kinematics_, influence_, axis) : Field();
+    const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / dx));   // that a face is felt in
+    const double area = body.uniform_volume() / dx;
+    double total = 0, wanted = 0;
     for (const std::int32_t p : points) {
       if (alive(p, 1)) continue;
-      const bool inner = alive(p, -1);
-      const double area = body.uniform_volume() / dx;
-      shares[p] += inner ? 1.5 * area : area;
-      if (inner) shares[static_cast<std::int32_t>(p - shift)] -= 0.5 * area;
+      wanted += area;
+      std::int64_t depth = 1;   // of the column, as far as it matters
+      while (depth < 2 * layers && alive(p - (depth - 1) * shift, -1)) ++depth;
+      if (!exact || depth == 1) {
+        shares[p] += depth > 1 ? 1.5 * area : area;
+        if (depth > 1) shares[static_cast<std::int32_t>(p - shift)] -= 0.5 * area;
+        total += area;
+        continue;
+      }
+      // What is nearer to the opposite face belongs to that one.
+      for (std::int64_t k = 0; k < std::min(layers, depth / 2); ++k) {
+        const double own = outward * areas.data()[p - k * shift];
+        shares[static_cast<std::int32_t>(p - k * shift)] += own;
+        total += own;
+      }
     }
+    for (auto& [p, value] : shares) value *= wanted / total;
   } else {
     // A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
     // the set holds a second layer, linear weights over both put the resultant on the face.
