@@ -108,8 +108,8 @@ const Fault faults[]{
      "found true", "only with energy_release_rate"},
     {"kinematics", "type", "\"bond_associated\"", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 1001, "damage",
      "found with kinematics \"bond_associated\"", "pair laws"},
-    {"integrator", "type", "\"newton\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 1001, "damage",
-     "found with integrator \"newton\"", "dynamic runs"},
+    {"kinematics", "type", "\"baqp\"\norder = 2", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 1001, "damage",
+     "found with kinematics \"baqp\"", "order 1"},
     {"kinematics", "type", "\"conventional\"\nstabilization = \"wan\"", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n",
      1001, "damage", "found with kinematics.stabilization", "kinematics without one"},
     // conditions
