@@ -160,7 +160,7 @@ double quantile(std::vector<Stretched> all, double share) {
 bool suits(const Example& example, int dimension) {
   const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
   const KinematicsTraits traits = kinematics->traits();
-  if (traits.at != EvaluationPoints::weighted && traits.order == 1) return true;
+  if (traits.force_state == ForceState::variational && (traits.order == 1 || (traits.at == EvaluationPoints::points && example.stabilization.empty()))) return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
 }
@@ -168,10 +168,10 @@ bool suits(const Example& example, int dimension) {
 }  // namespace
 
 TEST_CASE("kinematics: a body whose bonds have failed is the body that was built without them") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud};
         const auto whole = build(scene_text(options, kinematics_table(example)));
@@ -203,10 +203,10 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
 }
 
 TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bonds that fail at random") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud};
         const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -259,9 +259,9 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
 }
 
 TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine motion, momentum") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const int d : {1, 2, 3}) {
-      INFO(example.part, " (", example.table, "), ", d, "D");
+      INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D");
       if (!suits(example, d)) continue;
       BodyOptions options{.dimension = d, .cloud = true};
       const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -293,11 +293,11 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
 }
 
 TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a fragment") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {2, 3})
         for (const double share : {0.5, 0.6}) {
-          INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share, " of the bonds within the limit");
+          INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share, " of the bonds within the limit");
           if (!suits(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -333,10 +333,10 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
 }
 
 TEST_CASE("kinematics: points without bonds are free masses") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
@@ -356,9 +356,9 @@ TEST_CASE("kinematics: points without bonds are free masses") {
 }
 
 TEST_CASE("kinematics: a scene without damage pays nothing") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true}) {
-      INFO(example.part, " (", example.table, ") ", cloud ? "cloud" : "lattice");
+      INFO(example.part, " (", example.table, example.stabilization, ") ", cloud ? "cloud" : "lattice");
       if (!suits(example, 2)) continue;
       BodyOptions options{.dimension = 2, .cloud = cloud};
       const auto plain = build(scene_text(options, kinematics_table(example)));

@@ -38,9 +38,9 @@ void BodyProblem::read_damage() {
   if (partition_) refuse("a body on several ranks", "one rank");
   if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene_.stabilization) refuse("kinematics.stabilization", "kinematics without one");
-  if (traits.at == EvaluationPoints::weighted || traits.order > 1) {
-    refuse(fmt::format("kinematics \"{}\", whose stencils are made once", scene_.kinematics->type), "pair laws, and kinematics over the point gradient of order 1");
+  if (scene_.stabilization && traits.order > 1) refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
+  if (traits.at == EvaluationPoints::bonds && traits.order > 1) {
+    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, traits.order), "order 1");
   }
   damage_ = std::make_unique<BodyDamage>();
   damage_->law = damage_law_;

@@ -48,12 +48,19 @@ void AssemblingModel::watch_bonds(BondState& state) { fracture_.emplace(*parts_.
 BondUpdate AssemblingModel::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
   return fracture_->update(
-      u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks); },
-      [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
+      u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks) + (penalty_ ? penalty_->energy_of(at, marks) : 0.0); }, changed());
+}
+
+Fracture::Changed AssemblingModel::changed() {
+  return [this](std::span<const std::int32_t> points) {
+    std::vector<BondChange> fragments = bonds_changed(points);
+    if (penalty_) penalty_->bonds_changed(points);
+    return fragments;
+  };
 }
 
 void AssemblingModel::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
+  if (fracture_) fracture_->restore(changes, changed());
 }
 
 namespace {

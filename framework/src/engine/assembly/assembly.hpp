@@ -8,6 +8,7 @@
 
 #include "engine/assembly/block_pattern.hpp"
 #include "engine/bond_state.hpp"
+#include "engine/zero_energy_penalty.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/engine/model.hpp"
 
@@ -49,11 +50,14 @@ class AssemblingModel : public Model {
   BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) final;
   std::vector<BondChange> changed_bonds() const final { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
   void restore_bonds(std::span<const BondChange> changes) final;
+  /// A penalty on top of this model changes with the bonds too. It must outlive the model's last update.
+  void watch_bonds_of(ZeroEnergyPenalty& penalty) noexcept { penalty_ = &penalty; }
   BondChecks bond_checks() const final { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
  protected:
   explicit AssemblingModel(const ModelParts& parts) : parts_(parts) {}
   virtual std::unique_ptr<Assembly> make_assembly(const ModelParts& parts) const;
+  Fracture::Changed changed();
   /// With [damage], once the families are there.
   void watch_bonds(BondState& state);
   const Fracture* fracture() const noexcept { return fracture_ ? &*fracture_ : nullptr; }
@@ -72,6 +76,7 @@ class AssemblingModel : public Model {
   ModelParts parts_;
   std::unique_ptr<Assembly> assembly_;
   std::optional<Fracture> fracture_;
+  ZeroEnergyPenalty* penalty_ = nullptr;   ///< null: none
   std::size_t assembled_version_ = 0;   ///< of the bonds that the assembly knows
 };
 
