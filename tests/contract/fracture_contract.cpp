@@ -160,7 +160,9 @@ double quantile(std::vector<Stretched> all, double share) {
 bool suits(const Example& example, int dimension) {
   const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
   const KinematicsTraits traits = kinematics->traits();
-  if (traits.force_state == ForceState::variational && (traits.order == 1 || (traits.at == EvaluationPoints::points && example.stabilization.empty()))) return true;
+  if (traits.force_state == ForceState::variational &&
+      (traits.order == 1 || (traits.at == EvaluationPoints::points && example.stabilization.empty())))
+    return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
 }
@@ -267,7 +269,8 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
       const auto plain = build(scene_text(options, kinematics_table(example)));
       stretch_at_random(plain->problem().body(), plain->problem().displacement(), 17);
       const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().displacement());
-      options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n", quantile(all, 0.5), quantile(all, 0.97));
+      options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n",
+                                       quantile(all, 0.5), quantile(all, 0.97));
       const std::string text = scene_text(options, kinematics_table(example));
       const auto simulation = build(text);
       BodyProblem& problem = simulation->problem();
@@ -282,7 +285,8 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
       CHECK(left.energy < intact.energy);
       CHECK(slope_error(problem, left) <= 1e-6);
       CHECK(tangent_difference(problem) <= 1e-12);
-      for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
+      for (int c = 0; c < d; ++c)
+        CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
       const auto other = build(text);
       other->problem().restore(problem.snapshot());
       const Response same = respond(other->problem(), 17);
@@ -297,7 +301,8 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
     for (const bool cloud : {false, true})
       for (const int d : {2, 3})
         for (const double share : {0.5, 0.6}) {
-          INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share, " of the bonds within the limit");
+          INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share,
+               " of the bonds within the limit");
           if (!suits(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));

@@ -10,7 +10,7 @@ namespace perikit::contract {
 class WitnessProblem final : public Problem {
  public:
   explicit WitnessProblem(BodyProblem& other) : other_(other) {}
-  std::function<void()> before, after;   ///< of advance_history
+  std::function<void()> before, after;  ///< of advance_history
 
   bool advance_history(double time_step, ConstFieldView velocity) override {
     if (before) before();
@@ -28,7 +28,9 @@ class WitnessProblem final : public Problem {
   FieldView internal_force() noexcept override { return other_.internal_force(); }
   FieldView external_force() noexcept override { return other_.external_force(); }
   FieldView declare(const std::string& name, int components) override { return other_.declare(name, components); }
-  std::span<double> declare_numbers(const std::string& name, std::size_t count) override { return other_.declare_numbers(name, count); }
+  std::span<double> declare_numbers(const std::string& name, std::size_t count) override {
+    return other_.declare_numbers(name, count);
+  }
   double& time() noexcept override { return other_.time(); }
   std::int64_t& step() noexcept override { return other_.step(); }
   Energies& energies() noexcept override { return other_.energies(); }
@@ -39,7 +41,9 @@ class WitnessProblem final : public Problem {
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
     return other_.evaluate_forces(u, force, energy, time_step);
   }
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return other_.tangent_action(u, w, Kw); }
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    return other_.tangent_action(u, w, Kw);
+  }
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return other_.assemble_tangent(u, K); }
   AssembledSize assembled_size() override { return other_.assembled_size(); }
   void evaluate_loads(double t, FieldView force) override { other_.evaluate_loads(t, force); }
@@ -50,7 +54,9 @@ class WitnessProblem final : public Problem {
   bool any_constraint() const noexcept override { return other_.any_constraint(); }
   std::span<const std::int64_t> constrained() const noexcept override { return other_.constrained(); }
   ConstFieldView free_mask() const noexcept override { return other_.free_mask(); }
-  void prescribe_half_step_velocity(double t_begin, double t_end, FieldView v) override { other_.prescribe_half_step_velocity(t_begin, t_end, v); }
+  void prescribe_half_step_velocity(double t_begin, double t_end, FieldView v) override {
+    other_.prescribe_half_step_velocity(t_begin, t_end, v);
+  }
   void prescribe_velocity(double t, FieldView v) override { other_.prescribe_velocity(t, v); }
   void prescribe_displacement(double t, FieldView u) override { other_.prescribe_displacement(t, u); }
   double largest_eigenvalue(ConstFieldView u) override { return other_.largest_eigenvalue(u); }

@@ -1,4 +1,5 @@
-/// Cracks in quasi-static runs: the plate with a hole of Hashim et al., section 4.5, on coarse lattices, steps that are given up, and limits.
+/// Cracks in quasi-static runs: the plate with a hole of Hashim et al., section 4.5, on coarse lattices, steps that are given up,
+/// and limits.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -49,7 +50,8 @@ class Refusing final : public EquilibriumSolver {
 }  // namespace
 
 TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sides") {
-  for (const char* damage : {"{type=\"smooth_degradation\",stretch_min=0.0015,stretch=0.002,no_fail=[\"left\",\"right\"]}", "{type=\"critical_stretch\",stretch=0.002,no_fail=[\"left\",\"right\"]}"}) {
+  for (const char* damage : {"{type=\"smooth_degradation\",stretch_min=0.0015,stretch=0.002,no_fail=[\"left\",\"right\"]}",
+                             "{type=\"critical_stretch\",stretch=0.002,no_fail=[\"left\",\"right\"]}"}) {
     INFO(std::string(damage));
     const auto simulation = plate_with_hole({fmt::format("damage={}", damage)}, 2.5e-3);
     BodyProblem& problem = simulation->problem();
@@ -60,7 +62,9 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
     witness.after = [&] {
       if (first_radius > 0 || problem.model().changed_bonds().empty()) return;
       const Field lost = problem.model().damage();
-      const std::int32_t worst = *std::max_element(body.internal().begin(), body.internal().end(), [&](std::int32_t a, std::int32_t b) { return lost.data()[a] < lost.data()[b]; });
+      const std::int32_t worst =
+          *std::max_element(body.internal().begin(), body.internal().end(),
+                            [&](std::int32_t a, std::int32_t b) { return lost.data()[a] < lost.data()[b]; });
       const Point x = body.position(static_cast<std::size_t>(worst));
       first_x = std::abs(x[0]);
       first_radius = std::hypot(x[0], x[1]);
@@ -90,12 +94,14 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
       if (std::abs(body.position(static_cast<std::size_t>(p))[0]) > 0.025) CHECK(lost.data()[p] < 0.05);
     CHECK(std::abs(validation::pull(*simulation, "right", 0)) <= 1e-6 * peak);
     const Energies& e = problem.energies();
-    CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 1e-3 * e.external_work, "work ", e.external_work, ", dissipated ", e.dissipated);
+    CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 1e-3 * e.external_work, "work ", e.external_work,
+                  ", dissipated ", e.dissipated);
   }
 }
 
 TEST_CASE("plate with a hole: the paper's second solver, dynamic relaxation, finds the same crack") {
-  const auto newton = plate_with_hole({}), relaxed = plate_with_hole({"integrator={type=\"dynamic_relaxation\",steps=15,tolerance=1e-8}"});
+  const auto newton = plate_with_hole({}),
+             relaxed = plate_with_hole({"integrator={type=\"dynamic_relaxation\",steps=15,tolerance=1e-8}"});
   run(*newton);
   run(*relaxed);
   const Field a = newton->problem().model().damage(), b = relaxed->problem().model().damage();
@@ -139,21 +145,26 @@ TEST_CASE("a step that is given up between two equilibria gives its bonds back")
   CHECK(refusals == 1);
   CHECK(!check);
   // The step that was given up came again at half its length.
-  const bool halved = std::any_of(watch.reports.begin(), watch.reports.end(), [](const StepReport& report) { return report.step > 0 && report.time_step == 0.125; });
+  const bool halved = std::any_of(watch.reports.begin(), watch.reports.end(),
+                                  [](const StepReport& report) { return report.step > 0 && report.time_step == 0.125; });
   CHECK(halved);
 }
 
 TEST_CASE("bond_rounds ends a run that breaks on, with load parameter and key") {
   const auto simulation = plate_with_hole({"integrator.bond_rounds=2"});
   Protocol protocol;
-  CHECK_THROWS_WITH_AS(simulation->run(protocol), doctest::Contains("newton: bonds go on failing at load parameter 0."), RunError);
+  CHECK_THROWS_WITH_AS(simulation->run(protocol), doctest::Contains("newton: bonds go on failing at load parameter 0."),
+                       RunError);
   CHECK(protocol.reports.back().time > 0);
   CHECK(protocol.reports.back().time < 1);
   CHECK(protocol.text.find("bonds fail, round   2") != std::string::npos);
 }
 
 TEST_CASE("a body that falls apart under a load has no equilibrium, and the run says so") {
-  const auto simulation = plate_with_hole({"integrator.steps=4", "integrator.cut_backs=2", "boundary=[{set=\"left\",displacement=[0,0]}]", "load=[{set=\"right\",force=[1.2e7,0]}]"});
+  const auto simulation =
+      plate_with_hole({"integrator.steps=4", "integrator.cut_backs=2", "boundary=[{set=\"left\",displacement=[0,0]}]",
+                       "load=[{set=\"right\",force=[1.2e7,0]}]"});
   Protocol protocol;
-  CHECK_THROWS_WITH_AS(simulation->run(protocol), doctest::Contains("newton: no equilibrium found beyond load parameter"), RunError);
+  CHECK_THROWS_WITH_AS(simulation->run(protocol), doctest::Contains("newton: no equilibrium found beyond load parameter"),
+                       RunError);
 }

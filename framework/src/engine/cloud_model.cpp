@@ -414,7 +414,8 @@ EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) 
 
 template <int D>
 double CloudModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
-  return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
+  return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(),
+                    [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
@@ -426,8 +427,11 @@ ModelReport CloudModel<D>::report() const {
   report.fallbacks = fallbacks_;
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
-  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
-                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() + pressure_.size()) * sizeof(Row) +
+  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) +
+                 scale_.size() * sizeof(double) +
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() +
+                  pressure_.size()) *
+                     sizeof(Row) +
                  scratch_.bytes() + this->fracture_bytes();
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {

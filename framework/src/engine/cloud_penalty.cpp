@@ -21,8 +21,13 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 
  public:
   CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
-      : model_(model), families_(model.families()), position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
-        points_(parts.body->points()), parts_(parts), M_(columns * points_, Column{}), flux_(D * points_) {
+      : model_(model),
+        families_(model.families()),
+        position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
+        points_(parts.body->points()),
+        parts_(parts),
+        M_(columns * points_, Column{}),
+        flux_(D * points_) {
     if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists, points_));
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
@@ -89,7 +94,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     double intact = 0, M[6];
     for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
     const double damage = families_.damage.data()[p];
-    parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, intact, damage, families_.normaliser[p], inverse), M);
+    parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, intact, damage, families_.normaliser[p], inverse),
+                                  M);
     if constexpr (isotropic) {
       M_[p] = M[0];
     } else {

@@ -467,7 +467,8 @@ EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples
 
 template <int D>
 double LatticeModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
-  return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_, [&](Pass& pass) { return run(pass); });
+  return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_,
+                    [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
@@ -491,9 +492,9 @@ ModelReport LatticeModel<D>::report() const {
   report.broken_bonds = families_.broken - families_.failed;
   report.singular_families = families_.singular;
   report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
-  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() +
-                 volume_.bytes() + pressure_.bytes() + scratch_.bytes() + (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) +
-                 this->fracture_bytes();
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() +
+                 direction_.bytes() + scale_.bytes() + volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
+                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + this->fracture_bytes();
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);

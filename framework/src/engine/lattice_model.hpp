@@ -36,7 +36,9 @@ class LatticeModel final : public AssemblingModel {
 
  private:
   double energy_of(ConstFieldView u, const GroupMarks& marks) override;
-  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override { return families_.fragment_bonds(points); }
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override {
+    return families_.fragment_bonds(points);
+  }
   EvaluationStatus run(Pass& pass);
   void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;
   void points_block(std::size_t b, Pass& pass);
@@ -69,7 +71,7 @@ class LatticeModel final : public AssemblingModel {
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
   QuietBlocks quiet_;
-  std::optional<LatticeBonds> bonds_;              ///< only with damage
+  std::optional<LatticeBonds> bonds_;  ///< only with damage
   ScratchPool scratch_;
 };
 

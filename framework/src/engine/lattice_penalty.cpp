@@ -21,8 +21,14 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 
  public:
   LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
-      : model_(model), families_(model.families()), operator_(families_), parts_(parts), M_(parts.body->make_field(Matrix::components)),
-        B_(parts.body->make_field(Matrix::components)), flux_(parts.body->make_field(D * D)), source_(parts.body->make_field(D)) {
+      : model_(model),
+        families_(model.families()),
+        operator_(families_),
+        parts_(parts),
+        M_(parts.body->make_field(Matrix::components)),
+        B_(parts.body->make_field(Matrix::components)),
+        flux_(parts.body->make_field(D * D)),
+        source_(parts.body->make_field(D)) {
     if (parts.skip) quiet_ = QuietBlocks(families_.reach);
     const std::size_t blocks = families_.blocks.size();
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(chunk); }); });
@@ -118,7 +124,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         if (LatticeFamilies::intact(pattern, s, l)) intact += families_.omega[s];
       families_.inverse_shape(pattern, l, inverse);
       const double V = families_.volume;
-      parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
+      parts_.stabilization->penalty(
+          penalty_point(*parts_.body, *parts_.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
       for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
     }
   }

@@ -80,7 +80,7 @@ class LocalStencil {
   AlignedVector<double> inverse_;  ///< K_q^-1: [entry * lanes_ + q]; 0 where q is dropped
   AlignedVector<double> stress_;   ///< P_q K_q^-1: [component * lanes_ + q]
   AlignedVector<double> share_;
-  AlignedVector<double> whole_;    ///< omega without b
+  AlignedVector<double> whole_;  ///< omega without b
   std::vector<std::uint8_t> regular_;
 };
 

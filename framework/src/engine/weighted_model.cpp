@@ -45,7 +45,8 @@ void WeightedModel<D>::prepare_damage() {
   for (std::size_t b = 0; b + 1 < block_first_.size(); ++b)
     for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g)
       for (std::uint8_t l = 0; l < groups_[g].count; ++l)
-        place_[static_cast<std::size_t>(members_[groups_[g].first + l])] = {static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(g), l, false};
+        place_[static_cast<std::size_t>(members_[groups_[g].first + l])] = {static_cast<std::uint32_t>(b),
+                                                                            static_cast<std::uint32_t>(g), l, false};
 }
 
 template <int D>
@@ -68,8 +69,10 @@ std::vector<BondChange> WeightedModel<D>::bonds_changed(std::span<const std::int
     groups_[place.group].live ^= static_cast<std::uint8_t>(1u << place.lane);
     std::vector<std::int32_t>& left = left_[place.block];
     const auto entry = std::lower_bound(left.begin(), left.end(), p);
-    if (place.left) left.insert(entry, p);
-    else left.erase(entry);
+    if (place.left)
+      left.insert(entry, p);
+    else
+      left.erase(entry);
     singles_ = true;
   }
   return fragments;
@@ -78,7 +81,8 @@ std::vector<BondChange> WeightedModel<D>::bonds_changed(std::span<const std::int
 template <int D>
 double WeightedModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
   const BondState& bonds = lattice_ ? static_cast<const BondState&>(*lattice_bonds_) : cloud_->bond_state();
-  return run_energy(body_, laws_, traits_.selective, block_first_.size() - 1, u, marks, bonds, [&](Pass& pass) { return run(pass); });
+  return run_energy(body_, laws_, traits_.selective, block_first_.size() - 1, u, marks, bonds,
+                    [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
@@ -107,7 +111,9 @@ void WeightedModel<D>::load_own_family(std::int32_t p, Memory& m) const {
   }
   m.family.resize(D, static_cast<int>(kept));
   m.family.integrity.resize(m.family.size);
-  if (std::all_of(m.family.integrity.begin(), m.family.integrity.begin() + static_cast<std::ptrdiff_t>(kept), [](double b) { return b == 1; })) m.family.integrity.clear();
+  if (std::all_of(m.family.integrity.begin(), m.family.integrity.begin() + static_cast<std::ptrdiff_t>(kept),
+                  [](double b) { return b == 1; }))
+    m.family.integrity.clear();
   set_cloud_shares(at, m);
 }
 

@@ -21,8 +21,8 @@ namespace perikit {
 /// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its
 /// mirrors, and up to eight of them are evaluated at a time. Points of a cloud with few evaluation points keep their stencils,
 /// without the bonds that an evaluation point does not see. With an evaluation point at every bond, points of a cloud, of rare
-/// classes, and of classes beyond a cap in bytes make their stencil when they need it. So does a point whose bonds have failed: it leaves
-/// its group.
+/// classes, and of classes beyond a cap in bytes make their stencil when they need it. So does a point whose bonds have failed:
+/// it leaves its group.
 template <int D>
 class WeightedModel final : public AssemblingModel {
  public:
@@ -131,11 +131,11 @@ class WeightedModel final : public AssemblingModel {
   struct Place {
     std::uint32_t block, group;
     std::uint8_t lane;
-    bool left;            ///< its bonds have failed: it makes its own stencil
+    bool left;  ///< its bonds have failed: it makes its own stencil
   };
   std::optional<LatticeBonds> lattice_bonds_;
-  std::vector<Place> place_;                       ///< by point
-  std::vector<std::vector<std::int32_t>> left_;    ///< by block: points that have left their group, ascending
+  std::vector<Place> place_;                     ///< by point
+  std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;

@@ -38,9 +38,12 @@ void BodyProblem::read_damage() {
   if (partition_) refuse("a body on several ranks", "one rank");
   if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene_.stabilization && traits.order > 1) refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
+  if (scene_.stabilization && traits.order > 1)
+    refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
   if (traits.at == EvaluationPoints::bonds && traits.order > 1) {
-    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, traits.order), "order 1");
+    refuse(
+        fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, traits.order),
+        "order 1");
   }
   damage_ = std::make_unique<BodyDamage>();
   damage_->law = damage_law_;
@@ -80,7 +83,8 @@ EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K)
   const auto d = static_cast<std::size_t>(K.dimension);
   const auto diagonal = [&](std::size_t row) {
     const auto begin = K.column.begin() + K.row_first[row], end = K.column.begin() + K.row_first[row + 1];
-    return K.values.data() + static_cast<std::size_t>(std::lower_bound(begin, end, static_cast<std::int32_t>(row)) - K.column.begin()) * d * d;
+    return K.values.data() +
+           static_cast<std::size_t>(std::lower_bound(begin, end, static_cast<std::int32_t>(row)) - K.column.begin()) * d * d;
   };
   double sum = 0;
   for (std::size_t row = 0; row < K.rows(); ++row)
@@ -119,8 +123,10 @@ std::string BodyProblem::fracture_summary() const {
   const BondChecks checks = model_->bond_checks();
   std::string text = fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, energies_.dissipated);
   if (checks.groups > 0) {
-    text += fmt::format("bond checks   {} of {} groups of eight points in {} updates ({:.2f} %); the others were too far from failing\n", checks.checked, checks.groups,
-                        checks.updates, 100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
+    text += fmt::format(
+        "bond checks   {} of {} groups of eight points in {} updates ({:.2f} %); the others were too far from failing\n",
+        checks.checked, checks.groups, checks.updates,
+        100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
   }
   if (gains_ > 0) {
     text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all ({:.3g} of what was dissipated)\n", gains_, gained_,

@@ -15,7 +15,10 @@ ParameterTable load_step_parameters(std::int64_t max_iterations) {
   table.number("tolerance", "-", "Out-of-balance force over the norm of reactions and loads.").by_default("1.0e-8").positive().below(1.0);
   table.integer("max_iterations", "Iterations of a step before it is cut back.").by_default(fmt::to_string(max_iterations)).at_least(1).at_most(1e9);
   table.integer("cut_backs", "Halvings of a planned step before the run gives up.").by_default("10").at_least(0).at_most(30);
-  table.integer("bond_rounds", "With [damage]: times that bonds may fail, each followed by a new equilibrium, at one load; beyond, the run gives up.")
+  table
+      .integer(
+          "bond_rounds",
+          "With [damage]: times that bonds may fail, each followed by a new equilibrium, at one load; beyond, the run gives up.")
       .by_default("1000")
       .at_least(1)
       .at_most(1e9);
@@ -23,22 +26,32 @@ ParameterTable load_step_parameters(std::int64_t max_iterations) {
 }
 
 LoadStepOptions load_step_options(const ParameterValues& values) {
-  return {values.integer("steps"), values.number("tolerance"), values.integer("max_iterations"), values.integer("cut_backs"), values.integer("bond_rounds")};
+  return {values.integer("steps"), values.number("tolerance"), values.integer("max_iterations"), values.integer("cut_backs"),
+          values.integer("bond_rounds")};
 }
 
 namespace {
 
-/// Bonds that weaken gradually do so less and less at one load, and never cease to. What puts the body out of balance by less than this
-/// share of the largest reference of the run is left to the next step.
+/// Bonds that weaken gradually do so less and less at one load, and never cease to. What puts the body out of balance by less
+/// than this share of the largest reference of the run is left to the next step.
 constexpr double negligible = 1e-6;
 
 class LoadSteps {
  public:
-  LoadSteps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver)
-      : integrator_(integrator), options_(options), problem_(problem), observer_(observer), solver_(solver),
-        equilibrium_(problem, options.tolerance), u_(problem.displacement()), last_increment_(problem.declare("load_step_increment", problem.dimension())),
-        residual_(problem.make_field(problem.dimension())), driving_(problem.make_field(problem.dimension())),
-        old_driving_(problem.make_field(problem.dimension())), start_(problem.make_field(problem.dimension())),
+  LoadSteps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer,
+            EquilibriumSolver& solver)
+      : integrator_(integrator),
+        options_(options),
+        problem_(problem),
+        observer_(observer),
+        solver_(solver),
+        equilibrium_(problem, options.tolerance),
+        u_(problem.displacement()),
+        last_increment_(problem.declare("load_step_increment", problem.dimension())),
+        residual_(problem.make_field(problem.dimension())),
+        driving_(problem.make_field(problem.dimension())),
+        old_driving_(problem.make_field(problem.dimension())),
+        start_(problem.make_field(problem.dimension())),
         numbers_(problem.declare_numbers("load_steps", 5)) {}
 
   void run() {
@@ -131,7 +144,8 @@ class LoadSteps {
     copy(equilibrium_.displacement(), u_);
   }
 
-  /// Lets bonds fail at the equilibrium that was found, and finds equilibrium again at the same load, until no more fail or what they did is negligible.
+  /// Lets bonds fail at the equilibrium that was found, and finds equilibrium again at the same load, until no more fail or what
+  /// they did is negligible.
   void settle(double span, Solution& solution) {
     const double t = (position() + span) / planned();
     Energies& energies = problem_.energies();
@@ -148,9 +162,11 @@ class LoadSteps {
       equilibrium_.note(fmt::format("  bonds fail, round {:3}: {:.4g} J dissipated so far", round, energies.dissipated));
       if (round > options_.bond_rounds) {
         observer_.log(equilibrium_.take_notes());
-        throw RunError(fmt::format("{}: bonds go on failing at load parameter {:.9g} (after step {}): {} times, each followed by a new equilibrium, as many as bond_rounds allows. "
-                                   "The body may be about to break apart; a crack that has far to run at one load needs more rounds",
-                                   integrator_, t, problem_.step(), options_.bond_rounds));
+        throw RunError(
+            fmt::format("{}: bonds go on failing at load parameter {:.9g} (after step {}): {} times, each followed by a new "
+                        "equilibrium, as many as bond_rounds allows. "
+                        "The body may be about to break apart; a crack that has far to run at one load needs more rounds",
+                        integrator_, t, problem_.step(), options_.bond_rounds));
       }
       const double held = energies.strain - energies.external_work;
       copy(u_, start_);
@@ -167,7 +183,7 @@ class LoadSteps {
 
   void accept(double span, const Solution& solution) {
     position() += span;
-    last_span() = continues_ ? span : 0;   // the path has a kink where bonds have failed
+    last_span() = continues_ ? span : 0;  // the path has a kink where bonds have failed
     increment() = std::min(1.0, 2 * span);
     problem_.time() = position() / planned();
     ++problem_.step();
@@ -229,8 +245,8 @@ class LoadSteps {
   FieldView u_, last_increment_;
   Field residual_, driving_, old_driving_, start_;
   std::span<double> numbers_;
-  bool continues_ = true;                                     ///< no bond has failed in the last step
-  std::vector<std::byte> bonds_;                              ///< at the beginning of the step; empty without [damage]
+  bool continues_ = true;         ///< no bond has failed in the last step
+  std::vector<std::byte> bonds_;  ///< at the beginning of the step; empty without [damage]
   Field first_u_, first_driving_, first_increment_;
   Energies first_;
 };

@@ -15,7 +15,7 @@ struct LoadStepOptions {
   double tolerance = 1e-8;        ///< of the residual, relative to reactions and loads
   std::int64_t max_iterations = 25;
   std::int64_t cut_backs = 10;    ///< halvings of a planned step before the run gives up
-  std::int64_t bond_rounds = 1000;   ///< times that bonds may fail at one load
+  std::int64_t bond_rounds = 1000;  ///< times that bonds may fail at one load
 };
 
 /// A table with the keys steps, tolerance, max_iterations, cut_backs, bond_rounds. `max_iterations`: its default.
@@ -46,12 +46,13 @@ class EquilibriumSolver {
 /// continuation of the last one. A step that does not converge or meets an inadmissible deformation is halved, at most
 /// `cut_backs` times; every success doubles the step again, up to the planned one. Work of loads and prescribed
 /// displacements by the trapezoidal rule.
-/// With [damage] bonds fail at equilibria only, and then equilibrium is found again at the same load, until no more fail, or those that did
-/// put the body out of balance by less than 1e-6 of the largest reference so far: then the step counts, in equilibrium with the bonds it leaves. What the body sets free on its way from one equilibrium to the next, bonds
-/// apart, would become motion; a run without inertia counts it as dissipated. A step that is given up between two equilibria gives
-/// its bonds back. Steps, the last increment and the load parameter are kept with the problem, so that a
-/// restored run continues to the bit.
-/// Throws RunError when the smallest step fails, or bonds have failed bond_rounds times at one load, with load parameter, step and reason.
+/// With [damage] bonds fail at equilibria only, and then equilibrium is found again at the same load, until no more fail, or
+/// those that did put the body out of balance by less than 1e-6 of the largest reference so far: then the step counts, in
+/// equilibrium with the bonds it leaves. What the body sets free on its way from one equilibrium to the next, bonds apart, would
+/// become motion; a run without inertia counts it as dissipated. A step that is given up between two equilibria gives its bonds
+/// back. Steps, the last increment and the load parameter are kept with the problem, so that a restored run continues to the bit.
+/// Throws RunError when the smallest step fails, or bonds have failed bond_rounds times at one load, with load parameter, step
+/// and reason.
 void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver);
 
 }  // namespace perikit

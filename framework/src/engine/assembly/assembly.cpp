@@ -43,12 +43,18 @@ EvaluationStatus AssemblingModel::assemble(ConstFieldView u, BlockMatrix& K) {
   return own.assemble(u, K);
 }
 
-void AssemblingModel::watch_bonds(BondState& state) { fracture_.emplace(*parts_.body, *parts_.damage, state, parts_.skip); }
+void AssemblingModel::watch_bonds(BondState& state) {
+  fracture_.emplace(*parts_.body, *parts_.damage, state, parts_.skip);
+}
 
 BondUpdate AssemblingModel::update_bonds(ConstFieldView u, const Motion& motion) {
   if (!fracture_) return {};
   return fracture_->update(
-      u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks) + (penalty_ ? penalty_->energy_of(at, marks) : 0.0); }, changed());
+      u, motion,
+      [&](ConstFieldView at, const GroupMarks& marks) {
+        return energy_of(at, marks) + (penalty_ ? penalty_->energy_of(at, marks) : 0.0);
+      },
+      changed());
 }
 
 Fracture::Changed AssemblingModel::changed() {

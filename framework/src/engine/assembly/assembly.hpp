@@ -76,8 +76,8 @@ class AssemblingModel : public Model {
   ModelParts parts_;
   std::unique_ptr<Assembly> assembly_;
   std::optional<Fracture> fracture_;
-  ZeroEnergyPenalty* penalty_ = nullptr;   ///< null: none
-  std::size_t assembled_version_ = 0;   ///< of the bonds that the assembly knows
+  ZeroEnergyPenalty* penalty_ = nullptr;  ///< null: none
+  std::size_t assembled_version_ = 0;     ///< of the bonds that the assembly knows
 };
 
 /// First inadmissible point of loops over blocks: the smallest field index that any thread reports.

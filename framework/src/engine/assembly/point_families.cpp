@@ -62,10 +62,14 @@ void PointFamilies::set_bonds(std::span<const BondChange> changes) {
   whole_ = first_.whole;
   weakened_ = false;
   std::vector<std::size_t> ends;
-  const auto row_of = [&](std::int32_t p) { return static_cast<std::size_t>(std::lower_bound(point_.begin(), point_.end(), p) - point_.begin()); };
+  const auto row_of = [&](std::int32_t p) {
+    return static_cast<std::size_t>(std::lower_bound(point_.begin(), point_.end(), p) - point_.begin());
+  };
   const auto lower = [&](std::size_t row, std::size_t far, double b) {
     const auto family = neighbours(row);
-    integrity_[first(row) + static_cast<std::size_t>(std::lower_bound(family.begin(), family.end(), static_cast<std::int32_t>(far)) - family.begin())] = b;
+    integrity_[first(row) +
+               static_cast<std::size_t>(std::lower_bound(family.begin(), family.end(), static_cast<std::int32_t>(far)) -
+                                        family.begin())] = b;
     ends.push_back(row);
   };
   for (const BondChange& c : changes) {
@@ -117,12 +121,14 @@ void PointFamilies::load_first(std::size_t row, FamilyArrays& out) const {
 void PointFamilies::bond_shares(std::size_t row, const FamilyArrays& family, AlignedVector<double>& share) const {
   share.assign(family.size, 0.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k)
-    share[k] = family.volume[k] * (weight_ == BondWeight::kernel ? family.omega[k] : integrity(first(row) + k)) / normaliser_[row];
+    share[k] =
+        family.volume[k] * (weight_ == BondWeight::kernel ? family.omega[k] : integrity(first(row) + k)) / normaliser_[row];
 }
 
 std::size_t PointFamilies::bytes() const noexcept {
   return (lattice_ ? lattice_->bytes() : cloud_->bytes()) + rows() * 4 + lattice_lists_.neighbour.size() * 6 +
-         lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size() + (integrity_.size() + first_.damage.size() + first_.inverse.size()) * 8 + first_.whole.size();
+         lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size() +
+         (integrity_.size() + first_.damage.size() + first_.inverse.size()) * 8 + first_.whole.size();
 }
 
 bool point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {

@@ -67,7 +67,7 @@ class PointFamilies {
   struct First {
     AlignedVector<double> damage, inverse;
     std::vector<std::uint8_t> whole;
-  } first_;                          ///< of the set-up
+  } first_;  ///< of the set-up
 };
 
 /// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:
