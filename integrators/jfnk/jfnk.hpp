@@ -26,6 +26,9 @@ class KrylovEquations final : public LinearisedProblem {
   bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
   bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) override;
   bool exact() const noexcept override { return false; }
+  void bonds_changed() override {
+    if (preconditioner_) preconditioner_->discard();
+  }
 
  private:
   struct SolverDeleter {

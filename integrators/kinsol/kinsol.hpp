@@ -31,6 +31,9 @@ class KinsolSolver final : public EquilibriumSolver {
   KinsolSolver(const KinsolSolver&) = delete;
   KinsolSolver& operator=(const KinsolSolver&) = delete;
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
+  void bonds_changed() override {
+    if (preconditioner_) preconditioner_->discard();
+  }
 
  private:
   struct SolverDeleter {

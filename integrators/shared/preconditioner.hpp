@@ -22,6 +22,8 @@ class Preconditioner {
   bool prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
   /// z <- M^-1 r, 0 on prescribed components; r and z may be the same field.
   virtual void apply(ConstFieldView r, FieldView z) = 0;
+  /// To be made anew before the next solve.
+  void discard() noexcept { made() = in_hand_ = false; }
   /// Iterations that a solve took.
   void took(int iterations);
 

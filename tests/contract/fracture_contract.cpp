@@ -70,6 +70,62 @@ double difference(const Body& body, const Field& a, const Field& b) {
   return most;
 }
 
+/// |K w - Kw| of the assembled tangent and the tangent action along noise, relative to Kw.
+double tangent_difference(BodyProblem& problem) {
+  const Body& body = problem.body();
+  Field w = problem.make_field(problem.dimension()), Kw = problem.make_field(problem.dimension());
+  Noise random(21);
+  set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
+  REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
+  const double scale = largest(body, Kw);
+  BlockMatrix K;
+  REQUIRE(problem.model().assemble(problem.displacement(), K).ok());
+  const auto d = static_cast<std::size_t>(K.dimension);
+  for (std::size_t r = 0; r < K.rows(); ++r)
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t c = 0; c < d; ++c)
+          Kw.component(static_cast<int>(a))[K.point[r]] -=
+              K.values[(b * d + a) * d + c] * w.component(static_cast<int>(c))[K.point[static_cast<std::size_t>(K.column[b])]];
+  return largest(body, Kw) / scale;
+}
+
+/// How far the slope of the energy along a random direction is from -force, relative to it.
+double slope_error(BodyProblem& problem, const Response& r) {
+  const int d = problem.dimension();
+  Field w = problem.make_field(d), kept = problem.make_field(d), scratch = problem.make_field(d);
+  Noise random(3);
+  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
+  const FieldView u = problem.displacement();
+  std::copy_n(u.data, u.size(), kept.data());
+  const double h = 1e-5;
+  double energies[2] = {};
+  for (const int side : {0, 1}) {
+    for (std::size_t k = 0; k < u.size(); ++k) u.data[k] = kept.data()[k] + (side == 0 ? -h : h) * w.data()[k];
+    REQUIRE(problem.evaluate_forces(u, scratch, &energies[side]).ok());
+  }
+  std::copy_n(kept.data(), u.size(), u.data);
+  const double expected = -dot(problem.body(), r.force, w);
+  return std::abs((energies[1] - energies[0]) / (2 * h) - expected) / std::abs(expected);
+}
+
+/// Largest difference of sampled gradients of an affine motion from its own, fragments apart.
+double affine_error(BodyProblem& problem) {
+  const int d = problem.dimension();
+  set_field(problem.body(), problem.displacement(), [&](const Point& x) {
+    return d == 1 ? Point{0.1 * x[0]} : Point{0.1 * x[0] - 0.07 * x[1], 0.03 * x[0] - 0.06 * x[1], d == 3 ? 0.05 * x[2] : 0.0};
+  });
+  PointSamples samples;
+  REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+  const Field damage = problem.model().damage();
+  const double G[3][3] = {{0.1, -0.07, 0}, {0.03, -0.06, 0}, {0, 0, 0.05}};
+  double worst = 0;
+  for (const std::int32_t p : problem.body().internal())
+    for (int a = 0; a < d && damage.data()[p] < 1; ++a)
+      for (int b = 0; b < d; ++b) worst = std::max(worst, std::abs(samples.H.component(a * d + b)[p] - G[a][b]));
+  return worst;
+}
+
 struct Stretched {
   std::int32_t point, far;
   double stretch;
@@ -104,7 +160,9 @@ double quantile(std::vector<Stretched> all, double share) {
 bool suits(const Example& example, int dimension) {
   const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
   const KinematicsTraits traits = kinematics->traits();
-  if (traits.at != EvaluationPoints::weighted && traits.order == 1) return true;
+  if (traits.force_state == ForceState::variational &&
+      (traits.order == 1 || (traits.at == EvaluationPoints::points && example.stabilization.empty())))
+    return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
 }
@@ -112,10 +170,10 @@ bool suits(const Example& example, int dimension) {
 }  // namespace
 
 TEST_CASE("kinematics: a body whose bonds have failed is the body that was built without them") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud};
         const auto whole = build(scene_text(options, kinematics_table(example)));
@@ -147,10 +205,10 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
 }
 
 TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bonds that fail at random") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud};
         const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -167,22 +225,11 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.released) <= 1e-11 * intact.energy);
         CHECK(update.dissipated == update.released);
+        // The assembled tangent is the tangent action of the bonds that are left.
+        CHECK(tangent_difference(problem) <= 1e-12);
         // Momentum; and force = -dE/du along a random direction.
         for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, r.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, r.force));
-        Field w = problem.make_field(d), kept = problem.make_field(d), scratch = problem.make_field(d);
-        Noise random(3);
-        set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
-        const FieldView u = problem.displacement();
-        std::copy_n(u.data, u.size(), kept.data());
-        const double h = 1e-5;
-        double energies[2] = {};
-        for (const int side : {0, 1}) {
-          for (std::size_t k = 0; k < u.size(); ++k) u.data[k] = kept.data()[k] + (side == 0 ? -h : h) * w.data()[k];
-          REQUIRE(problem.evaluate_forces(u, scratch, &energies[side]).ok());
-        }
-        const double slope = (energies[1] - energies[0]) / (2 * h);
-        CHECK(slope == doctest::Approx(-dot(body, r.force, w)).epsilon(1e-6));
-        std::copy_n(kept.data(), u.size(), u.data);
+        CHECK(slope_error(problem, r) <= 1e-6);
         // No bond of a protected point failed, and every failed one is named once.
         const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
         std::set<std::pair<std::int32_t, std::int32_t>> named;
@@ -192,7 +239,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
           CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
         }
         std::size_t expected = 0;
-        for (const Stretched& b : stretches(body, u)) {
+        for (const Stretched& b : stretches(body, problem.displacement())) {
           if (b.stretch <= most || safe.contains(b.point) || safe.contains(b.far)) continue;
           ++expected;
           CHECK(named.contains({b.point, b.far}));
@@ -213,12 +260,49 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
       }
 }
 
+TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine motion, momentum") {
+  for (const Example& example : kinematics_examples())
+    for (const int d : {1, 2, 3}) {
+      INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D");
+      if (!suits(example, d)) continue;
+      BodyOptions options{.dimension = d, .cloud = true};
+      const auto plain = build(scene_text(options, kinematics_table(example)));
+      stretch_at_random(plain->problem().body(), plain->problem().displacement(), 17);
+      const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().displacement());
+      options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n",
+                                       quantile(all, 0.5), quantile(all, 0.97));
+      const std::string text = scene_text(options, kinematics_table(example));
+      const auto simulation = build(text);
+      BodyProblem& problem = simulation->problem();
+      const Body& body = problem.body();
+      const Response intact = respond(problem, 17);
+      const BondUpdate update = problem.model().update_bonds(problem.displacement());
+      const BondChecks checks = problem.model().bond_checks();
+      CHECK(checks.weakened > 0);
+      CHECK(checks.failed > 0);
+      const Response left = respond(problem, 17);
+      CHECK(std::abs(intact.energy - left.energy - update.released) <= 1e-11 * intact.energy);
+      CHECK(left.energy < intact.energy);
+      CHECK(slope_error(problem, left) <= 1e-6);
+      CHECK(tangent_difference(problem) <= 1e-12);
+      for (int c = 0; c < d; ++c)
+        CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
+      const auto other = build(text);
+      other->problem().restore(problem.snapshot());
+      const Response same = respond(other->problem(), 17);
+      CHECK(same.energy == left.energy);
+      CHECK(difference(body, same.force, left.force) == 0);
+      if (problem.model().has_gradients()) CHECK(affine_error(problem) <= 1e-12);
+    }
+}
+
 TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a fragment") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {2, 3})
         for (const double share : {0.5, 0.6}) {
-          INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share, " of the bonds within the limit");
+          INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share,
+               " of the bonds within the limit");
           if (!suits(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -249,23 +333,15 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
           CHECK(fragments > 0);
           CHECK(fragments < body.points());
           // Affine motion stays exact.
-          set_field(body, problem.displacement(), [&](const Point& x) { return Point{0.1 * x[0] - 0.07 * x[1], 0.03 * x[0] - 0.06 * x[1], d == 3 ? 0.05 * x[2] : 0.0}; });
-          PointSamples samples;
-          REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
-          const double G[3][3] = {{0.1, -0.07, 0}, {0.03, -0.06, 0}, {0, 0, 0.05}};
-          double worst = 0;
-          for (const std::int32_t p : body.internal())
-            for (int a = 0; a < d && damage.data()[p] < 1; ++a)
-              for (int b = 0; b < d; ++b) worst = std::max(worst, std::abs(samples.H.component(a * d + b)[p] - G[a][b]));
-          CHECK(worst <= 1e-12);
+          CHECK(affine_error(problem) <= 1e-12);
         }
 }
 
 TEST_CASE("kinematics: points without bonds are free masses") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
-        INFO(example.part, " (", example.table, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
@@ -285,9 +361,9 @@ TEST_CASE("kinematics: points without bonds are free masses") {
 }
 
 TEST_CASE("kinematics: a scene without damage pays nothing") {
-  for (const Example& example : examples(Kind::kinematics))
+  for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true}) {
-      INFO(example.part, " (", example.table, ") ", cloud ? "cloud" : "lattice");
+      INFO(example.part, " (", example.table, example.stabilization, ") ", cloud ? "cloud" : "lattice");
       if (!suits(example, 2)) continue;
       BodyOptions options{.dimension = 2, .cloud = cloud};
       const auto plain = build(scene_text(options, kinematics_table(example)));

@@ -19,6 +19,7 @@ BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy
     if (end_.size() == 0) end_ = body_.make_field(u.components);
     motion(end_);
   }
+  ++version_;
   BondUpdate update;
   while (!changes.empty()) {
     std::vector<std::int32_t> ends;
@@ -71,6 +72,7 @@ void Fracture::remember(std::span<const BondChange> changes) {
 }
 
 void Fracture::restore(std::span<const BondChange> log, const Changed& changed) {
+  ++version_;
   changed(state_.mend());
   log_.assign(log.begin(), log.end());
   changed(state_.lower(log_));

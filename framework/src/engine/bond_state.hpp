@@ -40,6 +40,8 @@ class Fracture {
 
   /// The bonds that are not as they were at the set-up, for checkpoints.
   std::vector<BondChange> changes() const;
+  /// Another number whenever bonds have changed.
+  std::size_t version() const noexcept { return version_; }
   void restore(std::span<const BondChange> log, const Changed& changed);
   BondChecks checks() const;
   std::size_t bytes() const noexcept { return monitor_->bytes() + log_.size() * sizeof(BondChange); }
@@ -55,7 +57,7 @@ class Fracture {
   std::unique_ptr<BondMonitor> monitor_;
   std::vector<BondChange> log_;      ///< every change in its order, now and then only the last one of each bond
   std::size_t compact_ = 0;          ///< entries that were left the last time
-  std::size_t updates_ = 0;
+  std::size_t updates_ = 0, version_ = 0;
   Field end_;                        ///< where failing bonds cease to act
 };
 

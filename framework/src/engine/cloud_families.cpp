@@ -128,6 +128,12 @@ BondState& CloudFamilies::bond_state() {
   return *bonds_;
 }
 
+bool CloudFamilies::lost_bonds(std::size_t p) const noexcept {
+  for (std::int64_t k = lists.first[p]; k < lists.first[p + 1]; ++k)
+    if (integrity(static_cast<std::size_t>(k)) != 1) return true;
+  return false;
+}
+
 template <int D>
 void CloudFamilies::measure_whole() {
   const Row* position = reinterpret_cast<const Row*>(body.rows().data());

@@ -38,6 +38,8 @@ struct CloudFamilies {
   /// b of a bond.
   double integrity(std::size_t bond) const noexcept { return bonds_ ? (*bonds_)[bond] : 1.0; }
   bool fails() const noexcept { return bonds_.has_value(); }
+  /// Whether bonds of the point have failed or weakened since the set-up.
+  bool lost_bonds(std::size_t p) const noexcept;
   /// Shape tensors, weights and damage of points whose bonds have changed. Returns the bonds left to those of them that are
   /// fragments, bonds between two of them twice.
   std::vector<BondChange> changed(std::span<const std::int32_t> points);

@@ -20,7 +20,7 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       families_(body_, *parts.influence, traits_.weight) {
   const std::size_t n = body_.points();
-  if (parts.damage) fracture_.emplace(body_, *parts.damage, families_.bond_state(), parts.skip);
+  if (parts.damage) this->watch_bonds(families_.bond_state());
   const BlockReach reach = cloud_reach(families_.lists, n);
   if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(reach);
   u_.resize(n);
@@ -413,16 +413,9 @@ EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) 
 }
 
 template <int D>
-BondUpdate CloudModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
-  if (!fracture_) return {};
-  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
-    return run_energy(body_, laws_, traits_.selective, blocks(), at, marks, families_.bond_state(), [&](Pass& pass) { return run(pass); });
-  }, [&](std::span<const std::int32_t> points) { return families_.changed(points); });
-}
-
-template <int D>
-void CloudModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { return families_.changed(points); });
+double CloudModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(),
+                    [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
@@ -434,9 +427,12 @@ ModelReport CloudModel<D>::report() const {
   report.fallbacks = fallbacks_;
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
-  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) + scale_.size() * sizeof(double) +
-                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() + pressure_.size()) * sizeof(Row) +
-                 scratch_.bytes() + (fracture_ ? fracture_->bytes() : 0);
+  report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) +
+                 scale_.size() * sizeof(double) +
+                 (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() +
+                  pressure_.size()) *
+                     sizeof(Row) +
+                 scratch_.bytes() + this->fracture_bytes();
   report.skips.push_back({"bond vectors", "recomputed from positions", fmt::format("{:.3g} MB", static_cast<double>(report.bonds) * 8 * (D + 1) / 1e6)});
   if (pairs_) {
     report.skips.push_back({"second evaluation of each bond", "the gradient is the same for ij and ji", fmt::format("{} of {} evaluations", report.bonds / 2, report.bonds)});

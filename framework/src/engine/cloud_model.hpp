@@ -26,10 +26,6 @@ class CloudModel final : public AssemblingModel {
   Field damage() override { return families_.damage; }
   ModelReport report() const override;
   QuietCounts quiet_counts() const override { return quiet_.counts(); }
-  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
-  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
-  void restore_bonds(std::span<const BondChange> changes) override;
-  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
   const CloudFamilies& families() const noexcept { return families_; }
   /// H of point p as rows: H[D p + e][c] = H_ce.
@@ -38,6 +34,8 @@ class CloudModel final : public AssemblingModel {
  private:
   static constexpr std::size_t block_points = cloud_block_points;
 
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override { return families_.changed(points); }
   EvaluationStatus run(Pass& pass);
   /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
@@ -74,7 +72,6 @@ class CloudModel final : public AssemblingModel {
   AlignedVector<Row> gradient_, direction_;    ///< Hbar[c][e] as row e over c, D rows a point
   AlignedVector<Row> flux_;                    ///< S, then Q; likewise
   AlignedVector<Row> force_;                   ///< scattered bond forces
-  std::optional<Fracture> fracture_;
   AlignedVector<Row> volume_, pressure_;       ///< selective: volume changes of points; pressures on them and their rates
   ScratchPool scratch_;
 };

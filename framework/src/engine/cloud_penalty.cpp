@@ -21,10 +21,15 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 
  public:
   CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
-      : model_(model), families_(model.families()), position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
-        points_(parts.body->points()), M_(columns * points_, Column{}), flux_(D * points_) {
+      : model_(model),
+        families_(model.families()),
+        position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
+        points_(parts.body->points()),
+        parts_(parts),
+        M_(columns * points_, Column{}),
+        flux_(D * points_) {
     if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists, points_));
-    over_points(everywhere, [&](std::size_t p) { set_matrix(parts, p); });
+    over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
   void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
@@ -52,6 +57,22 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     });
   }
 
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+    mirror_rows(u, points_, u_);
+    quiet_.wake();
+    double energy = 0;
+    for (std::size_t p = 0; p < points_; ++p) {
+      if (!marks[p / padding]) continue;
+      model_.gradient_rows(p, u_, flux_);
+      energy += energy_of_point(p, &flux_[D * p]);
+    }
+    return energy;
+  }
+
+  void bonds_changed(std::span<const std::int32_t> points) override {
+    for (const std::int32_t p : points) set_matrix(static_cast<std::size_t>(p));
+  }
+
   std::size_t bytes() const noexcept override { return M_.size() * sizeof(Column) + (flux_.size() + u_.size()) * sizeof(Row); }
 
  private:
@@ -66,13 +87,15 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     });
   }
 
-  void set_matrix(const ModelParts& parts, std::size_t p) {
+  void set_matrix(std::size_t p) {
     const double* inverse = &families_.inverse[6 * p];
+    std::fill_n(&M_[columns * p], columns, Column{});
     if (!std::isfinite(families_.condition.data()[p])) return;   // singular: M = 0
     double intact = 0, M[6];
     for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
     const double damage = families_.damage.data()[p];
-    parts.stabilization->penalty(penalty_point(*parts.body, *parts.laws, p, intact, damage, families_.normaliser[p], inverse), M);
+    parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, intact, damage, families_.normaliser[p], inverse),
+                                  M);
     if constexpr (isotropic) {
       M_[p] = M[0];
     } else {
@@ -135,6 +158,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   const CloudFamilies& families_;
   const Row* position_;          ///< {x, y, z, V}
   std::size_t points_;
+  ModelParts parts_;
   AlignedVector<Column> M_;
   AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns
   QuietBlocks quiet_;

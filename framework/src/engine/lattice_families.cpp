@@ -296,6 +296,16 @@ std::vector<BondChange> LatticeFamilies::fragment_bonds(std::span<const std::int
   return bonds;
 }
 
+bool LatticeFamilies::lost_bonds(std::int32_t point) const noexcept {
+  const LatticeChunk& chunk = chunks[static_cast<std::size_t>(chunk_of(point))];
+  if (chunk.pattern < 0 || static_cast<std::size_t>(chunk.pattern) < shared_) return false;
+  const LatticePattern& own = pattern(chunk);
+  const LatticePattern& original = pattern({chunk.first, owned_[static_cast<std::size_t>(chunk.pattern) - shared_].original});
+  for (std::size_t s = 0; s < offsets.size(); ++s)
+    if (intact(own, s, point % chunk_points) != intact(original, s, point % chunk_points)) return true;
+  return false;
+}
+
 std::vector<std::int32_t> LatticeFamilies::mend() {
   std::vector<std::int32_t> points;
   for (std::size_t k = 0; k < owned_.size(); ++k) {

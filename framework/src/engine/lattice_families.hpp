@@ -110,6 +110,8 @@ class LatticeFamilies {
   std::vector<std::int32_t> break_bonds(std::span<const BondChange> changes);
   /// The intact bonds of those of the points that are fragments; bonds between two of them twice. After `break_bonds`.
   std::vector<BondChange> fragment_bonds(std::span<const std::int32_t> points) const;
+  /// Whether bonds of the point have failed since the set-up.
+  bool lost_bonds(std::int32_t point) const noexcept;
   /// The patterns of the set-up. Returns the points whose bonds had been broken.
   std::vector<std::int32_t> mend();
   /// Whether a point of block b moves.

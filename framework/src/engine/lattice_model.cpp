@@ -39,7 +39,7 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
       families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)),
       slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
   if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(families_.reach);
-  if (parts.damage) fracture_.emplace(body_, *parts.damage, bonds_.emplace(families_), parts.skip);
+  if (parts.damage) this->watch_bonds(bonds_.emplace(families_));
   const auto alive = body_.alive_bits();
   for (const LatticeRow& row : families_.rows)
     for (int c = 0; c < row.chunks; ++c) {
@@ -466,16 +466,9 @@ EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples
 }
 
 template <int D>
-BondUpdate LatticeModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
-  if (!fracture_) return {};
-  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) {
-    return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), at, marks, *bonds_, [&](Pass& pass) { return run(pass); });
-  }, [&](std::span<const std::int32_t> points) { return families_.fragment_bonds(points); });
-}
-
-template <int D>
-void LatticeModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [](std::span<const std::int32_t>) { return std::vector<BondChange>(); });
+double LatticeModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_,
+                    [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
@@ -499,9 +492,9 @@ ModelReport LatticeModel<D>::report() const {
   report.broken_bonds = families_.broken - families_.failed;
   report.singular_families = families_.singular;
   report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
-  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() +
-                 volume_.bytes() + pressure_.bytes() + scratch_.bytes() + (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) +
-                 (fracture_ ? fracture_->bytes() : 0);
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() +
+                 direction_.bytes() + scale_.bytes() + volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
+                 (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + this->fracture_bytes();
   const bool bonds = traits_.at == EvaluationPoints::bonds;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);

@@ -29,16 +29,16 @@ class LatticeModel final : public AssemblingModel {
   Field damage() override;
   ModelReport report() const override;
   QuietCounts quiet_counts() const override { return quiet_.counts(); }
-  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
-  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
-  void restore_bonds(std::span<const BondChange> changes) override;
-  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
   const LatticeFamilies& families() const noexcept { return families_; }
   /// Zero in the dead lanes of chunks.
   void clean(FieldView out) const noexcept;
 
  private:
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override {
+    return families_.fragment_bonds(points);
+  }
   EvaluationStatus run(Pass& pass);
   void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;
   void points_block(std::size_t b, Pass& pass);
@@ -71,8 +71,7 @@ class LatticeModel final : public AssemblingModel {
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;
   QuietBlocks quiet_;
-  std::optional<LatticeBonds> bonds_;              ///< only with damage
-  std::optional<Fracture> fracture_;
+  std::optional<LatticeBonds> bonds_;  ///< only with damage
   ScratchPool scratch_;
 };
 

@@ -21,11 +21,17 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 
  public:
   LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
-      : model_(model), families_(model.families()), operator_(families_), M_(parts.body->make_field(Matrix::components)),
-        B_(parts.body->make_field(Matrix::components)), flux_(parts.body->make_field(D * D)), source_(parts.body->make_field(D)) {
+      : model_(model),
+        families_(model.families()),
+        operator_(families_),
+        parts_(parts),
+        M_(parts.body->make_field(Matrix::components)),
+        B_(parts.body->make_field(Matrix::components)),
+        flux_(parts.body->make_field(D * D)),
+        source_(parts.body->make_field(D)) {
     if (parts.skip) quiet_ = QuietBlocks(families_.reach);
     const std::size_t blocks = families_.blocks.size();
-    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(parts, chunk); }); });
+    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(chunk); }); });
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
@@ -69,6 +75,36 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     });
   }
 
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+    std::vector<double> energies(families_.blocks.size(), 0.0);
+    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+      alignas(64) double H[D * D * batch_points], sums[D * batch_points];
+      for_chunks(b, [&](const LatticeChunk& chunk) {
+        if (!marks[static_cast<std::size_t>(chunk.first) / padding]) return;
+        operator_.gradient_and_sums(&chunk, 1, u, H, sums, batch_points);
+        double of_points[chunk_points];
+        energies_of_points(chunk, u, H, of_points);
+        for (const double e : of_points) energies[b] += e;
+      });
+    });
+    return std::accumulate(energies.begin(), energies.end(), 0.0);
+  }
+
+  void bonds_changed(std::span<const std::int32_t> points) override {
+    // B of a point depends on M of its family.
+    GroupMarks changed(families_.body.stride() / padding, 0), near = changed;
+    for (const std::int32_t p : points) {
+      changed[static_cast<std::size_t>(p) / padding] = near[static_cast<std::size_t>(p) / padding] = 1;
+      for (const std::int64_t shift : families_.shifts) near[static_cast<std::size_t>(p + shift) / padding] = 1;
+    }
+    const auto over = [&](const GroupMarks& marks, auto&& set) {
+      for (const LatticeChunk& chunk : families_.chunks)
+        if (marks[static_cast<std::size_t>(chunk.first) / padding]) set(chunk);
+    };
+    over(changed, [&](const LatticeChunk& chunk) { set_matrices(chunk); });
+    over(near, [&](const LatticeChunk& chunk) { set_sums(chunk); });
+  }
+
   std::size_t bytes() const noexcept override { return M_.bytes() + B_.bytes() + flux_.bytes() + source_.bytes(); }
 
  private:
@@ -77,9 +113,10 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) body(families_.chunks[c]);
   }
 
-  void set_matrices(const ModelParts& parts, const LatticeChunk& chunk) {
+  void set_matrices(const LatticeChunk& chunk) {
     const LatticePattern& pattern = families_.pattern(chunk);
     for (int l = 0; l < chunk_points; ++l) {
+      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[chunk.first + l] = 0;
       if (!(pattern.live >> l & 1) || pattern.singular >> l & 1) continue;   // M = 0
       const auto p = static_cast<std::size_t>(chunk.first + l);
       double intact = 0, inverse[6], M[6];
@@ -87,7 +124,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         if (LatticeFamilies::intact(pattern, s, l)) intact += families_.omega[s];
       families_.inverse_shape(pattern, l, inverse);
       const double V = families_.volume;
-      parts.stabilization->penalty(penalty_point(*parts.body, *parts.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
+      parts_.stabilization->penalty(
+          penalty_point(*parts_.body, *parts_.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
       for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
     }
   }
@@ -186,6 +224,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   const LatticeModel<D>& model_;
   const LatticeFamilies& families_;
   LatticeOperator<D> operator_;
+  ModelParts parts_;
   Field M_, B_;
   Field flux_, source_;   ///< Q, v
   QuietBlocks quiet_;

@@ -213,6 +213,20 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
 }
 
 template <int D>
+void LocalStencil<D>::weigh(const StencilRules& rules, const FamilyArrays& family, double* rows) {
+  FamilyView view = family.view(rules.horizon);
+  if (family.integrity.empty()) return rules.kinematics->weights(view, rows, row_);
+  // Weakened bonds: the influence is that of whole ones, times b, however a kinematics makes use of omega.
+  whole_.assign(row_, 0.0);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
+    if (family.integrity[k] > 0) whole_[k] = family.omega[k] / family.integrity[k];
+  view.omega = whole_.data();
+  rules.kinematics->weights(view, rows, row_);
+  for (int q = rules.traits.selective ? 1 : 0; q < points_; ++q, rows += row_)
+    for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k) rows[k] *= family.integrity[k];
+}
+
+template <int D>
 void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields,
                             const double* const (*u)[D]) {
   bonds_ = family.bonds;
@@ -251,7 +265,7 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
     multiply(q, q + 1);
     invert_one(q, singular_ratio);
   };
-  rules.kinematics->weights(family.view(rules.horizon), row(first), row_);
+  weigh(rules, family, row(first));
   if (first == 1) std::copy_n(family.omega.data(), row_, row(0));
   multiply(0, points_);
   invert_all();

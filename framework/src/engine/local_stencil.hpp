@@ -21,6 +21,7 @@ struct FamilyArrays {
   int dimension = 3, bonds = 0;
   std::size_t size = 0;  ///< padded(bonds)
   AlignedVector<double> xi[3], length, volume, omega;
+  AlignedVector<double> integrity;  ///< b, where bonds are neither whole nor broken: omega holds it already; else empty
   double inverse_shape[6] = {};
 };
 
@@ -60,6 +61,8 @@ class LocalStencil {
   void set_lever(const StencilRules& rules, const FamilyArrays& family);
   template <int Fields>
   void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
+  /// The kinematics' influence of every bond in every evaluation point.
+  void weigh(const StencilRules& rules, const FamilyArrays& family, double* rows);
   /// Sums of the tiles that hold rows [begin, end): moments_ = omega_ columns_.
   void multiply(int begin, int end) noexcept;
   /// K_q^-1 of row q, or of all rows, and whether they are regular: the eigenvalues of K spread by less than 1 / ratio.
@@ -77,6 +80,7 @@ class LocalStencil {
   AlignedVector<double> inverse_;  ///< K_q^-1: [entry * lanes_ + q]; 0 where q is dropped
   AlignedVector<double> stress_;   ///< P_q K_q^-1: [component * lanes_ + q]
   AlignedVector<double> share_;
+  AlignedVector<double> whole_;  ///< omega without b
   std::vector<std::uint8_t> regular_;
 };
 

@@ -19,6 +19,7 @@ std::unique_ptr<Model> make_stabilized(const ModelParts& parts) {
     penalty = make_stencil_penalty<D>(parts);
   else
     penalty = make_penalty<D>(parts, *model);
+  model->watch_bonds_of(*penalty);
   return std::make_unique<StabilizedModel>(std::move(model), std::move(penalty));
 }
 

@@ -79,7 +79,7 @@ PairModel<D>::PairModel(const ModelParts& parts)
   }
   set_moduli();
   if (traits_.surface_correction) set_correction(*parts.influence);
-  if (parts.damage) fracture_.emplace(body_, *parts.damage, loop_->bond_state(), parts.skip);
+  if (parts.damage) this->watch_bonds(loop_->bond_state());
 }
 
 template <int D>
@@ -152,17 +152,6 @@ double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
     if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
   }
   return energy;
-}
-
-template <int D>
-BondUpdate PairModel<D>::update_bonds(ConstFieldView u, const Motion& motion) {
-  if (!fracture_) return {};
-  return fracture_->update(u, motion, [&](ConstFieldView at, const GroupMarks& marks) { return energy_of(at, marks); }, [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
-}
-
-template <int D>
-void PairModel<D>::restore_bonds(std::span<const BondChange> changes) {
-  if (fracture_) fracture_->restore(changes, [&](std::span<const std::int32_t> points) { return bonds_changed(points); });
 }
 
 template <int D>
@@ -278,7 +267,7 @@ ModelReport PairModel<D>::report() const {
   report.evaluation_points = share_ ? counts.bonds / 2 : counts.bonds;
   report.bytes = counts.bytes;
   for (const Field* field : {&damage_, &scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
-  if (fracture_) report.bytes += fracture_->bytes();
+  report.bytes += this->fracture_bytes();
   report.warnings = warnings_;
   report.skips.push_back({"bond vectors and lengths", body_.lattice() ? "lattice: neighbours lie at fixed shifts" : "recomputed from positions",
                           fmt::format("{:.3g} MB", static_cast<double>(counts.recomputed) / 1e6)});

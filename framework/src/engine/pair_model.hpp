@@ -21,19 +21,15 @@ class PairModel final : public AssemblingModel {
   Field damage() override { return damage_; }
   ModelReport report() const override;
   QuietCounts quiet_counts() const override { return loop_->quiet_counts(); }
-  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override;
-  std::vector<BondChange> changed_bonds() const override { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
-  void restore_bonds(std::span<const BondChange> changes) override;
-  BondChecks bond_checks() const override { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
  private:
   std::unique_ptr<Assembly> make_assembly(const ModelParts& parts) const override;
   void set_moduli();
   /// Moduli and damage of points with the same family; false where it has no intact bond.
   bool set_moduli_of(const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points, Field& modulus);
-  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points);
-  /// Strain energy of the marked groups: half of each of their bonds, and their dilatation.
-  double energy_of(ConstFieldView u, const GroupMarks& marks);
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override;
+  /// Half of each bond of the marked groups, and their dilatation.
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
   void set_correction(const InfluenceFunction& influence);
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
@@ -54,7 +50,6 @@ class PairModel final : public AssemblingModel {
   std::size_t lone_ = 0;         ///< points without bonds at the set-up
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
-  std::optional<Fracture> fracture_;
   Field density_;                ///< work field of energy_of
 };
 

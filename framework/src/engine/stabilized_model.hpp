@@ -20,6 +20,11 @@ class StabilizedModel final : public Model {
   Field damage() override { return base_->damage(); }
   ModelReport report() const override;
   QuietCounts quiet_counts() const override { return base_->quiet_counts(); }
+  /// The base knows the penalty, and its bonds are those of both.
+  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) override { return base_->update_bonds(u, motion); }
+  std::vector<BondChange> changed_bonds() const override { return base_->changed_bonds(); }
+  void restore_bonds(std::span<const BondChange> changes) override { base_->restore_bonds(changes); }
+  BondChecks bond_checks() const override { return base_->bond_checks(); }
 
  private:
   std::unique_ptr<Model> base_;

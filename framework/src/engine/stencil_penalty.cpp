@@ -79,6 +79,8 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     return total;
   }
   bool simple_force() const noexcept override { return false; }
+  double energy_of(ConstFieldView, const GroupMarks&) override { return 0; }
+  void bonds_changed(std::span<const std::int32_t>) override {}
 
  private:
   static Stencil keep(const PenaltyElement<D>& element) {

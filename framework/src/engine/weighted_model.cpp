@@ -32,6 +32,89 @@ WeightedModel<D>::WeightedModel(const ModelParts& parts)
     prepare_cloud(*parts.influence);
   if (!parts.skip || laws_.history()) quiet_ = {};
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
+  if (parts.damage) {
+    prepare_damage();
+    this->watch_bonds(lattice_ ? static_cast<BondState&>(lattice_bonds_.emplace(*lattice_)) : cloud_->bond_state());
+  }
+}
+
+template <int D>
+void WeightedModel<D>::prepare_damage() {
+  place_.assign(body_.stride(), {});
+  left_.resize(block_first_.size() - 1);
+  for (std::size_t b = 0; b + 1 < block_first_.size(); ++b)
+    for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g)
+      for (std::uint8_t l = 0; l < groups_[g].count; ++l)
+        place_[static_cast<std::size_t>(members_[groups_[g].first + l])] = {static_cast<std::uint32_t>(b),
+                                                                            static_cast<std::uint32_t>(g), l, false};
+}
+
+template <int D>
+std::vector<BondChange> WeightedModel<D>::bonds_changed(std::span<const std::int32_t> points) {
+  std::vector<BondChange> fragments = lattice_ ? lattice_->fragment_bonds(points) : cloud_->changed(points);
+  for (const std::int32_t p : points) {
+    const auto at = static_cast<std::size_t>(p);
+    if (lattice_) {
+      const LatticePattern& pattern = lattice_->pattern(lattice_->chunks[static_cast<std::size_t>(lattice_->chunk_of(p))]);
+      condition_.data()[p] = pattern.condition[at % chunk_points];
+      damage_.data()[p] = pattern.damage[at % chunk_points];
+    } else {
+      condition_.data()[p] = cloud_->condition.data()[p];
+      damage_.data()[p] = cloud_->damage.data()[p];
+    }
+    // Families that are whole again return: a restored model is bitwise a new one.
+    Place& place = place_[at];
+    if (place.left == (lattice_ ? lattice_->lost_bonds(p) : cloud_->lost_bonds(at))) continue;
+    place.left = !place.left;
+    groups_[place.group].live ^= static_cast<std::uint8_t>(1u << place.lane);
+    std::vector<std::int32_t>& left = left_[place.block];
+    const auto entry = std::lower_bound(left.begin(), left.end(), p);
+    if (place.left)
+      left.insert(entry, p);
+    else
+      left.erase(entry);
+    singles_ = true;
+  }
+  return fragments;
+}
+
+template <int D>
+double WeightedModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  const BondState& bonds = lattice_ ? static_cast<const BondState&>(*lattice_bonds_) : cloud_->bond_state();
+  return run_energy(body_, laws_, traits_.selective, block_first_.size() - 1, u, marks, bonds,
+                    [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+void WeightedModel<D>::load_own_family(std::int32_t p, Memory& m) const {
+  m.index.clear();
+  if (lattice_) {
+    const LatticePattern& pattern = lattice_->pattern(lattice_->chunks[static_cast<std::size_t>(lattice_->chunk_of(p))]);
+    const std::vector<std::uint16_t> slots = lattice_->intact_slots(pattern, p % chunk_points);
+    lattice_->load(slots, m.family);
+    for (const std::uint16_t s : slots) m.index.push_back(static_cast<std::int32_t>(p + lattice_->shifts[s]));
+    set_lattice_shares(pattern.scale[p % chunk_points], m);
+    return;
+  }
+  const auto at = static_cast<std::size_t>(p);
+  cloud_->load(at, m.family);
+  const auto family = cloud_->neighbours(at);
+  m.family.integrity.assign(m.family.size, 1.0);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < family.size(); ++k) {
+    const double b = cloud_->integrity(static_cast<std::size_t>(cloud_->lists.first[at]) + k);
+    if (b == 0) continue;
+    for (std::size_t c = 0; c < D; ++c) m.family.xi[c][kept] = m.family.xi[c][k];
+    for (AlignedVector<double>* values : {&m.family.length, &m.family.volume, &m.family.omega}) (*values)[kept] = (*values)[k];
+    m.family.integrity[kept++] = b;
+    m.index.push_back(family[k]);
+  }
+  m.family.resize(D, static_cast<int>(kept));
+  m.family.integrity.resize(m.family.size);
+  if (std::all_of(m.family.integrity.begin(), m.family.integrity.begin() + static_cast<std::ptrdiff_t>(kept),
+                  [](double b) { return b == 1; }))
+    m.family.integrity.clear();
+  set_cloud_shares(at, m);
 }
 
 template <int D>
@@ -158,21 +241,33 @@ void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
 }
 
 template <int D>
+void WeightedModel<D>::set_lattice_shares(double scale, Memory& m) const {
+  m.share.assign(m.family.size, 0.0);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(m.family.bonds); ++k)
+    m.share[k] = scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
+}
+
+template <int D>
+void WeightedModel<D>::set_cloud_shares(std::size_t p, Memory& m) const {
+  m.share.assign(m.family.size, 0.0);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(m.family.bonds); ++k) {
+    const double b = m.family.integrity.empty() ? 1.0 : m.family.integrity[k];
+    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : b) / cloud_->normaliser[p];
+  }
+}
+
+template <int D>
 void WeightedModel<D>::load_class(std::int32_t family, Memory& m) const {
   const FamilyClass& own = classes_[static_cast<std::size_t>(family)];
   lattice_->load(own.slots, m.family);
-  m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < own.slots.size(); ++k)
-    m.share[k] = own.scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
+  set_lattice_shares(own.scale, m);
 }
 
 template <int D>
 void WeightedModel<D>::load_cloud_family(std::size_t p, Memory& m) const {
+  m.family.integrity.clear();
   cloud_->load(p, m.family);
-  const auto bonds = static_cast<std::size_t>(m.family.bonds);
-  m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < bonds; ++k)
-    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0) / cloud_->normaliser[p];
+  set_cloud_shares(p, m);
 }
 
 template <int D>
@@ -211,6 +306,14 @@ void WeightedModel<D>::keep_owner_gradients(int points, Memory& m, BatchScratch&
 }
 
 template <int D>
+void WeightedModel<D>::clear_lanes(std::uint8_t kept, int slot, int slots, double* H, double* dH) noexcept {
+  for (double* gradient : {H, dH})
+    for (int c = 0; c < D * D && gradient; ++c)
+      for (int l = 0; l < 8 * slots; ++l)
+        if (!(kept >> l % 8 & 1)) gradient[c * batch_points + 8 * slot + l] = 0.0;
+}
+
+template <int D>
 void WeightedModel<D>::add_pressures(int lanes, const BatchScratch& s, bool tangent, double (&pressure)[2][8]) {
   for (int l = 0; l < lanes; ++l) {
     pressure[0][l % 8] += s.pressure[l];
@@ -225,9 +328,16 @@ void WeightedModel<D>::owner_stresses(const Memory& m, bool tangent, const doubl
 }
 
 template <int D>
+std::uint8_t WeightedModel<D>::lanes(const Group& g, const Pass& pass) const noexcept {
+  unsigned lanes = g.live & ((1u << g.count) - 1);
+  for (unsigned l = 0; l < g.count && pass.only; ++l)
+    if (!pass.wanted(members_[g.first + l])) lanes &= ~(1u << l);
+  return static_cast<std::uint8_t>(lanes);
+}
+
+template <int D>
 std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
   const std::int32_t p = members_[g.first];
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
   m.index.clear();
   if (lattice_) {
     load_class(g.family, m);
@@ -237,6 +347,12 @@ std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s
     const auto family = cloud_->neighbours(static_cast<std::size_t>(p));
     m.index.assign(family.begin(), family.end());
   }
+  return evaluate_family(p, m, s, pass, energy);
+}
+
+template <int D>
+std::int32_t WeightedModel<D>::evaluate_family(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
   const std::size_t size = m.family.size;
   load_differences(p, u_rows_, m, m.u);
   if (tangent) load_differences(p, w_rows_, m, m.w);
@@ -260,17 +376,15 @@ std::int32_t WeightedModel<D>::single(const Group& g, Memory& m, BatchScratch& s
       s.weight[l] = weight(p, stencil.share(first + l));
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
-    if (sample) {
-      pass.work.add_samples(n, s, *pass.sums);
-      continue;
-    }
+    if (sample) pass.work.add_samples(n, s, *pass.sums);
+    if (alone) continue;
     for (int l = 0; l < n && traits_.selective; ++l) {
       pressure[0][0] += s.pressure[l];
       if (tangent) pressure[1][0] += s.pressure_rate[l];
     }
     stencil.add_stress(first, n, s.P, batch_points);
   }
-  if (sample) return -1;
+  if (alone) return -1;
   if (traits_.selective) {
     double stress[D * D][8] = {};
     add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], stress[0], 8);
@@ -297,7 +411,9 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
   const MirroredStencil<D>& stencil = stencils_[static_cast<std::size_t>(g.stencil)];
   const std::int32_t* members = members_.data() + g.first;
   const LanePoints points{members, g.count, g.contiguous, classes_[static_cast<std::size_t>(g.family)].shifts.data()};
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
+  const std::uint8_t here = lanes(g, pass);
+  const bool all = here == (1u << g.count) - 1;
   const auto bonds = static_cast<std::size_t>(stencil.bonds()), evaluated = static_cast<std::size_t>(stencil.points());
   const auto coefficients = [&](ConstFieldView field, AlignedVector<double>& hat, AlignedVector<double>& out) {
     hat.resize(bonds * D * 8);
@@ -310,7 +426,7 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
   double lane_weight[8], pressure[2][8] = {};  // pressure: on the owners' gradients (selective map), and its rate
   double* const H = traits_.selective ? s.Ht : s.H;
   double* const dH = traits_.selective ? s.dHt : s.dH;
-  for (int l = 0; l < 8; ++l) lane_weight[l] = l < g.count ? weight(members[l], 1.0) : 0.0;
+  for (int l = 0; l < 8; ++l) lane_weight[l] = here >> l & 1 ? weight(members[l], 1.0) : 0.0;
   const std::vector<MirrorBasis::Orbit>& orbits = stencil.point_basis().orbits;
   for (auto begin = orbits.begin(); begin != orbits.end();) {
     // As many orbits as a batch holds.
@@ -319,6 +435,7 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
     for (; end != orbits.end() && (slots + end->size) * 8 <= batch_points; slots += end++->size) {
       orbit_gradients<D>(*end, m.m.data(), slots, H);
       if (tangent) orbit_gradients<D>(*end, m.dm.data(), slots, dH);
+      if (!all) clear_lanes(here, slots, end->size, H, tangent ? dH : nullptr);
       for (int i = 0; i < end->size; ++i)
         for (int l = 0; l < 8; ++l) {
           s.owner[(slots + i) * 8 + l] = members[l];
@@ -329,12 +446,12 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
     if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
-    if (traits_.selective && !sample) add_pressures(slots * 8, s, tangent, pressure);
+    if (traits_.selective && !alone) add_pressures(slots * 8, s, tangent, pressure);
     slots = 0;
     for (; begin != end; slots += begin++->size)
-      if (!sample) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
+      if (!alone) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
   }
-  if (sample) return -1;
+  if (alone) return -1;
   if (traits_.selective) {
     owner_stresses(m, tangent, pressure, s);
     orbit_stresses<D>(orbits.front(), s.P, 0, m.m.data());
@@ -349,8 +466,10 @@ template <int D>
 std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
   const SparseStencils<D>& stencils = sparse_[b];
   const std::size_t stencil = g.first - groups_[block_first_[b]].first;
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
   const std::span<const std::int32_t> members(members_.data() + g.first, g.count);
+  const std::uint8_t here = lanes(g, pass);
+  const bool all = here == (1u << g.count) - 1;
   const auto gradients = [&](const AlignedVector<Row>& rows, int first, int n, double* H) {
     for (std::size_t l = 0; l < members.size(); ++l)
       stencils.gradient(stencil + l, first, n, static_cast<std::size_t>(members[l]), rows.data(), H + l, batch_points);
@@ -368,22 +487,21 @@ std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memor
     const int n = std::min(batch_points / 8, owners_ + parts_ - first);
     gradients(u_rows_, first, n, H);
     if (tangent) gradients(w_rows_, first, n, dH);
+    if (!all) clear_lanes(here, 0, n, H, tangent ? dH : nullptr);
     if (traits_.selective && first == 0) keep_owner_gradients(8, m, s, tangent);
     for (int l = 0; l < 8 * n; ++l) {
       const auto lane = static_cast<std::size_t>(l % 8);
       s.owner[l] = members[lane < members.size() ? lane : 0];
-      s.weight[l] = lane < members.size() ? weight(s.owner[l], stencils.share(stencil + lane, first + l / 8)) : 0.0;
+      s.weight[l] = here >> lane & 1 ? weight(s.owner[l], stencils.share(stencil + lane, first + l / 8)) : 0.0;
     }
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
     if (bad >= 0) return s.owner[bad];
-    if (sample) {
-      pass.work.add_samples(8 * n, s, *pass.sums);
-      continue;
-    }
+    if (sample) pass.work.add_samples(8 * n, s, *pass.sums);
+    if (alone) continue;
     if (traits_.selective) add_pressures(8 * n, s, tangent, pressure);
     scatter(first, n);
   }
-  if (sample || !traits_.selective) return -1;
+  if (alone || !traits_.selective) return -1;
   owner_stresses(m, tangent, pressure, s);
   scatter(0, 1);
   return -1;
@@ -396,11 +514,22 @@ void WeightedModel<D>::block(std::size_t b, Pass& pass) {
   double energy = 0;
   for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
     const Group& group = groups_[g];
+    if (lanes(group, pass) == 0) continue;
     const std::int32_t bad = group.stencil >= 0 ? together(group, m, s, pass, &energy)
                              : sparse_.empty()  ? single(group, m, s, pass, &energy)
                                                 : side_by_side(group, b, m, s, pass, &energy);
     if (bad >= 0) {
       pass.report(bad);
+      return;
+    }
+  }
+  for (std::size_t k = 0; k < (left_.empty() ? 0 : left_[b].size()); ++k) {
+    const std::int32_t p = left_[b][k];
+    if (!pass.wanted(p)) continue;
+    load_own_family(p, m);
+    if (m.index.empty()) continue;
+    if (evaluate_family(p, m, s, pass, &energy) >= 0) {
+      pass.report(p);
       return;
     }
   }
@@ -416,7 +545,7 @@ EvaluationStatus WeightedModel<D>::run(Pass& pass) {
     mirror_rows(pass.u, stride, u_rows_);
     if (pass.work.tangent()) mirror_rows(pass.w, stride, w_rows_);
   }
-  if (pass.work.work() == Work::sample) {
+  if (pass.alone()) {
     parallel_for(block_first_.size() - 1, [&](std::size_t b) { block(b, pass); });
     return status_at(body_, pass.bad);
   }
@@ -472,7 +601,7 @@ ModelReport WeightedModel<D>::report() const {
   report.bytes = (lattice_ ? lattice_->bytes() : cloud_->bytes()) + stencils + groups_.size() * sizeof(Group) +
                  members_.size() * sizeof(std::int32_t) + sparse +
                  (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + condition_.bytes() + damage_.bytes() +
-                 scratch_.bytes();
+                 scratch_.bytes() + place_.size() * sizeof(Place) + this->fracture_bytes();
   if (lattice_) {
     const auto points = static_cast<double>(body_.points());
     std::size_t together = 0;

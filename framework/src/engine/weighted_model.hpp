@@ -9,6 +9,7 @@
 #include "cloud_rows.hpp"
 #include "engine/assembly/assembly.hpp"
 #include "family_classes.hpp"
+#include "lattice_bonds.hpp"
 #include "lattice_families.hpp"
 #include "local_stencil.hpp"
 #include "mirrored_stencil.hpp"
@@ -20,7 +21,8 @@ namespace perikit {
 /// Any weighted kinematics. On a lattice, points with equal families are a class that shares one stencil in the basis of its
 /// mirrors, and up to eight of them are evaluated at a time. Points of a cloud with few evaluation points keep their stencils,
 /// without the bonds that an evaluation point does not see. With an evaluation point at every bond, points of a cloud, of rare
-/// classes, and of classes beyond a cap in bytes make their stencil when they need it.
+/// classes, and of classes beyond a cap in bytes make their stencil when they need it. So does a point whose bonds have failed:
+/// it leaves its group.
 template <int D>
 class WeightedModel final : public AssemblingModel {
  public:
@@ -49,6 +51,7 @@ class WeightedModel final : public AssemblingModel {
     std::int32_t stencil;  ///< index of the stored one, or -1
     std::uint8_t count;
     bool contiguous;  ///< eight points in a row
+    std::uint8_t live = 0xff;  ///< lanes whose points have not left
   };
   struct Memory {
     FamilyArrays family;
@@ -66,15 +69,28 @@ class WeightedModel final : public AssemblingModel {
   /// Bonds of a point as arrays with their shares; on a cloud with b_k where it is stored.
   void load_cloud_family(std::size_t p, Memory& m) const;
   void load_class(std::int32_t family, Memory& m) const;
+  void set_lattice_shares(double scale, Memory& m) const;
+  void set_cloud_shares(std::size_t p, Memory& m) const;
   /// Stencil of the family in m, with the moments of these fields.
   void build(Memory& m, int fields, const double* const (*u)[D]) const;
   /// u of the far ends relative to the owner, [c * size + k].
   void load_differences(std::int32_t point, const AlignedVector<Row>& rows, Memory& m, AlignedVector<double>& out) const;
 
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override;
+  /// With damage: where the points are.
+  void prepare_damage();
+  /// The bonds that are left to a point, as load_cloud_family.
+  void load_own_family(std::int32_t p, Memory& m) const;
+
   EvaluationStatus run(Pass& pass);
   void block(std::size_t b, Pass& pass);
   /// Evaluate a group; -1, or an inadmissible one of its points.
   std::int32_t single(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  /// With the family in m.
+  std::int32_t evaluate_family(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  /// Lanes of a group to be evaluated: the others have no gradient and no weight.
+  std::uint8_t lanes(const Group& g, const Pass& pass) const noexcept;
   std::int32_t together(const Group& g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   std::int32_t side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   /// W of evaluation point q of point p.
@@ -82,6 +98,8 @@ class WeightedModel final : public AssemblingModel {
   /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
   void keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
 
+  /// No gradient at evaluation points slot ... slot + slots - 1, of eight owners side by side, of the owners that are not kept.
+  static void clear_lanes(std::uint8_t kept, int slot, int slots, double* H, double* dH) noexcept;
   /// Of eight owners side by side (selective map): pressure on their gradients and its rate += those of the lanes, owner l at lanes
   /// l, l + 8, ...
   static void add_pressures(int lanes, const BatchScratch& s, bool tangent, double (&pressure)[2][8]);
@@ -109,6 +127,15 @@ class WeightedModel final : public AssemblingModel {
   Field condition_, damage_;
   std::size_t bonds_ = 0, broken_ = 0, singular_ = 0, fallbacks_ = 0, dropped_ = 0;
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows
+  // With damage.
+  struct Place {
+    std::uint32_t block, group;
+    std::uint8_t lane;
+    bool left;  ///< its bonds have failed: it makes its own stencil
+  };
+  std::optional<LatticeBonds> lattice_bonds_;
+  std::vector<Place> place_;                     ///< by point
+  std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;

@@ -7,8 +7,11 @@
 /// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w). At higher orders the gradient's own share remains: see
 /// stencil_penalty.cpp.
 
+#include <cstdint>
 #include <memory>
+#include <span>
 
+#include "bond_state.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/model/stabilization.hpp"
 
@@ -28,6 +31,10 @@ class ZeroEnergyPenalty {
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;
+  /// E of the points of the marked groups (where bonds fail).
+  virtual double energy_of(ConstFieldView u, const GroupMarks& marks) = 0;
+  /// What follows from the bonds of these points is to be computed anew; the model knows already.
+  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// The force needs no divergence of its own, as sum of omega z (x) xi V = 0.
   virtual bool simple_force() const noexcept { return true; }
 };
@@ -37,7 +44,7 @@ template <int D>
 std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model);
 template <int D>
 std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model);
-/// Over a point gradient of higher order.
+/// Over a point gradient of higher order; bonds do not fail.
 template <int D>
 std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty(const ModelParts& parts);
 

@@ -34,7 +34,7 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   read_materials(factory);
   displacement_ = body_.make_field(dimension());
   internal_force_ = body_.make_field(dimension());
-  read_damage(quasi_static);
+  read_damage();
   try {
     model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, scene_.share, damage_.get()});
   } catch (const std::domain_error& error) {
@@ -166,11 +166,6 @@ void BodyProblem::refuse_assembly() const {
   if (partition_) throw RunError("an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers without a preconditioner");
 }
 
-EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
-  refuse_assembly();
-  return model_->assemble(u, K);
-}
-
 AssembledSize BodyProblem::assembled_size() {
   refuse_assembly();
   return model_->assembled_size();
@@ -236,7 +231,9 @@ void append(std::vector<std::byte>& bytes, const void* data, std::size_t size) {
   bytes.insert(bytes.end(), from, from + size);
 }
 
-class ByteReader {
+}  // namespace
+
+class BodyProblem::ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
   void take(void* to, std::size_t size) {
@@ -256,16 +253,8 @@ class ByteReader {
   std::span<const std::byte> bytes_;
 };
 
-}  // namespace
-
-std::vector<std::byte> BodyProblem::snapshot() const {
-  std::vector<std::byte> bytes;
+void BodyProblem::append_bonds(std::vector<std::byte>& bytes) const {
   const auto scalar = [&](const auto& value) { append(bytes, &value, sizeof value); };
-  scalar(static_cast<std::uint64_t>(stride()));
-  scalar(time_);
-  scalar(last_step_);
-  scalar(step_);
-  scalar(energies_);
   scalar(gains_);
   scalar(gained_);
   const std::vector<BondChange> bonds = model_->changed_bonds();
@@ -276,6 +265,43 @@ std::vector<std::byte> BodyProblem::snapshot() const {
     scalar(b.bond);
     scalar(b.integrity);
   }
+}
+
+void BodyProblem::take_bonds(ByteReader& in) {
+  gains_ = in.value<std::int64_t>();
+  gained_ = in.value<double>();
+  std::vector<BondChange> bonds;
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    BondChange b;
+    b.point = in.value<std::int32_t>();
+    b.far = in.value<std::int32_t>();
+    b.bond = in.value<std::int64_t>();
+    b.integrity = in.value<double>();
+    bonds.push_back(b);
+  }
+  model_->restore_bonds(bonds);
+}
+
+std::vector<std::byte> BodyProblem::bonds() const {
+  std::vector<std::byte> bytes;
+  if (damage_) append_bonds(bytes);
+  return bytes;
+}
+
+void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
+  ByteReader in(bonds);
+  take_bonds(in);
+}
+
+std::vector<std::byte> BodyProblem::snapshot() const {
+  std::vector<std::byte> bytes;
+  const auto scalar = [&](const auto& value) { append(bytes, &value, sizeof value); };
+  scalar(static_cast<std::uint64_t>(stride()));
+  scalar(time_);
+  scalar(last_step_);
+  scalar(step_);
+  scalar(energies_);
+  append_bonds(bytes);
   scalar(static_cast<std::uint64_t>(numbers_.size()));
   for (const auto& [name, values] : numbers_) {
     scalar(static_cast<std::uint64_t>(name.size()));
@@ -306,18 +332,7 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   last_step_ = in.value<double>();
   step_ = in.value<std::int64_t>();
   energies_ = in.value<Energies>();
-  gains_ = in.value<std::int64_t>();
-  gained_ = in.value<double>();
-  std::vector<BondChange> bonds;
-  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
-    BondChange b;
-    b.point = in.value<std::int32_t>();
-    b.far = in.value<std::int32_t>();
-    b.bond = in.value<std::int64_t>();
-    b.integrity = in.value<double>();
-    bonds.push_back(b);
-  }
-  model_->restore_bonds(bonds);
+  take_bonds(in);
   const auto text = [&] {
     const auto length = in.value<std::uint64_t>();
     if (length > 256) throw InputError("the saved state is damaged");

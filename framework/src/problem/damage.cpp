@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -28,19 +29,21 @@ double mean_bond_length(const InfluenceFunction& influence, int dimension, doubl
 
 }  // namespace
 
-void BodyProblem::read_damage(bool quasi_static) {
+void BodyProblem::read_damage() {
   if (!damage_law_) return;
   const KinematicsTraits traits = kinematics_->traits();
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene_.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
-  if (quasi_static) refuse(fmt::format("integrator \"{}\"", scene_.integrator->type), "integrators of dynamic runs, whose forces are not assembled");
   if (partition_) refuse("a body on several ranks", "one rank");
   if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene_.stabilization) refuse("kinematics.stabilization", "kinematics without one");
-  if (traits.at == EvaluationPoints::weighted || traits.order > 1) {
-    refuse(fmt::format("kinematics \"{}\", whose stencils are made once", scene_.kinematics->type), "pair laws, and kinematics over the point gradient of order 1");
+  if (scene_.stabilization && traits.order > 1)
+    refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
+  if (traits.at == EvaluationPoints::bonds && traits.order > 1) {
+    refuse(
+        fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, traits.order),
+        "order 1");
   }
   damage_ = std::make_unique<BodyDamage>();
   damage_->law = damage_law_;
@@ -71,6 +74,29 @@ void BodyProblem::read_damage(bool quasi_static) {
   if (equal) damage_->failure = Field();
 }
 
+EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
+  refuse_assembly();
+  const EvaluationStatus status = model_->assemble(u, K);
+  const std::vector<BondChange> changed = status.ok() ? model_->changed_bonds() : std::vector<BondChange>{};
+  if (changed.empty()) return status;
+  constexpr double share = 1e-9;
+  const auto d = static_cast<std::size_t>(K.dimension);
+  const auto diagonal = [&](std::size_t row) {
+    const auto begin = K.column.begin() + K.row_first[row], end = K.column.begin() + K.row_first[row + 1];
+    return K.values.data() +
+           static_cast<std::size_t>(std::lower_bound(begin, end, static_cast<std::int32_t>(row)) - K.column.begin()) * d * d;
+  };
+  double sum = 0;
+  for (std::size_t row = 0; row < K.rows(); ++row)
+    for (std::size_t c = 0; c < d; ++c) sum += std::abs(diagonal(row)[c * d + c]);
+  const double held = share * sum / static_cast<double>(K.rows() * d);
+  std::vector<std::uint8_t> ends(stride(), 0);
+  for (const BondChange& b : changed) ends[static_cast<std::size_t>(b.point)] = ends[static_cast<std::size_t>(b.far)] = 1;
+  for (std::size_t row = 0; row < K.rows(); ++row)
+    for (std::size_t c = 0; c < d && ends[static_cast<std::size_t>(K.point[row])]; ++c) diagonal(row)[c * d + c] += held;
+  return status;
+}
+
 bool BodyProblem::update_bonds(double time_step, ConstFieldView velocity) {
   // Half of the next step of an explicit scheme: its forces are known, and come from the bonds as they were.
   const Motion half_step = [&](FieldView end) {
@@ -97,8 +123,10 @@ std::string BodyProblem::fracture_summary() const {
   const BondChecks checks = model_->bond_checks();
   std::string text = fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, energies_.dissipated);
   if (checks.groups > 0) {
-    text += fmt::format("bond checks   {} of {} groups of eight points in {} steps ({:.2f} %); the others were too far from failing\n", checks.checked, checks.groups,
-                        checks.updates, 100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
+    text += fmt::format(
+        "bond checks   {} of {} groups of eight points in {} updates ({:.2f} %); the others were too far from failing\n",
+        checks.checked, checks.groups, checks.updates,
+        100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
   }
   if (gains_ > 0) {
     text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all ({:.3g} of what was dissipated)\n", gains_, gained_,

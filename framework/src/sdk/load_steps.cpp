@@ -15,23 +15,44 @@ ParameterTable load_step_parameters(std::int64_t max_iterations) {
   table.number("tolerance", "-", "Out-of-balance force over the norm of reactions and loads.").by_default("1.0e-8").positive().below(1.0);
   table.integer("max_iterations", "Iterations of a step before it is cut back.").by_default(fmt::to_string(max_iterations)).at_least(1).at_most(1e9);
   table.integer("cut_backs", "Halvings of a planned step before the run gives up.").by_default("10").at_least(0).at_most(30);
+  table
+      .integer(
+          "bond_rounds",
+          "With [damage]: times that bonds may fail, each followed by a new equilibrium, at one load; beyond, the run gives up.")
+      .by_default("1000")
+      .at_least(1)
+      .at_most(1e9);
   return table;
 }
 
 LoadStepOptions load_step_options(const ParameterValues& values) {
-  return {values.integer("steps"), values.number("tolerance"), values.integer("max_iterations"), values.integer("cut_backs")};
+  return {values.integer("steps"), values.number("tolerance"), values.integer("max_iterations"), values.integer("cut_backs"),
+          values.integer("bond_rounds")};
 }
 
 namespace {
 
+/// Bonds that weaken gradually do so less and less at one load, and never cease to. What puts the body out of balance by less
+/// than this share of the largest reference of the run is left to the next step.
+constexpr double negligible = 1e-6;
+
 class LoadSteps {
  public:
-  LoadSteps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver)
-      : integrator_(integrator), options_(options), problem_(problem), observer_(observer), solver_(solver),
-        equilibrium_(problem, options.tolerance), u_(problem.displacement()), last_increment_(problem.declare("load_step_increment", problem.dimension())),
-        residual_(problem.make_field(problem.dimension())), driving_(problem.make_field(problem.dimension())),
-        old_driving_(problem.make_field(problem.dimension())), start_(problem.make_field(problem.dimension())),
-        numbers_(problem.declare_numbers("load_steps", 4)) {}
+  LoadSteps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer,
+            EquilibriumSolver& solver)
+      : integrator_(integrator),
+        options_(options),
+        problem_(problem),
+        observer_(observer),
+        solver_(solver),
+        equilibrium_(problem, options.tolerance),
+        u_(problem.displacement()),
+        last_increment_(problem.declare("load_step_increment", problem.dimension())),
+        residual_(problem.make_field(problem.dimension())),
+        driving_(problem.make_field(problem.dimension())),
+        old_driving_(problem.make_field(problem.dimension())),
+        start_(problem.make_field(problem.dimension())),
+        numbers_(problem.declare_numbers("load_steps", 5)) {}
 
   void run() {
     if (started() == 0) begin();
@@ -45,6 +66,7 @@ class LoadSteps {
   double& position() noexcept { return numbers_[1]; }
   double& increment() noexcept { return numbers_[2]; }        ///< of the position, for the next step
   double& last_span() noexcept { return numbers_[3]; }        ///< length of the last step; 0: none to continue
+  double& largest_reference() noexcept { return numbers_[4]; }  ///< of the equilibria so far [N]
   double planned() const noexcept { return static_cast<double>(options_.steps); }
 
   void begin() {
@@ -63,14 +85,17 @@ class LoadSteps {
     // A step never passes a planned point.
     double span = std::min(increment(), std::floor(position()) + 1 - position());
     const double smallest = std::ldexp(1.0, -static_cast<int>(options_.cut_backs));
+    remember();
     for (;;) {
       Solution solution = attempt(span, last_span() > 0);
       // A continuation that cannot even be evaluated is dropped before the step is.
       if (!solution.converged && solution.iterations == 0 && last_span() > 0) solution = attempt(span, false);
+      if (solution.converged) settle(span, solution);
       if (solution.converged) {
         accept(span, solution);
         return;
       }
+      give_up();
       const double t = (position() + span) / planned();
       equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
       if (span / 2 < smallest) {
@@ -90,8 +115,13 @@ class LoadSteps {
     copy(u_, start_);
     if (extrapolate) combine(1, u_, span / last_span(), last_increment_, start_);
     equilibrium_.note(fmt::format("step {}  t = {:.9g}", problem_.step() + 1, t));
+    return find(t, extrapolate);
+  }
+
+  /// The equilibrium at t from start_.
+  Solution find(double t, bool extrapolated) {
     equilibrium_.begin(t, start_);
-    Solution solution = solver_.solve(equilibrium_, extrapolate);
+    Solution solution = solver_.solve(equilibrium_, extrapolated);
     if (!solution.converged) return solution;
     // Forces and energy of exactly this state, and the judgement of this class rather than the solver's.
     equilibrium_.impose(equilibrium_.displacement());
@@ -104,22 +134,86 @@ class LoadSteps {
     return solution;
   }
 
-  void accept(double span, const Solution& solution) {
+  /// The equilibrium that was found is the state of the body; its work counts.
+  void take() {
+    largest_reference() = std::max(largest_reference(), equilibrium_.reference());
     find_driving_force(driving_);
     combine(1, equilibrium_.displacement(), -1, u_, last_increment_);
     problem_.energies().external_work += 0.5 * (dot(old_driving_, last_increment_) + dot(driving_, last_increment_));
     copy(driving_, old_driving_);
     copy(equilibrium_.displacement(), u_);
+  }
+
+  /// Lets bonds fail at the equilibrium that was found, and finds equilibrium again at the same load, until no more fail or what
+  /// they did is negligible.
+  void settle(double span, Solution& solution) {
+    const double t = (position() + span) / planned();
+    Energies& energies = problem_.energies();
+    take();
+    continues_ = true;
+    bool settled = false;
+    for (std::int64_t round = 1; !settled && problem_.advance_history(span / planned()); ++round) {
+      continues_ = false;
+      solver_.bonds_changed();
+      solution.converged = equilibrium_.residual(u_, residual_, &energies.strain);
+      if (!solution.converged) solution.failure = equilibrium_.failure();
+      if (!solution.converged || equilibrium_.converged()) break;
+      settled = equilibrium_.residual_norm() <= negligible * largest_reference();
+      equilibrium_.note(fmt::format("  bonds fail, round {:3}: {:.4g} J dissipated so far", round, energies.dissipated));
+      if (round > options_.bond_rounds) {
+        observer_.log(equilibrium_.take_notes());
+        throw RunError(
+            fmt::format("{}: bonds go on failing at load parameter {:.9g} (after step {}): {} times, each followed by a new "
+                        "equilibrium, as many as bond_rounds allows. "
+                        "The body may be about to break apart; a crack that has far to run at one load needs more rounds",
+                        integrator_, t, problem_.step(), options_.bond_rounds));
+      }
+      const double held = energies.strain - energies.external_work;
+      copy(u_, start_);
+      const Solution again = find(t, false);
+      solution.iterations += again.iterations;
+      solution.converged = again.converged;
+      solution.failure = again.failure;
+      if (!again.converged) break;
+      take();
+      energies.dissipated += held - (energies.strain - energies.external_work);
+    }
+    if (!continues_) find_driving_force(old_driving_);
+  }
+
+  void accept(double span, const Solution& solution) {
     position() += span;
-    last_span() = span;
+    last_span() = continues_ ? span : 0;  // the path has a kink where bonds have failed
     increment() = std::min(1.0, 2 * span);
     problem_.time() = position() / planned();
     ++problem_.step();
-    problem_.advance_history(span / planned());
     solver_.accepted(problem_, u_);
     observer_.log(equilibrium_.take_notes());
     observer_.wants_sample(problem_.step(), problem_.time());
     report(span / planned(), solution.iterations);
+  }
+
+  /// With [damage] a step consists of several equilibria: what is needed to return to where it began.
+  void remember() {
+    bonds_ = problem_.bonds();
+    if (bonds_.empty()) return;
+    first_ = problem_.energies();
+    for (Field* field : {&first_u_, &first_driving_, &first_increment_})
+      if (field->size() == 0) *field = problem_.make_field(problem_.dimension());
+    copy(u_, first_u_);
+    copy(old_driving_, first_driving_);
+    copy(last_increment_, first_increment_);
+  }
+
+  void give_up() {
+    if (bonds_.empty()) return;
+    problem_.energies() = first_;
+    copy(first_u_, u_);
+    copy(first_driving_, old_driving_);
+    copy(first_increment_, last_increment_);
+    if (problem_.bonds() == bonds_) return;
+    problem_.restore_bonds(bonds_);
+    solver_.bonds_changed();
   }
 
   /// What moves the body from outside: the loads, and on prescribed components load and reaction, -internal force [N].
@@ -151,6 +245,10 @@ class LoadSteps {
   FieldView u_, last_increment_;
   Field residual_, driving_, old_driving_, start_;
   std::span<double> numbers_;
+  bool continues_ = true;         ///< no bond has failed in the last step
+  std::vector<std::byte> bonds_;  ///< at the beginning of the step; empty without [damage]
+  Field first_u_, first_driving_, first_increment_;
+  Energies first_;
 };
 
 }  // namespace

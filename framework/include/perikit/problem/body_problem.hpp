@@ -49,6 +49,8 @@ class BodyProblem final : public Problem {
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
   bool advance_history(double time_step, ConstFieldView velocity = {}) override;
+  std::vector<std::byte> bonds() const override;
+  void restore_bonds(std::span<const std::byte> bonds) override;
 
   bool any_constraint() const noexcept override { return !constraints_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
@@ -105,7 +107,11 @@ class BodyProblem final : public Problem {
   void read_materials(const PartFactory& factory);
   /// Laws with history: refuses runs that have no steps of a path, and makes room.
   void prepare_history(bool quasi_static);
-  void read_damage(bool quasi_static);
+  void read_damage();
+  class ByteReader;
+  /// State of the bonds in snapshots.
+  void append_bonds(std::vector<std::byte>& bytes) const;
+  void take_bonds(ByteReader& in);
   /// Lets bonds fail at the present displacement; true where any changed.
   bool update_bonds(double time_step, ConstFieldView velocity);
   void read_initial();

@@ -94,8 +94,10 @@ class Problem {
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
   /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
   virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
-  /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must
-  /// come from this problem. Values are overwritten; undefined after a failure.
+  /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K
+  /// has must come from this problem. Values are overwritten; undefined after a failure. Points at bonds that have failed are
+  /// held by 1e-9 of the mean stiffness of a point: pieces that nothing else holds then stay where they are, and K is not
+  /// singular.
   virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
   /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
   virtual AssembledSize assembled_size() = 0;
@@ -104,9 +106,14 @@ class Problem {
   virtual bool any_load() const noexcept = 0;
   virtual bool loads_depend_on_time() const noexcept = 0;
   /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
-  /// velocity: of explicit schemes, of the last half step. Their forces of this step come from the bonds as they were, so that bonds that fail now act for another
-  /// half step, and what they dissipate is taken there.
+  /// velocity: of explicit schemes, of the last half step. Their forces of this step come from the bonds as they were, so that
+  /// bonds that fail now act for another half step, and what they dissipate is taken there. Quasi-static runs call it at every
+  /// equilibrium: as long as bonds change, the step is not over.
   virtual bool advance_history(double time_step, ConstFieldView velocity = {}) = 0;
+  /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
+  virtual std::vector<std::byte> bonds() const = 0;
+  /// Bonds of `bonds`, not empty.
+  virtual void restore_bonds(std::span<const std::byte> bonds) = 0;
 
   // Constraints.
   virtual bool any_constraint() const noexcept = 0;

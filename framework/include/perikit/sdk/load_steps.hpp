@@ -15,9 +15,10 @@ struct LoadStepOptions {
   double tolerance = 1e-8;        ///< of the residual, relative to reactions and loads
   std::int64_t max_iterations = 25;
   std::int64_t cut_backs = 10;    ///< halvings of a planned step before the run gives up
+  std::int64_t bond_rounds = 1000;  ///< times that bonds may fail at one load
 };
 
-/// A table with the keys steps, tolerance, max_iterations, cut_backs. `max_iterations`: its default.
+/// A table with the keys steps, tolerance, max_iterations, cut_backs, bond_rounds. `max_iterations`: its default.
 ParameterTable load_step_parameters(std::int64_t max_iterations);
 LoadStepOptions load_step_options(const ParameterValues& values);
 
@@ -37,14 +38,21 @@ class EquilibriumSolver {
   virtual Solution solve(Equilibrium& equilibrium, bool extrapolated) = 0;
   /// After a step that converged, `u` its displacement: where state that later steps reuse may be renewed.
   virtual void accepted(Problem&, ConstFieldView /*u*/) {}
+  /// Bonds have failed, or are as before because a step was given up: a tangent that is kept is that of another body.
+  virtual void bonds_changed() {}
 };
 
 /// Runs `problem` from its load parameter to 1. Planned steps are equal, end exactly at k/steps and start from the linear
 /// continuation of the last one. A step that does not converge or meets an inadmissible deformation is halved, at most
 /// `cut_backs` times; every success doubles the step again, up to the planned one. Work of loads and prescribed
-/// displacements by the trapezoidal rule. Steps, the last increment and the load parameter are kept with the problem, so that a
-/// restored run continues to the bit.
-/// Throws RunError when the smallest step fails, with load parameter, step and reason.
+/// displacements by the trapezoidal rule.
+/// With [damage] bonds fail at equilibria only, and then equilibrium is found again at the same load, until no more fail, or
+/// those that did put the body out of balance by less than 1e-6 of the largest reference so far: then the step counts, in
+/// equilibrium with the bonds it leaves. What the body sets free on its way from one equilibrium to the next, bonds apart, would
+/// become motion; a run without inertia counts it as dissipated. A step that is given up between two equilibria gives its bonds
+/// back. Steps, the last increment and the load parameter are kept with the problem, so that a restored run continues to the bit.
+/// Throws RunError when the smallest step fails, or bonds have failed bond_rounds times at one load, with load parameter, step
+/// and reason.
 void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver);
 
 }  // namespace perikit

@@ -19,6 +19,8 @@ class LinearisedProblem {
   virtual bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) = 0;
   /// True where solve() is as good as exact.
   virtual bool exact() const noexcept = 0;
+  /// See EquilibriumSolver.
+  virtual void bonds_changed() {}
 };
 
 /// Newton iteration [Hashim et al. eqs. 21-29, Partmann et al. eqs. 3.69-3.72]:
@@ -33,6 +35,7 @@ class NewtonIteration final : public EquilibriumSolver {
   NewtonIteration(LinearisedProblem& equations, std::int64_t max_iterations, bool line_search)
       : equations_(equations), max_iterations_(max_iterations), line_search_(line_search) {}
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
+  void bonds_changed() override { equations_.bonds_changed(); }
 
  private:
   LinearisedProblem& equations_;

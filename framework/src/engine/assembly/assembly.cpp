@@ -29,6 +29,46 @@ AssembledSize Assembly::size() const {
           blocks * (entries * sizeof(double) + sizeof(std::int32_t)) + families_.rows() * 12 + families_.bytes() + work_bytes()};
 }
 
+void Assembly::set_bonds(std::span<const BondChange> changes) {
+  families_.set_bonds(changes);
+  bonds_changed();
+}
+
+EvaluationStatus AssemblingModel::assemble(ConstFieldView u, BlockMatrix& K) {
+  Assembly& own = assembly();
+  if (fracture_ && fracture_->version() != assembled_version_) {
+    own.set_bonds(fracture_->changes());
+    assembled_version_ = fracture_->version();
+  }
+  return own.assemble(u, K);
+}
+
+void AssemblingModel::watch_bonds(BondState& state) {
+  fracture_.emplace(*parts_.body, *parts_.damage, state, parts_.skip);
+}
+
+BondUpdate AssemblingModel::update_bonds(ConstFieldView u, const Motion& motion) {
+  if (!fracture_) return {};
+  return fracture_->update(
+      u, motion,
+      [&](ConstFieldView at, const GroupMarks& marks) {
+        return energy_of(at, marks) + (penalty_ ? penalty_->energy_of(at, marks) : 0.0);
+      },
+      changed());
+}
+
+Fracture::Changed AssemblingModel::changed() {
+  return [this](std::span<const std::int32_t> points) {
+    std::vector<BondChange> fragments = bonds_changed(points);
+    if (penalty_) penalty_->bonds_changed(points);
+    return fragments;
+  };
+}
+
+void AssemblingModel::restore_bonds(std::span<const BondChange> changes) {
+  if (fracture_) fracture_->restore(changes, changed());
+}
+
 namespace {
 
 template <int D>

@@ -3,9 +3,12 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "engine/assembly/block_pattern.hpp"
+#include "engine/bond_state.hpp"
+#include "engine/zero_energy_penalty.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/engine/model.hpp"
 
@@ -17,12 +20,16 @@ class Assembly {
   virtual ~Assembly() = default;
   EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K);
   AssembledSize size() const;
+  /// Of bonds that fail: every change since the set-up. The pattern stays that of the set-up.
+  void set_bonds(std::span<const BondChange> changes);
 
  protected:
   /// steps: bonds between two points that depend on each other, at most.
   Assembly(const ModelParts& parts, int steps);
   /// Adds to values that are zero. Returns the field index of the first inadmissible point, or -1.
   virtual std::int64_t fill(ConstFieldView u, BlockMatrix& K) = 0;
+  /// What is kept from one assembly to the next and depends on bonds is to be made anew.
+  virtual void bonds_changed() {}
   /// Kept from one assembly to the next.
   virtual std::size_t work_bytes() const noexcept { return 0; }
   const PointFamilies& families() const noexcept { return families_; }
@@ -35,15 +42,30 @@ class Assembly {
   bool convex_ = false;
 };
 
-/// A model with an assembled tangent. By default that of the correspondence shapes.
+/// A model with an assembled tangent, by default that of the correspondence shapes, and with bonds that fail.
 class AssemblingModel : public Model {
  public:
-  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K) final { return assembly().assemble(u, K); }
+  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K) final;
   AssembledSize assembled_size() final { return assembly().size(); }
+  BondUpdate update_bonds(ConstFieldView u, const Motion& motion = {}) final;
+  std::vector<BondChange> changed_bonds() const final { return fracture_ ? fracture_->changes() : std::vector<BondChange>{}; }
+  void restore_bonds(std::span<const BondChange> changes) final;
+  /// A penalty on top of this model changes with the bonds too. It must outlive the model's last update.
+  void watch_bonds_of(ZeroEnergyPenalty& penalty) noexcept { penalty_ = &penalty; }
+  BondChecks bond_checks() const final { return fracture_ ? fracture_->checks() : BondChecks{}; }
 
  protected:
   explicit AssemblingModel(const ModelParts& parts) : parts_(parts) {}
   virtual std::unique_ptr<Assembly> make_assembly(const ModelParts& parts) const;
+  Fracture::Changed changed();
+  /// With [damage], once the families are there.
+  void watch_bonds(BondState& state);
+  const Fracture* fracture() const noexcept { return fracture_ ? &*fracture_ : nullptr; }
+  std::size_t fracture_bytes() const noexcept { return fracture_ ? fracture_->bytes() : 0; }
+  /// Strain energy of the evaluation points that the marked groups own.
+  virtual double energy_of(ConstFieldView, const GroupMarks&) { return 0; }
+  /// See Fracture::Changed.
+  virtual std::vector<BondChange> bonds_changed(std::span<const std::int32_t>) { return {}; }
 
  private:
   Assembly& assembly() {
@@ -53,6 +75,9 @@ class AssemblingModel : public Model {
 
   ModelParts parts_;
   std::unique_ptr<Assembly> assembly_;
+  std::optional<Fracture> fracture_;
+  ZeroEnergyPenalty* penalty_ = nullptr;  ///< null: none
+  std::size_t assembled_version_ = 0;     ///< of the bonds that the assembly knows
 };
 
 /// First inadmissible point of loops over blocks: the smallest field index that any thread reports.

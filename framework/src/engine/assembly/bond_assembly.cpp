@@ -22,15 +22,16 @@ template <int D>
 BondAssembly<D>::BondAssembly(const ModelParts& parts)
     : Assembly(parts, parts.kinematics->traits().base == BondBase::mean ? 3 : 2),
       laws_(*parts.laws),
+      kinematics_(parts.kinematics),
       traits_(parts.kinematics->traits()),
       mean_(traits_.base == BondBase::mean),
       symmetric_(traits_.pair_symmetric && !traits_.selective && parts.share),
       colouring_(cloud_reach(families().lists(), families().rows())) {
-  read_bonds(parts);
+  read_bonds();
 }
 
 template <int D>
-void BondAssembly<D>::read_bonds(const ModelParts& parts) {
+void BondAssembly<D>::read_bonds() {
   const std::size_t rows = families().rows();
   bond_.resize(families().bonds());
   own_gradient_.assign(D * rows, 0.0);
@@ -47,7 +48,7 @@ void BondAssembly<D>::read_bonds(const ModelParts& parts) {
     families().load(i, s.family);
     families().bond_shares(i, s.family, s.share);
     s.correction.assign(D * s.family.size, 0.0);
-    parts.kinematics->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
+    kinematics_->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
     point_gradient(s.family, families().body().horizon(), traits_.order, s.gradient);
     regular_[i] = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
     const auto neighbours = families().neighbours(i);
@@ -204,7 +205,7 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, Con
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t k = families().first(i); k < families().first(i + 1); ++k) {
       const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
-      if (j < i && evaluated_once(i, j)) continue;
+      if ((j < i && evaluated_once(i, j)) || families().integrity(k) == 0) continue;
       add_lane(i, k, u, m);
       if (m.batch.lanes() < batch_points) continue;
       const std::int64_t bad = finish();

@@ -37,8 +37,9 @@ class BondAssembly final : public Assembly {
   };
 
   std::int64_t fill(ConstFieldView u, BlockMatrix& K) override;
+  void bonds_changed() override { read_bonds(); }
   std::size_t work_bytes() const noexcept override;
-  void read_bonds(const ModelParts& parts);
+  void read_bonds();
   void point_gradients(std::size_t row, ConstFieldView u) noexcept;
   /// ij and ji have the same gradient and the same law: one evaluation with both weights.
   bool evaluated_once(std::size_t i, std::size_t j) const noexcept;
@@ -48,6 +49,7 @@ class BondAssembly final : public Assembly {
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
 
   const Laws& laws_;
+  std::shared_ptr<const Kinematics> kinematics_;
   KinematicsTraits traits_;
   bool mean_, symmetric_;
   std::vector<Bond> bond_;

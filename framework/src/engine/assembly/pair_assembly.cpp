@@ -29,8 +29,11 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
   const auto neighbours = families().neighbours(row);
   const std::size_t p = families().point(row);
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
-    m.omega[k] = traits_.influence ? m.family.omega[k] : 1.0;
-    for (std::size_t c = 0; c < D; ++c) {
+    // b weakens the bond itself and leaves its law alone; a broken one is at rest, wherever its far end may be.
+    const double b = families().integrity(families().first(row) + k);
+    m.family.volume[k] *= b;
+    m.omega[k] = traits_.influence && b > 0 ? m.family.omega[k] / b : 1.0;
+    for (std::size_t c = 0; c < D && b > 0; ++c) {
       const double* value = u.component(static_cast<int>(c));
       m.du[c][k] = value[families().point(static_cast<std::size_t>(neighbours[k]))] - value[p];
     }

@@ -49,7 +49,70 @@ void PointFamilies::read_lattice() {
   }
 }
 
+void PointFamilies::set_bonds(std::span<const BondChange> changes) {
+  if (integrity_.empty()) {
+    if (changes.empty()) return;
+    if (cloud_) inverse_ = cloud_->inverse;
+    first_ = {damage_, inverse_, whole_};
+  }
+  // From the set-up on: what follows from the bonds must not depend on the order in which they failed.
+  integrity_.assign(bonds(), 1.0);
+  damage_ = first_.damage;
+  inverse_ = first_.inverse;
+  whole_ = first_.whole;
+  weakened_ = false;
+  std::vector<std::size_t> ends;
+  const auto row_of = [&](std::int32_t p) {
+    return static_cast<std::size_t>(std::lower_bound(point_.begin(), point_.end(), p) - point_.begin());
+  };
+  const auto lower = [&](std::size_t row, std::size_t far, double b) {
+    const auto family = neighbours(row);
+    integrity_[first(row) +
+               static_cast<std::size_t>(std::lower_bound(family.begin(), family.end(), static_cast<std::int32_t>(far)) -
+                                        family.begin())] = b;
+    ends.push_back(row);
+  };
+  for (const BondChange& c : changes) {
+    const std::size_t row = row_of(c.point), far = row_of(c.far);
+    lower(row, far, c.integrity);
+    lower(far, row, c.integrity);
+    weakened_ = weakened_ || (c.integrity > 0 && c.integrity < 1);
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  for (const std::size_t row : ends) changed(row);
+}
+
+void PointFamilies::changed(std::size_t row) {
+  FamilyArrays family;
+  load_first(row, family);
+  double K[6] = {}, whole = 0, left = 0;
+  const int d = family.dimension;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k) {
+    const double w = family.omega[k] * family.volume[k], b = integrity_[first(row) + k];
+    whole += w;
+    left += b * w;
+    for (int a = 0; a < d; ++a)
+      for (int e = a; e < d; ++e) K[symmetric_index(d, a, e)] += b * w * family.xi[a][k] * family.xi[e][k];
+  }
+  double* inverse = &inverse_[6 * row];
+  d == 1 ? invert_shape<1>(K, inverse) : d == 2 ? invert_shape<2>(K, inverse) : invert_shape<3>(K, inverse);
+  damage_[row] = whole > 0 ? 1 - (1 - first_.damage[row]) * left / whole : 1.0;
+  if (!whole_.empty()) whole_[row] = 0;
+}
+
 void PointFamilies::load(std::size_t row, FamilyArrays& out) const {
+  load_first(row, out);
+  if (integrity_.empty()) return;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(out.bonds); ++k) out.omega[k] *= integrity_[first(row) + k];
+  std::copy_n(&inverse_[6 * row], 6, out.inverse_shape);
+  out.integrity.clear();
+  if (!weakened_) return;
+  out.integrity.assign(out.size, 1.0);
+  std::copy_n(integrity_.data() + first(row), out.bonds, out.integrity.begin());
+}
+
+void PointFamilies::load_first(std::size_t row, FamilyArrays& out) const {
   if (cloud_) return cloud_->load(row, out);
   lattice_->load({slot_.data() + first(row), first(row + 1) - first(row)}, out);
   std::copy_n(&inverse_[6 * row], 6, out.inverse_shape);
@@ -58,12 +121,14 @@ void PointFamilies::load(std::size_t row, FamilyArrays& out) const {
 void PointFamilies::bond_shares(std::size_t row, const FamilyArrays& family, AlignedVector<double>& share) const {
   share.assign(family.size, 0.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k)
-    share[k] = family.volume[k] * (weight_ == BondWeight::kernel ? family.omega[k] : 1.0) / normaliser_[row];
+    share[k] =
+        family.volume[k] * (weight_ == BondWeight::kernel ? family.omega[k] : integrity(first(row) + k)) / normaliser_[row];
 }
 
 std::size_t PointFamilies::bytes() const noexcept {
   return (lattice_ ? lattice_->bytes() : cloud_->bytes()) + rows() * 4 + lattice_lists_.neighbour.size() * 6 +
-         lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size();
+         lattice_lists_.first.size() * 8 + (normaliser_.size() + damage_.size() + inverse_.size()) * 8 + whole_.size() +
+         (integrity_.size() + first_.damage.size() + first_.inverse.size()) * 8 + first_.whole.size();
 }
 
 bool point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {

@@ -33,6 +33,10 @@ class PointFamilies {
   bool whole(std::size_t row) const noexcept { return !whole_.empty() && whole_[row]; }
   double damage(std::size_t row) const noexcept { return damage_[row]; }   ///< D_i
   double normaliser(std::size_t row) const noexcept { return normaliser_[row]; }   ///< N_i of bond weights over the whole family
+  /// Every change of bonds since the set-up. Those that fail stay in the lists, with less or no influence.
+  void set_bonds(std::span<const BondChange> changes);
+  /// b of a bond.
+  double integrity(std::size_t bond) const noexcept { return integrity_.empty() ? 1.0 : integrity_[bond]; }
   /// Bonds in the order of neighbours(row), with the inverse shape tensor.
   void load(std::size_t row, FamilyArrays& out) const;
   /// w_ij of each bond of a loaded family, 1/N_i over the whole one; padded.
@@ -41,6 +45,10 @@ class PointFamilies {
 
  private:
   void read_lattice();
+  /// The family as it was at the set-up.
+  void load_first(std::size_t row, FamilyArrays& out) const;
+  /// Shape tensor and damage of a row whose bonds have changed.
+  void changed(std::size_t row);
 
   const Body& body_;
   BondWeight weight_;
@@ -52,7 +60,14 @@ class PointFamilies {
   FamilyLists lattice_lists_;
   std::vector<std::uint16_t> slot_;  ///< by bond
   std::vector<std::uint8_t> whole_;  ///< by row
-  AlignedVector<double> inverse_;    ///< K^-1 by row, 6 components
+  AlignedVector<double> inverse_;    ///< K^-1 by row, 6 components; of clouds only once bonds have changed
+  // Once bonds have changed.
+  AlignedVector<double> integrity_;  ///< by bond
+  bool weakened_ = false;            ///< some b is neither 0 nor 1
+  struct First {
+    AlignedVector<double> damage, inverse;
+    std::vector<std::uint8_t> whole;
+  } first_;  ///< of the set-up
 };
 
 /// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:
