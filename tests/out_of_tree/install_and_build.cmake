@@ -35,6 +35,11 @@ foreach(kind IN LISTS kinds)
     message(FATAL_ERROR "no manifest beside ${library}.so")
   endif()
   run(${CMAKE_CTEST_COMMAND} --test-dir ${part}/build --output-on-failure --no-tests=error)
+  file(READ ${work}/${part}/build/Testing/Temporary/LastTest.log report)
+  must_contain("${report}" "kept:   ${kind}: ")
+  if(kind STREQUAL stabilization)
+    must_contain("${report}" "kept:   kinematics: linear and angular momentum")   # of what it stabilizes
+  endif()
   execute_process(COMMAND ${prefix}/bin/perikit list ${kind} --plugin-path ${part}/build WORKING_DIRECTORY ${work}
                   OUTPUT_VARIABLE parts COMMAND_ERROR_IS_FATAL ANY)
   must_contain("${parts}" ${part})

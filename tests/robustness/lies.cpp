@@ -46,7 +46,28 @@ TEST_CASE("contract: every lie is caught by the test case of what it breaks") {
     const std::set<std::string> broken = broken_cases(result.out);
     for (const std::string& name : lie.broken) CHECK_MESSAGE(broken.contains(name), "not caught by '", name, "' but by ", fmt::format("{}", fmt::join(broken, "; ")));
     CHECK(contains(result.out, fmt::format("{}/{} breaks its contract", lie.kind, lie.name)));
+    // What broke is said with numbers, once for each check: not once for each of a thousand points.
+    CHECK(contains(result.out, "    expected "));
+    CHECK_MESSAGE(lines(result.out).size() < 120, lie.name, ": ", lines(result.out).size(), " lines");
   }
+}
+
+TEST_CASE("contract: what breaks is named with numbers, and how often it breaks") {
+  const Desk desk;
+  const std::string out = desk.perikit(fmt::format("contract '{}/wrong_stress.so'", PERIKIT_LIES)).out;
+  for (const std::string word : {"material/wrong_stress\n", "kept:   material: ", "broken: material: stress is the derivative of the energy", "P : dF = dpsi (differences): ", "error ", " > 1e-",
+                                 "   (material_check.hpp:", " times more\n", " test cases kept; "})
+    CHECK_MESSAGE(contains(out, word), "no '", word, "' in\n", out);
+}
+
+TEST_CASE("contract: without perikit's own parts there is nothing to test with") {
+  const Desk desk;
+  // A framework library that has no folder of plugins beside it.
+  fs::create_directories(desk.path("lib"));
+  fs::copy_file(fs::path(PERIKIT_PARTS).parent_path() / "libperikit.so.1", desk.path("lib/libperikit.so.1"));
+  const Result result = desk.perikit(fmt::format("contract '{}/company.so'", PERIKIT_LIES), "unset PERIKIT_PLUGIN_PATH; LD_LIBRARY_PATH=lib");
+  CHECK(result.status == 2);
+  CHECK_MESSAGE(contains(result.err, "need the parts that come with perikit"), result.err);
 }
 
 TEST_CASE("contract: exit status 2 for what is no library of parts") {
