@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/thread_team.hpp"
+
 namespace perikit {
 
 namespace {
@@ -13,7 +15,7 @@ int threads = std::max(1, omp_get_max_threads());
 
 int thread_count() noexcept { return threads; }
 void set_thread_count(int n) noexcept { threads = std::max(1, n); }
-int thread_index() noexcept { return omp_get_thread_num(); }
+int thread_index() noexcept { return detail::team_index(); }
 
 namespace detail {
 void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
@@ -21,8 +23,7 @@ void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)
     for (std::size_t i = 0; i < n; ++i) body(context, i);
     return;
   }
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
-  for (std::size_t i = 0; i < n; ++i) body(context, i);
+  team_for(threads, n, context, body);
 }
 }  // namespace detail
 

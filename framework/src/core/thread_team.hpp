@@ -1,0 +1,43 @@
+#pragma once
+/// The threads of one loop: GCC's OpenMP, or, for the thread sanitizer, std::thread. The sanitizer does not see the barriers of the OpenMP
+/// runtime, which is built without it, and would call every value that one loop writes and a later one reads a race.
+
+#include <omp.h>
+
+#include <cstddef>
+#if defined(__SANITIZE_THREAD__)
+#include <thread>
+#include <vector>
+#endif
+
+namespace perikit::detail {
+
+#if defined(__SANITIZE_THREAD__)
+
+inline thread_local int own_team_index = 0;
+inline int team_index() noexcept { return own_team_index; }
+
+/// Index i on thread i mod `threads`: neighbouring blocks always meet on different threads, whatever the machine is doing.
+inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t)) {
+  const auto share = [&](int thread) {
+    own_team_index = thread;
+    for (std::size_t i = static_cast<std::size_t>(thread); i < n; i += static_cast<std::size_t>(threads)) body(context, i);
+  };
+  std::vector<std::thread> others;
+  for (int thread = 1; thread < threads; ++thread) others.emplace_back(share, thread);
+  share(0);
+  for (std::thread& other : others) other.join();
+}
+
+#else
+
+inline int team_index() noexcept { return omp_get_thread_num(); }
+
+inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t)) {
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+  for (std::size_t i = 0; i < n; ++i) body(context, i);
+}
+
+#endif
+
+}  // namespace perikit::detail
