@@ -117,7 +117,7 @@ void list(const Options& options) {
 
 void describe(const Options& options) {
   const auto registry = open_registry(options);
-  if (!options.markdown && options.part.empty()) throw InputError("name what to describe: KIND/NAME, scene or scene/SECTION; --markdown describes everything");
+  if (!options.markdown && options.part.empty()) throw InputError("name what to describe: KIND/NAME, scene, scene/SECTION or study; --markdown describes everything");
   if (options.markdown && !options.part.empty()) throw InputError("--markdown describes everything: name no part");
   fmt::print("{}", options.markdown ? reference_page(*registry) : describe_part(*registry, options.part));
 }
@@ -197,7 +197,7 @@ void add_commands(CLI::App& app, Options& options) {
   plot_command->add_option("--view", options.view, "3D: direction from the body to the eye")->expected(3);
   plot_command->add_option("--range", options.range, "Ends of the colour scale")->expected(2);
   plot_command->add_option("--unit", options.unit, "Unit to show, where the scene is not in SI");
-  plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf");
+  plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf; default: <field>_<frame>.png in the folder of the run");
   CLI::App* bench_command = add("bench", "Speed of the kernels beside the limits of this machine", measure);
   bench_command->add_option("--kinematics", options.bench.kinematics, "Which; with a penalty: conventional+silling; default: all known ones");
   bench_command->add_option("--material", options.bench.materials, "Which")->capture_default_str();
@@ -207,13 +207,13 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--json", options.bench.json, "Write the figures to this file as well");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
-  new_command->add_option("kind", options.kind, "Kind of the part: material, kinematics, ...")->required();
+  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   add("contract", "Run the contract suites on every part of a library", contract)
       ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
-  CLI::App* describe_command = add("describe", "Describe a part, or the keys of the scene: parameters, equations, source, limits", describe);
-  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output");
+  CLI::App* describe_command = add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
+  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
   describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }
 

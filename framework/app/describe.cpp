@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "perikit/run/study.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit::app {
@@ -53,11 +54,11 @@ std::string parameter_lines(const ParameterTable& table) {
   return out;
 }
 
-/// The keys of the scene, or of one of its sections.
-std::string describe_scene(const std::string& section) {
+/// The keys of a file, or of one of its sections.
+std::string describe_sections(const std::vector<std::pair<std::string, ParameterTable>>& sections, const std::string& section) {
   std::string out;
   std::vector<std::string> known;
-  for (const auto& [name, table] : scene_sections()) {
+  for (const auto& [name, table] : sections) {
     known.push_back(name.empty() ? "top" : name);
     if (section.empty() || section == known.back()) out += fmt::format("[{}]\n{}\n", name.empty() ? "top level" : name, parameter_lines(table));
   }
@@ -65,6 +66,14 @@ std::string describe_scene(const std::string& section) {
     throw InputError(fmt::format("found the unknown section '{}'; allowed: {}{}", section, fmt::join(known, ", "),
                                  did_you_mean(section, known)));
   return out;
+}
+
+/// For a name without its kind.
+std::string kinds_with(Registry& registry, const std::string& part) {
+  std::string meant;
+  for (const Kind kind : all_kinds)
+    if (registry.known(kind, part)) meant += fmt::format("{}{}/{}", meant.empty() ? "; did you mean " : ", ", name(kind), part);
+  return meant;
 }
 
 }  // namespace
@@ -89,8 +98,13 @@ std::string list_parts(Registry& registry, const std::string& kind) {
 
 std::string describe_part(Registry& registry, const std::string& part) {
   const std::size_t slash = part.find('/');
-  if (part.substr(0, slash) == "scene") return describe_scene(slash == std::string::npos ? "" : part.substr(slash + 1));
-  if (slash == std::string::npos) throw InputError(fmt::format("'{}': expected KIND/NAME, e.g. material/neo_hookean, or scene/SECTION, e.g. scene/output", part));
+  const std::string head = part.substr(0, slash), rest = slash == std::string::npos ? "" : part.substr(slash + 1);
+  if (head == "scene") return describe_sections(scene_sections(), rest);
+  if (head == "study") return std::string(study_values_note) + "\n\n" + describe_sections(study_sections(), rest);
+  if (slash == std::string::npos) {
+    throw InputError(fmt::format("'{}': expected KIND/NAME, e.g. material/neo_hookean; scene or scene/SECTION, e.g. scene/output; or study{}", part,
+                                 kinds_with(registry, part)));
+  }
   const Kind kind = parse_kind(part.substr(0, slash));
   const PartDescription& d = registry.describe(kind, part.substr(slash + 1));
   std::string out = fmt::format("{}/{}: {}\n", name(kind), d.name, d.summary);

@@ -8,7 +8,11 @@ namespace perikit::app {
 /// Known parts by kind, one line each. kind empty: all. Throws InputError for an unknown kind.
 std::string list_parts(Registry& registry, const std::string& kind);
 
-/// Everything that the part's tables say. `part`: KIND/NAME; or "scene", "scene/SECTION" for the keys of the scene itself.
+inline constexpr const char* study_values_note =
+    "A study runs one scene for lists of values of some of its keys: `[values]` holds these keys, e.g. `family.horizon_ratio = [2.015, 3.015]`. "
+    "`perikit study` writes table.csv, table.md and, with [plot], plot.png and plot.svg.";
+
+/// Everything that the part's tables say. `part`: KIND/NAME; or "scene", "scene/SECTION", "study", "study/SECTION" for the keys of these files.
 std::string describe_part(Registry& registry, const std::string& part);
 
 /// "exactly 2 of: youngs_modulus, ..."

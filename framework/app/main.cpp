@@ -1,10 +1,12 @@
-/// The command line: perikit run | check | list | describe.
+/// The command line: perikit run | check | study | plot | bench | new | contract | list | describe.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 
@@ -22,6 +24,18 @@ void stop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// The message of the parser, and where it says no more than that a word is missing, which command was meant.
+int refuse(const CLI::App& app, const CLI::ParseError& error, const std::string& word) {
+  std::vector<std::string> commands;
+  for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
+  if (std::ranges::find(commands, word) == commands.end() && !word.starts_with('-')) {
+    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "), perikit::did_you_mean(word, commands));
+  } else {
+    fmt::print(stderr, "{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " ");
+  }
+  return input_refused;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -37,6 +51,10 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app::Options options;
   app::add_commands(app, options);
+  if (argc < 2) {
+    fmt::print(stderr, "{}", app.help());
+    return input_refused;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& e) {
@@ -46,8 +64,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::CallForVersion& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    app.exit(e);
-    return input_refused;
+    return refuse(app, e, argc > 1 ? argv[1] : "");
   }
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);

@@ -87,7 +87,7 @@ std::string new_project(const Registry& registry, const std::string& kind, const
   }
   return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n"
                      "  cmake -S {0} -B {0}/build && cmake --build {0}/build && ctest --test-dir {0}/build --output-on-failure\n"
-                     "  perikit run {0}/scene.toml --plugin-path {0}/build\n", part);
+                     "  perikit run {0}/scene.toml --plugin-path {0}/build -o {0}/out\n", part);
 }
 
 }  // namespace perikit::app

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "describe.hpp"
+#include "perikit/run/study.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit::app {
@@ -50,6 +51,10 @@ std::string reference_page(Registry& registry) {
                     "Wherever a number is allowed, so is a string with an expression in `[constants]`: `spacing = \"L/n\"`.\n\n## The scene\n\n";
   for (const auto& [section, table] : scene_sections()) {
     out += fmt::format("### {}\n\n{}\n", section.empty() ? "Top level" : fmt::format("[{}]", section), table_of(table));
+  }
+  out += fmt::format("## A study\n\n{}\n\n", study_values_note);
+  for (const auto& [section, table] : study_sections()) {
+    out += fmt::format("### {}\n\n{}\n", section.empty() ? "Top level of a study" : fmt::format("[{}] of a study", section), table_of(table));
   }
   for (const Kind kind : all_kinds) {
     const auto names = registry.names(kind);

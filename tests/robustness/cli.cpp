@@ -28,6 +28,30 @@ TEST_CASE("cli: exit status 0 for what is done, 2 for what is refused") {
   CHECK(contains(desk.perikit("run nowhere.toml").err, "nowhere.toml"));
 }
 
+TEST_CASE("cli: what was meant by a misspelt command, kind or name") {
+  const Desk desk;
+  const auto said = [&](const std::string& arguments, const std::string& word) {
+    const Result result = desk.perikit(arguments);
+    CHECK(result.status == 2);
+    CHECK_MESSAGE(contains(result.err, word), "perikit ", arguments, ": no '", word, "' in\n", result.err);
+  };
+  said("", "Subcommands:");
+  said("rnu scene.toml", "unknown command 'rnu'; allowed: run, check, study, plot, bench, new, contract, list, describe; did you mean 'run'?");
+  said("run", "scene is required\nHelp: perikit run --help");
+  said("run scene.toml --sett a=1", "Help: perikit run --help");
+  said("list materials", "did you mean 'material'?");
+  said("describe neo_hookean", "did you mean material/neo_hookean");
+  said("describe material/neo", "did you mean 'neo_hookean'?");
+  said("describe study/quantitiy", "did you mean 'quantity'?");
+  said("run scene.toml --set kinematics.type=my_own_idea", "unknown kinematics 'my_own_idea'; allowed: baqp, ");
+  said("run scene.toml --set kinematics.type=my_own_idea", "; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH");
+  said("run scene.toml --plugin-path nowhere", "nowhere: this plugin folder cannot be read: No such file or directory");
+  said("study nowhere.toml", "nowhere.toml: does not exist; allowed: a readable study file");
+  said("plot nowhere", "nowhere: cannot be read: No such file or directory");
+  said("contract nowhere.so", "nowhere.so: this library is refused: no such file");
+  said("new materials my_law", "no template for kind 'materials'; did you mean 'material'?");
+}
+
 TEST_CASE("cli: errors name file, line, column, key and what was meant") {
   struct Fault {
     std::string from, to;
@@ -89,6 +113,8 @@ TEST_CASE("cli: describe shows the keys of the scene and the whole reference") {
   CHECK(unknown.status == 2);
   CHECK(contains(unknown.err, "did you mean 'output'"));
   CHECK(desk.perikit("describe").status == 2);
+  const std::string study = desk.perikit("describe study").out;
+  for (const std::string word : {"[top level]", "[quantity]", "[plot]", "reduce", "run_time", "reference"}) CHECK_MESSAGE(contains(study, word), "no ", word);
   const std::string page = desk.perikit("describe --markdown").out;
   for (const std::string& line : lines(desk.perikit("list material").out)) CHECK(contains(page, "### material/" + line.substr(0, line.find(' ')) + "\n"));
   CHECK(contains(page, "| `checkpoint_every` |"));

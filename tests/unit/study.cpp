@@ -2,12 +2,14 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 
 #include "perikit/plugin/registry.hpp"
+#include "run/study_axes.hpp"
 #include "unit/fake_catalogue.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -157,7 +159,7 @@ TEST_CASE("errors of a study file name place, key, what was found and what is al
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "values: found nothing; allowed: a table of scene keys"));
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "quantity: found nothing; allowed: [[quantity]]"));
   CHECK(contains(folder.error("format = "), "study.toml:1:10: not valid TOML"));
-  CHECK(contains(message_of([&] { read_study(folder.path / "absent.toml", folder.parts); }), "absent.toml: cannot be read"));
+  CHECK(contains(message_of([&] { read_study(folder.path / "absent.toml", folder.parts); }), "absent.toml: does not exist"));
 }
 
 TEST_CASE("a quantity or reference that does not fit the scene is refused before the first run") {
@@ -187,7 +189,7 @@ TEST_CASE("the table holds values, quantities, errors and what went wrong; a fai
       run_study(study, folder.parts, {}, folder.path / "out", pretend, [&](const std::string& line) { lines.push_back(line); });
   REQUIRE(table.rows.size() == 9);
   CHECK(lines.size() == 18);
-  CHECK(lines[0] == "run 1 of 9: kinematics.type = \"conventional\", constants.k = 1");
+  CHECK(lines[0] == "run 1 of 9 (runs/0): kinematics.type = \"conventional\", constants.k = 1");
   CHECK(table.number(table.rows[2], "constants.k") == 4);
   CHECK(table.number(table.rows[2], "top") == 6);           // max: 1.5 k
   CHECK(table.number(table.rows[2], "top_error") == 0.25);  // against 2 k
@@ -259,6 +261,17 @@ TEST_CASE("reductions over the history") {
   CHECK(top("mean") == doctest::Approx(5.0 / 3.0).epsilon(1e-15));
 }
 
+TEST_CASE("a logarithmic axis has labelled tics, also where it covers less than a decade") {
+  for (const auto& [least, most] : {std::pair{0.398, 0.492}, {0.005, 0.02}, {0.9, 1.1}, {1e-9, 9e-8}, {3.0, 3.001}}) {
+    const std::vector<double> tics = logarithmic_tics(least, most);
+    const auto shown = std::ranges::count_if(tics, [&](double tic) { return tic >= least && tic <= most; });
+    CHECK_MESSAGE((shown >= 2 && shown <= 8), shown, " tics from ", least, " to ", most);
+    CHECK(std::ranges::is_sorted(tics));
+  }
+  CHECK(logarithmic_tics(1e-3, 1.0).empty());   // every decade
+  CHECK(logarithmic_tics(2.0, 2.0).empty());
+}
+
 TEST_CASE("the picture has a line for each value of the series" *
           doctest::skip(std::system("gnuplot --version > /dev/null 2>&1") != 0)) {
   StudyFolder folder;
@@ -266,6 +279,8 @@ TEST_CASE("the picture has a line for each value of the series" *
       folder.parse(study_text + "[plot]\nx = \"cost\"\ny = \"top_error\"\nseries = \"kinematics.type\"\nlog = \"xy\"\n");
   run_study(study, folder.parts, {}, folder.path / "out", pretend, silent);
   CHECK(content(folder.path / "out" / "plot.png").starts_with("\x89PNG"));
+  const std::string vector = content(folder.path / "out" / "plot.svg");
+  for (const std::string word : {"<svg", "relative error of top", "cost [s]"}) CHECK_MESSAGE(contains(vector, word), "no ", word);
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
   CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
                  "no run gives numbers for cost and top_error"));

@@ -159,6 +159,7 @@ struct Registry::Implementation {
       message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);
       separator = "; ";
     }
+    if (refused.empty() && did_you_mean(part, known).empty()) message += "; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH";
     throw InputError(message);
   }
 

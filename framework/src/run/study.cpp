@@ -185,7 +185,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
     end(i, "");
   };
   for (std::size_t i = 0; i < runs.size() && !stop_requested(); ++i) {
-    progress(fmt::format("run {} of {}: {}", i + 1, runs.size(), described(study, runs[i].row)));
+    progress(fmt::format("run {} of {} (runs/{}): {}", i + 1, runs.size(), i, described(study, runs[i].row)));
     if (!runs[i].scene) {
       end(i, "");
       continue;
@@ -214,7 +214,9 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
   if (stop_requested()) {
     throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
   }
-  if (study.plot) draw(table, folder / "plot.png");
+  if (study.plot) {
+    for (const char* picture : {"plot.png", "plot.svg"}) draw(table, folder / picture);
+  }
   return table;
 }
 

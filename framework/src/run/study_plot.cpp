@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "output/picture/gnuplot.hpp"
+#include "run/study_axes.hpp"
 
 namespace perikit {
 
@@ -47,11 +48,9 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
   if (lines.empty()) throw RunError(fmt::format("{}: no run gives numbers for {} and {}", picture.string(), plot.x, plot.y));
 
   std::string script = gnuplot_terminal(picture, 1150, 750);
-  script += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\n", gnuplot_quoted(table.study.title), gnuplot_quoted(plot.x),
-                        gnuplot_quoted(plot.y));
-  if (!plot.log.empty()) script += fmt::format("set logscale {}\n", plot.log);
+  script += axes(table);
   script +=
-      "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
+      "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.05, graph 0.05, graph 0.08, graph 0.08\n";
   const bool wide = std::ranges::any_of(lines, [](const Line& line) { return line.name.size() > 24; });  // would leave no room beside it
   script += plot.series.empty() ? "unset key\n"
                                 : fmt::format("set key {} title {}\n", wide ? "below" : "outside right top", gnuplot_quoted(plot.series));

@@ -31,7 +31,7 @@ ParameterTable head_table() {
 ParameterTable quantity_table() {
   ParameterTable table;
   table.string("name", "Name of its column.").require();
-  table.string("from", "A column of history.csv, or a measure of the run.").require();
+  table.string("from", fmt::format("A column of history.csv, or a measure of the run: {}.", fmt::join(run_measures(), ", "))).require();
   table.choice("reduce", {"last", "max", "min", "mean"}, "How the rows of the history become one number.").by_default("\"last\"");
   return table;
 }
@@ -248,7 +248,19 @@ class StudyReader {
   Study study_;
 };
 
+/// What read_quantity reads by itself, as describe shows it.
+ParameterTable whole_quantity_table() {
+  ParameterTable table = quantity_table();
+  table.expression("reference", "", "Gives the column NAME_error, the distance from it over its size; an expression in the scene's [constants]; not 0.");
+  return table;
+}
+
 }  // namespace
+
+const std::vector<std::pair<std::string, ParameterTable>>& study_sections() {
+  static const std::vector<std::pair<std::string, ParameterTable>> all{{"", head_table()}, {"quantity", whole_quantity_table()}, {"plot", plot_table()}};
+  return all;
+}
 
 Study parse_study(const std::string& text, const fs::path& file, PartCatalogue& parts) {
   return StudyReader(parts, file).read(parse_toml(text, file.string()));
@@ -256,6 +268,7 @@ Study parse_study(const std::string& text, const fs::path& file, PartCatalogue& 
 
 Study read_study(const fs::path& file, PartCatalogue& parts) {
   std::error_code failed;
+  if (!fs::exists(file, failed)) throw InputError({file.string()}, "", "does not exist; allowed: a readable study file");
   std::ifstream stream(file, std::ios::binary);
   if (!fs::is_regular_file(file, failed) || !stream)
     throw InputError({file.string()}, "", "cannot be read; allowed: a readable study file");

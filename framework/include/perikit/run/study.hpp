@@ -72,6 +72,10 @@ Study read_study(const std::filesystem::path& file, PartCatalogue& parts);
 /// The same from memory; `file` is used in messages and for relative paths.
 Study parse_study(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts);
 
+/// The keys of a study by section ("" for the top level, "quantity", "plot"), for `describe` and the reference page. [values] has the
+/// keys of the scene.
+const std::vector<std::pair<std::string, ParameterTable>>& study_sections();
+
 /// For each run the index of the value of each key.
 std::vector<std::vector<std::size_t>> combinations(const Study& study);
 
@@ -120,7 +124,7 @@ struct StudyTable {
 };
 
 /// Runs every combination into folder/runs/<index>, `jobs` at a time, and writes folder/table.csv and table.md after each, and
-/// folder/plot.png at the end where the study wants one. A combination that is refused or fails gives a row that says so.
+/// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that says so.
 /// options: for every run; `progress` gets a line before and after each.
 /// Throws InputError where no combination makes a scene, or a quantity or reference does not fit a scene - before the first run;
 /// RunError where a file cannot be written, or request_stop was called (the rows so far are kept).
