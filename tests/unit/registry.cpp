@@ -325,7 +325,7 @@ TEST_CASE("an unknown name gets the nearest, the known ones and the refused libr
   CHECK(message.find("found the unknown influence 'sund'; allowed: sound; did you mean 'sound'?; refused libraries") == 0);
   CHECK(message.find("text.so (not a shared library (ELF magic missing))") != std::string::npos);
   CHECK(error_of([&] { Registry().library_of(Kind::material, "steel"); }) ==
-        "found the unknown material 'steel'; allowed: none, no library brings any");
+        "found the unknown material 'steel'; allowed: none, no library brings any; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH");
 }
 
 TEST_CASE("a factory that throws or returns null names part and library") {

@@ -281,6 +281,11 @@ TEST_CASE("the picture has a line for each value of the series" *
   CHECK(content(folder.path / "out" / "plot.png").starts_with("\x89PNG"));
   const std::string vector = content(folder.path / "out" / "plot.svg");
   for (const std::string word : {"<svg", "relative error of top", "cost [s]"}) CHECK_MESSAGE(contains(vector, word), "no ", word);
+  // The order of the list does not matter where the axis is a key.
+  const std::string drawn = "[plot]\nx = \"constants.k\"\ny = \"top\"\nseries = \"kinematics.type\"\n";
+  run_study(folder.parse(study_text + drawn), folder.parts, {}, folder.path / "sorted", pretend, silent);
+  run_study(folder.parse(replaced(study_text, "[1, 2, 4]", "[4, 1, 2]") + drawn), folder.parts, {}, folder.path / "other", pretend, silent);
+  CHECK(content(folder.path / "sorted" / "plot.svg") == content(folder.path / "other" / "plot.svg"));
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
   CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
                  "no run gives numbers for cost and top_error"));

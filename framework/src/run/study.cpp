@@ -126,6 +126,14 @@ void fill(StudyRow& row, const Study& study, const RunOutcome& outcome, const st
   }
 }
 
+/// Lines go from left to right where the axis is a key of the values; where it is a result (run time), from run to run.
+StudyTable in_order_of_axis(StudyTable table) {
+  const std::string& x = table.study.plot->x;
+  if (std::ranges::find(table.study.keys, x, &StudyKey::key) == table.study.keys.end()) return table;
+  std::ranges::stable_sort(table.rows, {}, [&](const StudyRow& row) { return table.number(row, x).value_or(INFINITY); });
+  return table;
+}
+
 std::string described(const Study& study, const StudyRow& row) {
   std::vector<std::string> texts;
   for (std::size_t k = 0; k < study.keys.size(); ++k)
@@ -215,7 +223,8 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
     throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
   }
   if (study.plot) {
-    for (const char* picture : {"plot.png", "plot.svg"}) draw(table, folder / picture);
+    const StudyTable drawn = in_order_of_axis(table);
+    for (const char* picture : {"plot.png", "plot.svg"}) draw(drawn, folder / picture);
   }
   return table;
 }
