@@ -161,6 +161,24 @@ TEST_CASE("history columns, file types and default names") {
   options.output = picture_folder(folder) / "history.png";
   plot(options);
   check_png(options.output);
+  // Units come from the scene of the run.
+  const auto drawn = [&](const std::string& scene) {
+    std::ofstream(run / "scene.toml") << scene;
+    options.output = folder.path / "history.svg";
+    plot(options);
+    return bytes(options.output);
+  };
+  const std::string own = "[integrator]\nend_time = 1.0\n[[output.history]]\nname = \"tip_uy\"\nquantity = \"displacement\"\n";
+  const std::string dynamic = drawn(own), quasi_static = drawn(own.substr(own.find("[[")));
+  CHECK(dynamic.find(">tip uy [m]<") != std::string::npos);
+  CHECK(dynamic.find(">time [s]<") != std::string::npos);
+  CHECK(quasi_static.find(">time<") != std::string::npos);
+  options.unit = "mm";
+  CHECK(drawn(own).find(">tip uy [mm]<") != std::string::npos);
+  CHECK(drawn(own).find(">time<") != std::string::npos);
+  options.unit.reset();
+  options.field = "history:time";
+  CHECK(drawn("no scene").find(">time<") != std::string::npos);
   options.field = "volume";
   options.output = folder.path / "volume.svg";
   plot(options);
@@ -209,6 +227,7 @@ TEST_CASE("what cannot be drawn is refused with the names that can") {
   };
   refused([](PlotOptions& o) { o.field = "displacment"; },
           "cauchy, damage, displacement, volume, material_id, id; did you mean 'displacement'?");
+  refused([](PlotOptions& o) { o.field = "von_mises"; }, "what a run writes stands in its scene: [output] fields");
   refused([](PlotOptions& o) { o.component = "w"; }, "found 'w'; 'displacement' has x, y, z, magnitude");
   refused([](PlotOptions& o) { o.field = "damage", o.component = "x"; }, "'damage' is a scalar");
   refused([](PlotOptions& o) { o.frame = 7; }, "frame: found 7; must be one of 0 ... 1");

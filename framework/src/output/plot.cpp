@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "output/history_file.hpp"
+#include "output/picture/axis_units.hpp"
 #include "output/picture/body_picture.hpp"
 #include "output/picture/field_values.hpp"
 #include "output/picture/gnuplot.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/errors.hpp"
+#include "scene/sections.hpp"
 
 namespace perikit {
 
@@ -25,6 +27,11 @@ constexpr std::string_view history_prefix = "history:";
 
 std::string labelled(const std::string& label, const std::string& unit) {
   return unit.empty() ? label : fmt::format("{} [{}]", label, unit);
+}
+
+std::string in_words(std::string column) {
+  std::ranges::replace(column, '_', ' ');
+  return column;
 }
 
 /// Smallest and largest value that is a number, a little apart where they are equal.
@@ -57,8 +64,11 @@ hdf5::Source::Array read_field(const ResultFile& results, const std::string& gro
   std::vector<std::string> known = source.names(group, true);
   for (const char* name : {"volume", "material_id", "id"}) known.emplace_back(name);
   if (std::find(known.begin(), known.end(), field) == known.end()) {
+    const std::vector<std::string> fields = history_parameters().find("quantity")->choices;
+    const bool possible = std::ranges::find(fields, field) != fields.end();
     throw InputError({results.path().string(), 0, 0}, "field",
-                     fmt::format("found '{}'; this run has {}{}", field, fmt::join(known, ", "), did_you_mean(field, known)));
+                     fmt::format("found '{}'; this run has {}{}", field, fmt::join(known, ", "),
+                                 possible ? "; what a run writes stands in its scene: [output] fields" : did_you_mean(field, known)));
   }
   const std::string path = source.contains(group + "/" + field) ? group + "/" + field : "/reference/" + field;
   hdf5::Source::Array array = source.read(path);
@@ -84,8 +94,10 @@ void plot_history(const PlotOptions& options, const std::string& name, const fs:
   CurvePicture curve;
   curve.x = history.values[x];
   curve.y = history.values[static_cast<std::size_t>(found - history.columns.begin())];
-  curve.x_label = history.columns[x];
-  curve.y_label = labelled(name, options.unit.value_or(""));
+  const SceneUnits units(scene_text(file.parent_path()));
+  // A scene with a unit of its own is not in SI.
+  curve.x_label = labelled(in_words(history.columns[x]), options.unit ? "" : units.column(history.columns[x]));
+  curve.y_label = labelled(in_words(name), options.unit.value_or(units.column(name)));
   curve.y_range = options.range ? fmt::format("[{}:{}]", (*options.range)[0], (*options.range)[1]) : "[*:*]";
   curve.file = picture;
   run_gnuplot(curve_script(curve), picture);
@@ -132,7 +144,8 @@ void plot_frame(const PlotOptions& options, const ResultFile& results, std::int6
     const hdf5::Source::Array displacement = read_field(results, group, "displacement", points);
     for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i] += options.deformed * displacement.data[i];
   }
-  const std::string title = source.text("/", "title"), time = fmt::format("t = {:.6g}", source.real(group, "time"));
+  const std::string title = source.text("/", "title"), unit = SceneUnits(source.text("/", "scene")).time();
+  const std::string time = fmt::format("t = {:.6g}{}{}", source.real(group, "time"), unit.empty() || options.unit ? "" : " ", options.unit ? "" : unit);
   BodyPicture body;
   body.dimension = dimension_of(position.data);
   body.reference = position.data;

@@ -143,7 +143,7 @@ std::string body_script(const BodyPicture& picture) {
   const int columns = std::max(1, static_cast<int>(std::lround(scale * frame.size().x())));
   const int rows = std::max(1, static_cast<int>(std::lround(scale * frame.size().y())));
   const bool wide = columns > 2 * rows, solid = picture.dimension == 3;
-  const int left = solid ? 60 : 175, right = wide ? 60 : 220, top = 60;
+  const int left = solid ? 60 : 175, right = wide ? 60 : 250, top = 60;
   const int bottom = (solid ? 150 : 110) + (wide ? 120 : 0);
   const int width = std::max(columns, 420) + left + right, height = rows + top + bottom;
 
@@ -156,7 +156,7 @@ std::string body_script(const BodyPicture& picture) {
   script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\nset cbrange [{}:{}]\n", frame.lower.x(), frame.upper.x(),
                         frame.lower.y(), frame.upper.y(), picture.range[0], picture.range[1]);
   // Centred over the whole picture: the plot itself may be much narrower than its title.
-  script += fmt::format("set label 1 {} at screen 0.5, screen 0.98 center\nset cbtics out\nunset key\n", gnuplot_quoted(picture.title));
+  script += fmt::format("set label 1 {} at screen 0.5, screen 0.98 center\nset cbtics out\nset format cb '%g'\nunset key\n", gnuplot_quoted(picture.title));
   // The label of the bar has a place of its own, because gnuplot's own one runs into long numbers.
   const std::string value_label = gnuplot_quoted(picture.value_label);
   if (wide) {
@@ -166,7 +166,7 @@ std::string body_script(const BodyPicture& picture) {
   } else {
     script += fmt::format("set colorbox vertical user origin screen {},screen {} size screen {},screen {}\n",
                           screen_x(left + columns + 25), screen_y(bottom + 0.1 * rows), screen_x(24), screen_y(0.8 * rows));
-    script += fmt::format("set label {} at screen {},{} center rotate by 90\n", value_label, screen_x(left + columns + 185),
+    script += fmt::format("set label {} at screen {},{} center rotate by 90\n", value_label, screen_x(left + columns + 215),
                           screen_y(bottom + 0.5 * rows));
   }
   if (solid) {

@@ -51,15 +51,23 @@ double component_value(const double* row, int width, std::size_t component, cons
   return name == "von_mises" ? von_mises(tensor) : tensor.norm();
 }
 
+const KnownField* known_field(const std::string& field) {
+  const auto known = std::find_if(std::begin(known_fields), std::end(known_fields), [&](const auto& k) { return field == k.name; });
+  return known == std::end(known_fields) ? nullptr : known;
+}
+
 }  // namespace
+
+std::string field_unit(const std::string& field) {
+  const KnownField* known = known_field(field);
+  return known ? known->unit : "";
+}
 
 FieldValues field_values(const std::string& field, int width, std::span<const double> data, const std::string& component) {
   FieldValues result;
   result.label = field;
   std::replace(result.label.begin(), result.label.end(), '_', ' ');
-  const auto known =
-      std::find_if(std::begin(known_fields), std::end(known_fields), [&](const auto& k) { return field == k.name; });
-  if (known != std::end(known_fields)) {
+  if (const KnownField* known = known_field(field)) {
     result.label = known->label;
     result.unit = known->unit;
   }

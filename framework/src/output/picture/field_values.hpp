@@ -17,4 +17,7 @@ struct FieldValues {
 /// components.
 FieldValues field_values(const std::string& field, int width, std::span<const double> data, const std::string& component);
 
+/// SI unit of a point field; empty for what has none and for unknown ones.
+std::string field_unit(const std::string& field);
+
 }  // namespace perikit

@@ -1,0 +1,44 @@
+#include "output/picture/axis_units.hpp"
+
+#include <toml++/toml.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "output/picture/field_values.hpp"
+#include "perikit/core/errors.hpp"
+#include "scene/toml_reader.hpp"
+
+namespace perikit {
+
+SceneUnits::SceneUnits(const std::string& scene) {
+  toml::table root;
+  try {
+    root = parse_toml(scene, "scene.toml");
+  } catch (const InputError&) {
+    return;
+  }
+  if (root["integrator"]["end_time"]) time_ = std::string("s");
+  const toml::array* history = root["output"]["history"].as_array();
+  if (!history) return;
+  for (const toml::node& entry : *history) {
+    const toml::table* table = entry.as_table();
+    if (table) own_.emplace_back((*table)["name"].value_or(std::string()), field_unit((*table)["quantity"].value_or(std::string())));
+  }
+}
+
+std::string SceneUnits::column(const std::string& name) const {
+  if (name == "time" || name == "time_step") return time_;
+  for (const char* energy : {"strain_energy", "kinetic_energy", "dissipated_energy", "external_work"})
+    if (name == energy) return "J";
+  for (const auto& [own, unit] : own_)
+    if (name == own) return unit;
+  return "";
+}
+
+std::string scene_text(const std::filesystem::path& folder) {
+  std::ifstream stream(folder / "scene.toml", std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace perikit
