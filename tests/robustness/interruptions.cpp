@@ -120,7 +120,7 @@ TEST_CASE("interruptions: a checkpoint with one other byte is refused") {
   std::ofstream(desk.path("out/checkpoint.h5"), std::ios::binary) << bytes;
   const Result resumed = desk.perikit("run scene.toml --resume -o out");
   CHECK(resumed.status == 2);
-  CHECK_MESSAGE(contains(resumed.err, "out/checkpoint.h5: state: found other bytes than were written"), resumed.err);
+  CHECK_MESSAGE(contains(resumed.err, "out/checkpoint.h5: found other bytes than were written"), resumed.err);
 }
 
 TEST_CASE("interruptions: a library that was replaced between run and resume is refused by name") {

@@ -64,7 +64,7 @@ TEST_CASE("resume: another scene is refused with what differs") {
   CHECK(read_frames(desk.path("out")) == before);
   // A damaged checkpoint is named.
   desk.write("out/checkpoint.h5", "no HDF5");
-  refuse("", {"checkpoint.h5", "not an HDF5 file"});
+  refuse("", {"checkpoint.h5", "found other bytes than were written"});
 }
 
 TEST_CASE("resume: a body from another file is refused") {

@@ -59,7 +59,7 @@ int write_all(int descriptor, std::span<const std::byte> bytes) noexcept {
   return 0;
 }
 
-void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more) {
   const std::filesystem::path temporary = temporary_name(file);
   const auto give_up = [&](int code) {
     ::unlink(temporary.c_str());
@@ -67,7 +67,8 @@ void store_atomically(const std::filesystem::path& file, std::span<const std::by
   };
   Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (!descriptor) throw_system_error(file, "cannot write", errno);
-  if (const int code = write_all(descriptor.get(), bytes)) give_up(code);
+  for (const auto part : {bytes, more})
+    if (const int code = write_all(descriptor.get(), part)) give_up(code);
   if (::fsync(descriptor.get()) != 0) give_up(errno);
   // Network file systems report a full disk only here.
   if (::close(descriptor.release()) != 0) give_up(errno);

@@ -8,8 +8,8 @@
 
 namespace perikit {
 
-/// Replaces `file` by `bytes`. Throws RunError with the file's name and the system's reason; an earlier `file` is then untouched.
-void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes);
+/// Replaces `file` by `bytes`, then `more`. Throws RunError with the file's name and the system's reason; an earlier `file` is then untouched.
+void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more = {});
 
 /// Creates a folder with those above it; removes a file if it is there. Throw RunError.
 void make_folder(const std::filesystem::path& folder);

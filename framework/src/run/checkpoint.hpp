@@ -26,7 +26,7 @@ std::string body_fingerprint(const ReferenceData& body);
 
 /// Replaces the checkpoint of the folder. Throws RunError; an earlier one is then untouched.
 void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& checkpoint);
-/// Throws InputError where it cannot be read, or where its state is not what was written.
+/// Throws InputError where it cannot be read, or is not byte for byte what was written.
 Checkpoint read_checkpoint(const std::filesystem::path& folder);
 
 /// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body, version and libraries.
