@@ -1,6 +1,6 @@
 # Memory errors of the optimised program, which the sanitizers' builds are not: runs of the scenes beside this file, going on from a checkpoint,
-# and the unit tests of the registry, which open, refuse and release libraries of parts. Any error, and any block that is lost for sure, fails.
-# Needs: valgrind, program, unit (perikit_unit), work (scratch folder).
+# and opening every library of parts, the good ones and those that must be refused. Any error, and any block that is lost for sure, fails.
+# Needs: valgrind, program, bad (folder of libraries that must be refused), work (scratch folder).
 file(REMOVE_RECURSE ${work})
 file(MAKE_DIRECTORY ${work})
 set(ENV{OMP_WAIT_POLICY} passive)          # else the program starts itself again
@@ -22,4 +22,8 @@ endforeach()
 checked(explicit ${program} run ${CMAKE_CURRENT_LIST_DIR}/explicit.toml -o explicit --threads 2)
 checked(resume ${program} run ${CMAKE_CURRENT_LIST_DIR}/explicit.toml -o explicit --threads 2 --resume)
 checked(describe ${program} describe --markdown)
-checked(registry ${unit} --source-file=*unit/registry.cpp)
+file(GLOB folders ${bad}/*)
+foreach(folder IN LISTS folders)
+  cmake_path(GET folder FILENAME name)
+  checked(list_${name} ${program} list --plugin-path ${folder})
+endforeach()

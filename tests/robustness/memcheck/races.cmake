@@ -1,0 +1,40 @@
+# The scenes beside this file with three threads, under the thread sanitizer: explicit steps of every kinematics on lattices and clouds, with bonds
+# that fail where they can, and every quasi-static integrator. A race ends the run.
+# Needs: program, work (scratch folder).
+file(REMOVE_RECURSE ${work})
+file(MAKE_DIRECTORY ${work})
+set(ENV{OMP_WAIT_POLICY} passive)
+set(ENV{OPENBLAS_NUM_THREADS} 1)   # its own threads are not built with the sanitizer
+set(ENV{TSAN_OPTIONS} "halt_on_error=1 exitcode=66")
+set(scenes ${CMAKE_CURRENT_LIST_DIR})
+function(clean name)
+  message(STATUS "races: ${name}")
+  execute_process(COMMAND ${program} run ${ARGN} -o ${name} --threads 3 WORKING_DIRECTORY ${work} RESULT_VARIABLE status OUTPUT_VARIABLE out ERROR_VARIABLE out)
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR "${name}: exit status ${status}\n${out}")
+  endif()
+endfunction()
+
+set(larger --set "body.lattice.upper=[100, 50]" --set integrator.end_time=0.3)   # several blocks of every loop
+foreach(kinematics conventional baqp projection bond_augmented non_spherical sub_horizon bond_associated bond_based ordinary selective)
+  set(type "kinematics={type=\"${kinematics}\"}")
+  if(kinematics STREQUAL selective)
+    set(type "kinematics={type=\"selective\",base={type=\"bond_associated\"}}")
+  endif()
+  set(scene explicit)
+  if(kinematics MATCHES "non_spherical|sub_horizon|bond_associated|selective")
+    set(scene intact)   # bonds cannot fail there
+  endif()
+  set(fields)
+  if(kinematics MATCHES "bond_based|ordinary")
+    set(fields --set "output.fields=[\"displacement\", \"internal_force\", \"strain_energy_density\"]")   # pair laws have no stresses
+  endif()
+  clean(${kinematics}_lattice ${scenes}/${scene}.toml --set ${type} ${larger} ${fields})
+  clean(${kinematics}_cloud ${scenes}/${scene}.toml --set ${type} ${larger} ${fields} --set body.lattice.jitter=0.1)
+endforeach()
+foreach(stabilization silling wan)
+  clean(${stabilization} ${scenes}/intact.toml --set "kinematics={type=\"conventional\",stabilization=\"${stabilization}\"}" ${larger})
+endforeach()
+foreach(solver newton jfnk kinsol dynamic_relaxation)
+  clean(${solver} ${scenes}/quasi_static.toml --set integrator.type=${solver} --set "body.lattice.upper=[14, 6, 6]")
+endforeach()
