@@ -281,7 +281,7 @@ TEST_CASE("cli: a signal ends a run in order") {
   CHECK_MESSAGE(frames.back().step >= 8, "the state at the end is not kept");
 }
 
-TEST_CASE("cli: newton refuses a tangent that memory does not hold, with the numbers") {
+TEST_CASE("cli: newton refuses a tangent that memory does not hold, with the numbers" * doctest::skip(unlimited_addresses)) {
   const Desk desk(R"(format = 1
 [body]
 dimension = 2

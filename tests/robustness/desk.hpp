@@ -22,6 +22,13 @@ namespace perikit::test {
 
 inline constexpr std::size_t points = 8 * 5;
 
+/// Address and thread sanitizer map terabytes of their own: no limit of the address space can be set.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool unlimited_addresses = true;
+#else
+inline constexpr bool unlimited_addresses = false;
+#endif
+
 /// A plate that is pulled for 1 s in steps of 0.02 s.
 inline const std::string plate = R"(format = 1
 title = "Pulled plate"
