@@ -52,7 +52,8 @@ std::string fault(const PartDescription& description) {
 }  // namespace
 
 void PartCollector::add(RegisteredPart part) {
-  const auto& [description, factory] = part;
+  const auto& description = part.description;   // no structured binding: clang 14 lets no lambda see one
+  const auto& factory = part.factory;
   const auto refuse = [&](const std::string& reason) {
     throw std::invalid_argument(fmt::format("{} '{}': {}", name(part.kind()), description.name, reason));
   };
