@@ -19,8 +19,10 @@ TEST_CASE("errors: combinations of parts that have no meaning are refused with w
   refused("--set 'kinematics={type=\"selective\",base={type=\"baqp\"}}' --set body.plane=stress",
           {"scene.toml:4:1: body: found a state of stress with kinematics \"selective\"", "allowed: plane = \"strain\""});
   refused("--set kinematics.type=selective", {"scene.toml:19:1: kinematics.base: found nothing; allowed: the name of a kinematics"});
-  refused("--set kinematics.type=bond_associated --set 'damage={type=\"critical_stretch\",stretch=0.1}'",
-          {"damage: found with kinematics \"bond_associated\", whose stencils are made once; allowed: pair laws, and kinematics over the point gradient"});
+  refused("--set kinematics.order=2 --set 'damage={type=\"critical_stretch\",stretch=0.1}'",
+          {"damage: found with kinematics \"baqp\" of order 2, whose point gradients are made once; allowed: order 1"});
+  refused("--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}' --set 'damage={type=\"critical_stretch\",stretch=0.1}'",
+          {"damage: found with a law whose stress depends on the path; allowed: hyperelastic laws"});
   refused("--set 'kinematics={type=\"baqp\",stabilization=\"silling\"}'",
           {"kinematics.stabilization: found 'silling' over baqp; allowed: over kinematics with one gradient per point"});
   refused("--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}' --set 'integrator={type=\"newton\"}'",
