@@ -117,6 +117,29 @@ TEST_CASE("every kinematics in every space, on lattices, clouds and cracked bodi
   CHECK(count > 80);
 }
 
+TEST_CASE("a part that only bonds longer than the springs join to the rest, and points that stand alone") {
+  registry();
+  BodyOptions body;
+  body.dimension = 2;
+  body.cells = 12;  // and 10 along x
+  body.horizon_ratio = 3.015;
+  body.sets = "held = \"x < 2.01\"\nend = \"x > 8\"\n";
+  body.conditions = "[[boundary]]\nset = \"held\"\ndisplacement = [0, 0]\n[[load]]\nset = \"end\"\nforce = [0.01, 0.01]\n";
+  for (const std::string gap : {"x < 6 || x > 7", "x < 5 || (abs(y - 2.5) < 0.1 && abs(x - 6.5) < 0.1) || x > 7"}) {
+    INFO(gap);
+    std::vector<std::unique_ptr<Simulation>> found;
+    for (const std::string& integrator : {companion, std::string("type = \"newton\"\nsteps = 1\ntolerance = 1e-9\n")}) {
+      body.integrator = integrator;
+      std::string text = contract::scene_text(body, "type = \"baqp\"");
+      text.insert(text.find("[sets]"), "inside = \"" + gap + "\"\n");
+      found.push_back(contract::build(text));
+      run(*found.back());
+    }
+    CHECK(mean(*found[1], "end", 0) > 1e-3);
+    CHECK(distance(*found[0], *found[1]) < 1e-6);
+  }
+}
+
 TEST_CASE("nearly incompressible: more iterations, still an answer") {
   const Protocol easy = run(*block("type = \"baqp\"", 9, companion, 0.25)),
                  hard = run(*block("type = \"baqp\"", 9, companion, 0.49));

@@ -9,6 +9,8 @@ namespace perikit {
 
 namespace {
 
+constexpr double floating = 1e-9;  // of the diagonal: less than the softest bending of bodies that fit into memory
+
 /// a and b of the springs that stand for an isotropic law.
 struct SpringModuli {
   double stretch, slide;
@@ -28,7 +30,7 @@ double squared(const double* a, const double* b) {
   return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/// Rows of `near`; those with fewer than 2 d members, and their partners, from `far` instead.
+/// Rows of `near`; those of poor points, and their partners, from `far` instead.
 FamilyLists merged(const FamilyLists& near, const FamilyLists& far, const std::vector<bool>& poor) {
   FamilyLists lists{{0}, {}};
   for (std::size_t i = 0; i + 1 < near.first.size(); ++i) {
@@ -64,7 +66,8 @@ Companion::Companion(const Body& body, const Laws& laws) : body_(body), dimensio
       m += influence(xi2) * xi2 * other[3];
     }
     const SpringModuli moduli = spring_moduli(body.space(), laws.moduli(static_cast<std::size_t>(point_[i])));
-    stretch_[i] = m > 0 ? moduli.stretch / m : 0;
+    // A point without a spring stands alone, as stiff as its like.
+    stretch_[i] = m > 0 ? moduli.stretch / m : moduli.stretch * rows_[4 * i + 3] / (body.spacing() * body.spacing());
     slide_[i] = m > 0 ? moduli.slide / m : 0;
   }
 }
@@ -72,16 +75,13 @@ Companion::Companion(const Body& body, const Laws& laws) : body_(body), dimensio
 void Companion::find_pattern() {
   const std::size_t n = point_.size();
   // A little more than the diagonal of a face; clouds have about as many neighbours there, but where points are far apart some
-  // have few.
+  // have few: they keep their family.
   const double reach = (dimension_ == 1 ? 1.01 : 1.43) * body_.spacing();
   lists_ = find_families(rows_, n, dimension_, reach);
-  if (!body_.lattice()) {
-    std::vector<bool> poor(n);
-    for (std::size_t i = 0; i < n; ++i) poor[i] = lists_.first[i + 1] - lists_.first[i] < 2 * dimension_;
-    if (std::ranges::find(poor, true) != poor.end()) {
-      lists_ = merged(lists_, find_families(rows_, n, dimension_, std::max(body_.horizon(), reach)), poor);
-    }
-  }
+  std::vector<bool> poor(n);
+  for (std::size_t i = 0; i < n; ++i) poor[i] = lists_.first[i + 1] - lists_.first[i] < dimension_;
+  if (std::ranges::find(poor, true) != poor.end())
+    lists_ = merged(lists_, find_families(rows_, n, dimension_, std::max(body_.horizon(), reach)), poor);
   if (body_.cracks().empty()) return;
   FamilyLists whole{{0}, {}};
   for (std::size_t i = 0; i < n; ++i) {
@@ -140,6 +140,9 @@ void Companion::assemble(ConstFieldView u, BlockMatrix& K) const {
           sum[a * d + c] -= block[a * d + c];
         }
     }
+    // Parts that springs do not join to a held one stay where they are, all but freely.
+    const bool alone = K.row_first[i + 1] - K.row_first[i] == 1;
+    for (std::size_t a = 0; a < d; ++a) sum[a * d + a] = alone ? stretch_[i] : sum[a * d + a] * (1 + floating);
     std::copy_n(sum, size, own);
   });
 }
