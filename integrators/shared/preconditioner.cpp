@@ -156,8 +156,7 @@ std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Pro
   if (name == "auto" && communicator().size() > 1) {
     chosen = "none";   // the assembled tangent needs the whole body on one rank
   } else if (name == "auto") {
-    const auto bytes = static_cast<double>(problem.assembled_size().bytes);
-    chosen = problem.dimension() < 3 && bytes <= 2e9 ? "factorisation" : "companion";
+    chosen = problem.dimension() < 3 && static_cast<double>(problem.assembled_size().bytes) <= 2e9 ? "factorisation" : "companion";
   }
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
   if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);
