@@ -71,6 +71,8 @@ class TimedProblem final : public Problem {
   bool any_load() const noexcept override { return of_.any_load(); }
   bool loads_depend_on_time() const noexcept override { return of_.loads_depend_on_time(); }
   bool advance_history(double time_step, ConstFieldView velocity) override { return of_.advance_history(time_step, velocity); }
+  std::vector<std::byte> bonds() const override { return of_.bonds(); }
+  void restore_bonds(std::span<const std::byte> bonds) override { of_.restore_bonds(bonds); }
   bool any_constraint() const noexcept override { return of_.any_constraint(); }
   std::span<const std::int64_t> constrained() const noexcept override { return of_.constrained(); }
   ConstFieldView free_mask() const noexcept override { return of_.free_mask(); }
