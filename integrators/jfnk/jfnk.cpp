@@ -80,7 +80,7 @@ bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double
   const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution.get(), right_vector_.get(), accuracy * size);
   const int iterations = SUNLinSolNumIters(gmres_.get());
   const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
-  if (preconditioner_) preconditioner_->took(iterations);
+  if (preconditioner_) preconditioner_->took(iterations, reached);
   note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
   // A direction that was not solved to the accuracy asked for is still one that lowers the residual.
   if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;

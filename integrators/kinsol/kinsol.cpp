@@ -149,7 +149,7 @@ int KinsolSolver::run_once(Equilibrium& equilibrium, double target, Solution& so
   long iterations = 0, linear = 0;
   KINGetNumNonlinSolvIters(memory_, &iterations);
   if (linear_ && !matrix_) KINGetNumLinIters(memory_, &linear);
-  if (preconditioner_ && iterations > 0) preconditioner_->took(static_cast<int>(linear / iterations));
+  if (preconditioner_ && iterations > 0) preconditioner_->took(static_cast<int>(linear / iterations), 0.1);   // alike from solve to solve: counted as a digit each
   solution.iterations += static_cast<int>(iterations);
   equilibrium.note(fmt::format("  {} iterations{}", iterations, linear > 0 ? fmt::format(", {} linear ones", linear) : ""));
   return flag;

@@ -6,15 +6,31 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
+#include "multigrid.hpp"
 #include "sparse_solver.hpp"
 
 namespace perikit {
 
 namespace {
 
-class Factorisation final : public Preconditioner {
+/// Made of the assembled tangent.
+class FromTangent : public Preconditioner {
+ protected:
+  using Preconditioner::Preconditioner;
+  virtual bool make(const BlockMatrix& K, ConstFieldView free, std::string& failure) = 0;
+
+ private:
+  bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string& failure) final {
+    const EvaluationStatus status = problem.assemble_tangent(u, tangent_);
+    if (!status.ok()) failure = status.description;
+    return status.ok() && make(tangent_, free, failure);
+  }
+  BlockMatrix tangent_;
+};
+
+class Factorisation final : public FromTangent {
  public:
-  explicit Factorisation(Problem& problem) : Preconditioner(problem) {}
+  explicit Factorisation(Problem& problem) : FromTangent(problem) {}
   void apply(ConstFieldView r, FieldView z) override { solver_.solve(r, z); }
 
  private:
@@ -23,9 +39,9 @@ class Factorisation final : public Preconditioner {
 };
 
 /// Inverses of the diagonal blocks, prescribed components left out.
-class BlockJacobi final : public Preconditioner {
+class BlockJacobi final : public FromTangent {
  public:
-  explicit BlockJacobi(Problem& problem) : Preconditioner(problem) {}
+  explicit BlockJacobi(Problem& problem) : FromTangent(problem) {}
 
   void apply(ConstFieldView r, FieldView z) override {
     if (z.data != r.data) fill(0.0, z);
@@ -86,6 +102,24 @@ class BlockJacobi final : public Preconditioner {
   std::vector<double> inverse_;
 };
 
+/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly.
+class CompanionCycle final : public Preconditioner {
+ public:
+  explicit CompanionCycle(Problem& problem) : Preconditioner(problem) {}
+  void apply(ConstFieldView r, FieldView z) override { multigrid_.apply(r, z); }
+
+ private:
+  bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string&) override {
+    problem.assemble_companion(u, springs_);
+    multigrid_.make(springs_, free, problem.rigid_motions(u));
+    return true;
+  }
+  double patience() const noexcept override { return 1.3; }   // it is cheap
+
+  BlockMatrix springs_;
+  Multigrid multigrid_;
+};
+
 }  // namespace
 
 Preconditioner::Preconditioner(Problem& problem)
@@ -93,27 +127,27 @@ Preconditioner::Preconditioner(Problem& problem)
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   Problem& problem = equilibrium.problem();
-  const bool worn = !problem.constant_stiffness() && lately() > 2 * at_first() + 5;
+  const bool worn = !problem.constant_stiffness() && lately() > patience() * at_first() + 2;
   if (in_hand_ && !worn) return true;
   if (made() == 0 || worn) {
     copy(u, state_);
     made() = 1;
     at_first() = lately() = 0;
   }
-  const EvaluationStatus status = problem.assemble_tangent(state_, tangent_);
-  if (!status.ok()) failure = status.description;
-  in_hand_ = status.ok() && make(tangent_, equilibrium.free(), failure);
+  in_hand_ = make(problem, state_, equilibrium.free(), failure);
   if (!in_hand_) made() = 0;
   return in_hand_;
 }
 
-void Preconditioner::took(int iterations) {
-  if (at_first() == 0) at_first() = iterations;
-  lately() = iterations;
+void Preconditioner::took(int iterations, double reduction) {
+  // A solve that gains less than a digit says little of its speed.
+  const double digits = std::max(1.0, -std::log10(std::max(reduction, 1e-16)));
+  lately() = iterations / digits;
+  if (at_first() == 0) at_first() = lately();
 }
 
 void add_preconditioner_key(ParameterTable& table) {
-  table.choice("preconditioner", {"auto", "none", "jacobi", "factorisation"}, "Of Krylov solvers: from the assembled tangent where it is affordable.")
+  table.choice("preconditioner", {"auto", "none", "jacobi", "factorisation", "companion"}, "Of Krylov solvers: the assembled tangent (its factors, or the blocks of its diagonal), or springs between nearest neighbours (companion).")
       .by_default("\"auto\"");
 }
 
@@ -122,10 +156,10 @@ std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Pro
   if (name == "auto" && communicator().size() > 1) {
     chosen = "none";   // the assembled tangent needs the whole body on one rank
   } else if (name == "auto") {
-    const auto bytes = static_cast<double>(problem.assembled_size().bytes);
-    chosen = bytes <= (problem.dimension() == 3 ? 0.5e9 : 2e9) ? "factorisation" : bytes <= 4e9 ? "jacobi" : "none";
+    chosen = problem.dimension() < 3 && static_cast<double>(problem.assembled_size().bytes) <= 2e9 ? "factorisation" : "companion";
   }
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
+  if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
   return nullptr;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Preconditioners of the linear systems of load steps, from the assembled tangent.
+/// Preconditioners of the linear systems of load steps: from the assembled tangent, or from a companion of nearest neighbours.
 
 #include <memory>
 #include <span>
@@ -13,7 +13,7 @@
 namespace perikit {
 
 /// An approximate inverse of the tangent on the free components, made at one state and kept over iterations and steps until solves
-/// take clearly more iterations than they took with it at first. The state and the counts are kept with the problem: a restored
+/// take clearly more iterations for each digit than they took with it at first. The state and the counts are kept with the problem: a restored
 /// run makes the same preconditioner again.
 class Preconditioner {
  public:
@@ -24,29 +24,31 @@ class Preconditioner {
   virtual void apply(ConstFieldView r, FieldView z) = 0;
   /// To be made anew before the next solve.
   void discard() noexcept { made() = in_hand_ = false; }
-  /// Iterations that a solve took.
-  void took(int iterations);
+  /// Iterations that a solve took to make its residual smaller by the factor `reduction` < 1.
+  void took(int iterations, double reduction);
 
  protected:
   explicit Preconditioner(Problem& problem);
-  /// Makes it from the tangent.
-  virtual bool make(const BlockMatrix& K, ConstFieldView free, std::string& failure) = 0;
+  /// How many times as many iterations a digit as at first it may take before it is made anew.
+  virtual double patience() const noexcept { return 2; }
+  /// Makes it at u.
+  virtual bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string& failure) = 0;
 
  private:
   double& made() noexcept { return numbers_[0]; }
-  double& at_first() noexcept { return numbers_[1]; }   ///< iterations of the first solve with it
+  double& at_first() noexcept { return numbers_[1]; }   ///< iterations a digit of the first solve with it
   double& lately() noexcept { return numbers_[2]; }     ///< and of the last
   FieldView state_;                                     ///< where it was made
   std::span<double> numbers_;
-  BlockMatrix tangent_;
   bool in_hand_ = false;
 };
 
 /// The key `preconditioner` of an integrator.
 void add_preconditioner_key(ParameterTable& table);
 
-/// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "auto": the
-/// factorisation where the assembled tangent takes at most 2 GB (3D: 0.5 GB, for its factors are fuller), Jacobi up to 4 GB, none beyond.
+/// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion" (a
+/// multigrid cycle on springs between nearest neighbours, never the tangent), "auto": in 3D the companion, else the factorisation where the
+/// assembled tangent takes at most 2 GB.
 /// `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 

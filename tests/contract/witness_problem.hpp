@@ -36,6 +36,8 @@ class WitnessProblem final : public Problem {
   Energies& energies() noexcept override { return other_.energies(); }
   std::vector<std::byte> snapshot() const override { return other_.snapshot(); }
   void restore(std::span<const std::byte> bytes) override { other_.restore(bytes); }
+  void assemble_companion(ConstFieldView u, BlockMatrix& K) override { other_.assemble_companion(u, K); }
+  std::vector<Field> rigid_motions(ConstFieldView u) override { return other_.rigid_motions(u); }
   std::span<const double> mass() override { return other_.mass(); }
   double uniform_mass() override { return other_.uniform_mass(); }
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -173,7 +174,7 @@ TEST_CASE("a quantity or reference that does not fit the scene is refused before
     CHECK_FALSE(ran);
   };
   check("\"time\"", "\"tiem\"", "study.toml:9:8: quantity.0.from: found \"tiem\"; allowed: step, time, time_step,");
-  check("\"time\"", "\"tiem\"", "run_time, set_up_time, steps, points, bonds, memory; did you mean 'time'?");
+  check("\"time\"", "\"tiem\"", "run_time, cpu_time, set_up_time, steps, points, bonds, memory; did you mean 'time'?");
   check("2 * k", "2 * kk", "study.toml:11:13: quantity.0.reference: found the expression \"2 * kk\": unknown name 'kk'");
   check("2 * k", "2 * x", "quantity.0.reference: found an expression in x, y or z; allowed: one in the constants of the scene");
   check("2 * k", "k - 2", "quantity.0.reference: found the value 0; allowed: any other");
@@ -289,6 +290,32 @@ TEST_CASE("the picture has a line for each value of the series" *
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
   CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
                  "no run gives numbers for cost and top_error"));
+}
+
+TEST_CASE("where a series stays below a level: the last point above it counts, straight lines (of logarithms) lie between points") {
+  using Points = std::vector<std::pair<double, double>>;
+  using enum Crossing::Kind;
+  const auto found = [](Points points, bool logarithmic) { return crossing(std::move(points), 0.01, logarithmic); };
+  CHECK(found({{1, 0.1}, {10, 0.001}}, true).x == doctest::Approx(std::sqrt(10.0)).epsilon(1e-12));
+  CHECK(found({{10, 0.0}, {1, 0.02}}, false).x == doctest::Approx(5.5).epsilon(1e-12));
+  // An error that passes through zero on its way is not small for good.
+  CHECK(found({{1, 0.1}, {2, 1e-6}, {4, 0.04}, {16, 0.0025}}, true).x == doctest::Approx(8).epsilon(1e-12));
+  CHECK(found({{1, 0.1}}, true).kind == never);
+  CHECK(found({{3, 0.001}, {2, 0.01}}, true).kind == at_once);
+  CHECK(found({{3, 0.001}, {2, 0.01}}, true).x == 2);
+}
+
+TEST_CASE("a study with a level tells it in its table, and refuses one that a logarithmic axis does not have") {
+  StudyFolder folder;
+  const std::string plot = "[plot]\nx = \"constants.k\"\ny = \"top_error\"\nlog = \"xy\"\n";
+  // top = 1.5 k against 2 k: an error of a quarter everywhere.
+  const auto table = [&](const std::string& level) {
+    const Study study = folder.parse(study_text + plot + "level = " + level + "\n");
+    return run_study(study, folder.parts, {}, folder.path / "out", pretend, silent).markdown();
+  };
+  CHECK(contains(table("0.3"), "| series | constants.k from which top_error stays below 0.3 |\n| --- | --- |\n| top_error | < 1 |\n"));
+  CHECK(contains(table("0.2"), "| top_error | > 4 |\n"));
+  CHECK(contains(folder.error(study_text + plot + "level = 0\n"), "plot.level: found 0; allowed with a logarithmic axis: a number > 0"));
 }
 
 TEST_CASE("a run in a process of its own: its measures come back, its end is told") {

@@ -10,6 +10,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/recorder.hpp"
+#include "problem/companion.hpp"
 
 namespace perikit {
 
@@ -169,6 +170,41 @@ void BodyProblem::refuse_assembly() const {
 AssembledSize BodyProblem::assembled_size() {
   refuse_assembly();
   return model_->assembled_size();
+}
+
+BodyProblem::~BodyProblem() = default;
+
+void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K) {
+  refuse_assembly();
+  if (!companion_) companion_ = std::make_unique<Companion>(body_, *laws_);
+  companion_->assemble(u, K);
+}
+
+std::vector<Field> BodyProblem::rigid_motions(ConstFieldView u) {
+  const int d = dimension();
+  Point middle{};
+  for (const std::int32_t p : body_.internal())
+    for (std::size_t c = 0; c < 3; ++c) middle[c] += body_.position(static_cast<std::size_t>(p))[c] / static_cast<double>(points());
+  double size = spacing();
+  for (const std::int32_t p : body_.internal())
+    for (std::size_t c = 0; c < 3; ++c) size = std::max(size, std::abs(body_.position(static_cast<std::size_t>(p))[c] - middle[c]));
+  std::vector<Field> motions;
+  for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(make_field(d));
+  for (const std::int32_t index : body_.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    Point y = body_.position(p);
+    for (int c = 0; c < d; ++c) {
+      y[static_cast<std::size_t>(c)] += u.component(c)[p] - middle[static_cast<std::size_t>(c)];
+      motions[static_cast<std::size_t>(c)].component(c)[p] = 1;
+    }
+    std::size_t k = static_cast<std::size_t>(d);
+    for (int a = 0; a < d; ++a)
+      for (int b = a + 1; b < d; ++b, ++k) {
+        motions[k].component(a)[p] = -y[static_cast<std::size_t>(b)] / size;
+        motions[k].component(b)[p] = y[static_cast<std::size_t>(a)] / size;
+      }
+  }
+  return motions;
 }
 
 double BodyProblem::kinetic_energy(ConstFieldView velocity) {

@@ -12,6 +12,7 @@
 #include "output/atomic_file.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
+#include "run/reduction.hpp"
 
 namespace perikit {
 
@@ -195,39 +196,13 @@ void RunRecorder::write_frame(const StepReport& report) {
   ++frames_written_;
 }
 
-double RunRecorder::reduce(const HistoryDescription& record) {
-  const OutputField& field = fields_.get(record.quantity);
-  const Body& body = simulation_.problem().body();
-  const int column = PointFields::column(record.quantity, record.component);
-  const auto w = static_cast<std::size_t>(field.width);
-  double sum = 0, least = INFINITY, most = -INFINITY;
-  const auto& members = body.set(record.set);
-  for (const std::int32_t index : members) {
-    const double* row = &field.data[w * static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(index)))];
-    double value = 0;
-    if (column >= 0) {
-      value = row[column];
-    } else {
-      for (std::size_t c = 0; c < w; ++c) value += row[c] * row[c];
-      value = std::sqrt(value);
-    }
-    sum += value;
-    least = std::min(least, value);
-    most = std::max(most, value);
-  }
-  if (record.reduce == "sum") return sum;
-  if (record.reduce == "min") return least;
-  if (record.reduce == "max") return most;
-  return sum / static_cast<double>(members.size());
-}
-
 void RunRecorder::write_history(const StepReport& report) {
   BodyProblem& problem = simulation_.problem();
   Energies& energies = problem.energies();
   if (simulation_.dynamic()) energies.kinetic = problem.kinetic_energy(problem.velocity());
   std::vector<double> row{static_cast<double>(report.step), report.time, report.time_step, energies.strain, energies.kinetic,
                           energies.external_work, energies.dissipated, static_cast<double>(report.iterations), report.residual};
-  for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduce(record));
+  for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
   history_->row(row);
   ++rows_written_;
 }

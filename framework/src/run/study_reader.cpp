@@ -42,6 +42,7 @@ ParameterTable plot_table() {
   table.string("y", "Column of the vertical axis.").require();
   table.string("series", "A line for each value of this key.");
   table.choice("log", {"", "x", "y", "xy"}, "Axes with a logarithmic scale.").by_default("\"\"");
+  table.number("level", "-", "A value of y: a line in the picture, and a table of where each series stays below it.");
   return table;
 }
 
@@ -153,7 +154,8 @@ class StudyReader {
     key.values.push_back(std::move(value));
   }
 
-  /// A string without its quotes; a table by its type, then what else it says: conventional (stabilization = wan).
+  /// A string without its quotes; a table by its type, then what else it says, tables in it without their keys: conventional (wan),
+  /// conventional (silling (coefficient = 0.1)).
   static std::string shown(const toml::node& node, const std::string& text) {
     if (const auto* string = node.as_string()) return string->get();
     const auto* table = node.as_table();
@@ -164,7 +166,7 @@ class StudyReader {
       if (key == "type")
         type = inner;
       else
-        rest += (rest.empty() ? "" : ", ") + std::string(key.str()) + " = " + inner;
+        rest += (rest.empty() ? "" : ", ") + (value.is_table() ? inner : std::string(key.str()) + " = " + inner);
     }
     if (type.empty()) return rest;
     return rest.empty() ? type : type + " (" + rest + ")";
@@ -241,7 +243,11 @@ class StudyReader {
       return text;
     };
     study_.plot =
-        StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : ""};
+        StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : "",
+                            values.has("level") ? std::optional(values.number("level")) : std::nullopt};
+    if (study_.plot->level && study_.plot->log.find('y') != std::string::npos && !(*study_.plot->level > 0)) {
+      reader_.errors.add(values.position("level"), "plot.level", fmt::format("found {}; allowed with a logarithmic axis: a number > 0", *study_.plot->level));
+    }
   }
 
   TomlReader reader_;

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <ctime>
 #include <new>
 #include <span>
 #include <sstream>
@@ -69,7 +70,7 @@ std::string received(int pipe, pid_t child) {
 }  // namespace
 
 const std::vector<std::string>& run_measures() {
-  static const std::vector<std::string> names{"run_time", "set_up_time", "steps", "points", "bonds", "memory"};
+  static const std::vector<std::string> names{"run_time", "cpu_time", "set_up_time", "steps", "points", "bonds", "memory"};
   return names;
 }
 
@@ -88,6 +89,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     RunRecorder recorder(simulation, folder, false);
     recorder.log(simulation.summary());
     const auto running = clock::now();
+    const std::clock_t processor = std::clock();
     try {
       simulation.run(recorder);
     } catch (const RunError& error) {
@@ -95,6 +97,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
       throw;
     }
     outcome.measures["run_time"] = seconds(clock::now() - running);
+    outcome.measures["cpu_time"] = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
     outcome.measures["steps"] = static_cast<double>(problem.step());
     if (recorder.cancelled()) return failed("stopped by a signal");
   } catch (const InputError& error) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "perikit/run/study.hpp"
+#include "run/study_series.hpp"
 
 namespace perikit {
 
@@ -79,6 +80,7 @@ std::string StudyTable::markdown() const {
   line(header(study));
   line(std::vector<std::string>(header(study).size(), "---"));
   for (const StudyRow& row : rows) line(cells(*this, row, 6));
+  if (study.plot && study.plot->level) (text += '\n') += level_table(*this);
   return text;
 }
 

@@ -121,7 +121,7 @@ void SceneReader::read_history(const toml::table& output) {
     writer_.lines(table, values);
     const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
     HistoryDescription description{text("name"),      set_of(values), text("quantity"),
-                                   text("component"), text("reduce"), reader_.position(*record)};
+                                   text("component"), text("reduce"), reader_.position(*record), {}, {}};
     const auto refuse = [&](const char* key, const std::string& message) {
       reader_.errors.add(values.position(key), join_path(path, key), message);
     };
@@ -149,6 +149,17 @@ void SceneReader::read_history(const toml::table& output) {
                fmt::format("found {}; allowed: {}", values.has("component") ? toml_string(description.component) : "nothing",
                            fmt::join(allowed, ", ")));
       }
+    }
+    for (const auto& [key, reduce] : {std::pair{"at", "fit"}, {"exact", "error"}}) {
+      if (values.has("reduce") && values.has(key) && description.reduce != reduce) {
+        refuse(key, fmt::format("found it with reduce = \"{}\"; allowed: only with reduce = \"{}\"", description.reduce, reduce));
+      } else if (description.reduce == reduce && !record->contains(key)) {
+        refuse("reduce", fmt::format("found \"{}\" without {}; allowed: {}", reduce, key, allowed(*table.find(key))));
+      }
+    }
+    if (values.has("at")) std::ranges::copy(values.numbers("at"), description.at.begin());
+    if (values.has("exact")) {
+      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"), join_path(path, "exact"));
     }
     scene_.output.history.push_back(std::move(description));
   }

@@ -171,7 +171,13 @@ ParameterTable history_parameters() {
   table.string("set", "The points that are sampled.").by_default("\"all\"");
   table.choice("quantity", point_fields, "A point field.").require();
   table.string("component", "Component of a vector (x) or tensor (xy).");
-  table.choice("reduce", {"mean", "sum", "min", "max"}, "How the values of the set become one.").by_default("\"mean\"");
+  table
+      .choice("reduce", {"mean", "sum", "min", "max", "fit", "error"},
+              "How the values of the set become one. fit: an affine function fitted to them, taken at the place `at`; error: their "
+              "root-mean-square distance from `exact`, relative to that of `exact` from 0, weighted by volume.")
+      .by_default("\"mean\"");
+  table.add(ParameterType::numbers, "at", "m", "With reduce = \"fit\": a place, which need not be a point of the body.").one_per_axis();
+  table.add(ParameterType::expression, "exact", "-", "With reduce = \"error\": what the quantity should be, in its own unit.").with_time();
   return table;
 }
 

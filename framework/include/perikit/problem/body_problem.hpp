@@ -14,11 +14,14 @@
 
 namespace perikit {
 
+class Companion;
+
 class BodyProblem final : public Problem {
  public:
   /// Builds everything that the scene describes, by parts from `factory`. Where the communicator has several ranks: this rank's part
   /// of it, whose fields are zero at ghosts. Throws InputError.
   BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static);
+  ~BodyProblem() override;
 
   int dimension() const noexcept override { return body_.dimension(); }
   std::size_t stride() const noexcept override { return body_.stride(); }
@@ -45,6 +48,8 @@ class BodyProblem final : public Problem {
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
   AssembledSize assembled_size() override;
+  void assemble_companion(ConstFieldView u, BlockMatrix& K) override;
+  std::vector<Field> rigid_motions(ConstFieldView u) override;
   void evaluate_loads(double t, FieldView force) override;
   bool any_load() const noexcept override { return !loads_.empty(); }
   bool loads_depend_on_time() const noexcept override;
@@ -147,6 +152,7 @@ class BodyProblem final : public Problem {
   Field displacement_, internal_force_;
   std::map<std::string, Field> declared_;
   std::map<std::string, std::vector<double>> numbers_;
+  std::unique_ptr<Companion> companion_;       ///< made when asked for
   Field eigenvector_;
   AlignedVector<double> mass_;
   double uniform_mass_ = -1;

@@ -101,6 +101,11 @@ class Problem {
   virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
   /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
   virtual AssembledSize assembled_size() = 0;
+  /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap, spectrally close to
+  /// the tangent. For preconditioners. Pattern and values as with assemble_tangent.
+  virtual void assemble_companion(ConstFieldView u, BlockMatrix& K) = 0;
+  /// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its middle.
+  virtual std::vector<Field> rigid_motions(ConstFieldView u) = 0;
   /// Loads at time (or load parameter) t [N].
   virtual void evaluate_loads(double t, FieldView force) = 0;
   virtual bool any_load() const noexcept = 0;

@@ -94,7 +94,6 @@ class RunRecorder final : public Observer {
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
   void write_history(const StepReport& report);
-  double reduce(const HistoryDescription& record);
   void progress(const StepReport& report);
 
   Simulation& simulation_;

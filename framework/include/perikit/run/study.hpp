@@ -17,6 +17,7 @@
 ///   y = "tip_error"
 ///   series = "kinematics.type"               # a line for each of its values
 ///   log = "xy"
+///   level = 0.01                             # a line at this y, and in table.md from which x on each series stays below it
 
 #include <filesystem>
 #include <functional>
@@ -56,6 +57,7 @@ struct StudyPlot {
   std::string x, y;
   std::string series;  ///< a key of the values; empty: one line
   std::string log;     ///< axes with a logarithmic scale: "", "x", "y", "xy"
+  std::optional<double> level;   ///< of y
 };
 
 struct Study {
@@ -79,8 +81,8 @@ const std::vector<std::pair<std::string, ParameterTable>>& study_sections();
 /// For each run the index of the value of each key.
 std::vector<std::vector<std::size_t>> combinations(const Study& study);
 
-/// What a run itself knows besides its history: run_time [s] (with its output), set_up_time [s], steps, points, bonds, memory
-/// [bytes].
+/// What a run itself knows besides its history: run_time [s] (with its output), cpu_time [s] (processor time of that, all threads
+/// together: on a busy machine too), set_up_time [s], steps, points, bonds, memory [bytes].
 const std::vector<std::string>& run_measures();
 
 struct RunOutcome {
@@ -122,6 +124,18 @@ struct StudyTable {
   std::string csv() const;
   std::string markdown() const;
 };
+
+/// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms where both
+/// axes have them).
+struct Crossing {
+  double x = 0;
+  enum class Kind {
+    reached,   ///< at x
+    at_once,   ///< by all points, the first of them at x
+    never,     ///< the last point, at x, is above
+  } kind = Kind::never;
+};
+Crossing crossing(std::vector<std::pair<double, double>> points, double level, bool logarithmic);
 
 /// Runs every combination into folder/runs/<index>, `jobs` at a time, and writes folder/table.csv and table.md after each, and
 /// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that says so.

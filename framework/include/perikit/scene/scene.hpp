@@ -74,6 +74,8 @@ struct LoadDescription {
 struct HistoryDescription {
   std::string name, set, quantity, component, reduce;
   SourcePosition position;
+  std::optional<Expression> exact;           ///< with reduce "error"
+  std::array<double, 3> at{};                ///< with reduce "fit" [m]
 };
 
 struct OutputDescription {

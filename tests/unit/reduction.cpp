@@ -1,0 +1,89 @@
+#include "run/reduction.hpp"
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "perikit/plugin/registry.hpp"
+#include "perikit/run/simulation.hpp"
+#include "unit/fake_catalogue.hpp"
+
+using namespace perikit;
+using namespace perikit::test;
+
+namespace {
+
+/// A plate of 6 x 5 points at (k + 1/2) 0.5 with one record of its displacement.
+std::unique_ptr<Simulation> plate(const std::string& set, const std::string& record, double jitter = 0) {
+  static Registry registry;
+  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  const std::string text = fmt::format(
+      "format = 1\n[constants]\nright = 3.0\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.5\nlower = "
+      "[0, 0]\nupper = [3, 2.5]\njitter = {}\n"
+      "[sets]\nsome = \"{}\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"conventional\"\n"
+      "[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25\n[integrator]\ntype = "
+      "\"evaluate\"\n"
+      "[output]\nhistory = [{{ name = \"u\", set = \"some\", quantity = \"displacement\", component = \"x\", {} }}]\n",
+      jitter, set, record);
+  return std::make_unique<Simulation>(parse_scene(text, "plate.toml", registry), registry);
+}
+
+/// What the record gives for u_x = value(x, y) at t.
+template <class Value>
+double recorded(Simulation& simulation, Value&& value, double t = 0) {
+  BodyProblem& problem = simulation.problem();
+  for (const std::int32_t p : problem.body().internal()) {
+    const Point x = problem.body().position(static_cast<std::size_t>(p));
+    problem.displacement().component(0)[p] = value(x[0], x[1]);
+  }
+  PointFields fields(problem, false);
+  return reduced(simulation.scene().output.history.front(), problem.body(), fields.get("displacement"), t);
+}
+
+}  // namespace
+
+TEST_CASE(
+    "fit: an affine field is found at any place, also outside of the body and on clouds; a column of points has no slope "
+    "across") {
+  const auto affine = [](double x, double y) { return 0.3 - 0.1 * x + 0.2 * y; };
+  for (const double jitter : {0.0, 0.2}) {
+    const auto corner = plate("x > 1.5", "reduce = \"fit\", at = [\"right\", 2.5]", jitter);
+    CHECK(recorded(*corner, affine) == doctest::Approx(affine(3, 2.5)).epsilon(1e-12));
+    CHECK(std::abs(recorded(*corner, [](double x, double y) { return x * y; }) - 7.5) > 0.01);  // no interpolation: a fit
+  }
+  const auto column = plate("x > 2.5", "reduce = \"fit\", at = [3, 2.5]");
+  CHECK(recorded(*column, affine) == doctest::Approx(affine(2.75, 2.5)).epsilon(1e-12));
+  const auto point = plate("x > 2.5 && y > 2", "reduce = \"fit\", at = [3, 2.5]");
+  CHECK(recorded(*point, affine) == doctest::Approx(affine(2.75, 2.25)).epsilon(1e-12));
+}
+
+TEST_CASE("error: the distance from an exact solution, relative to it, at the time of the sample") {
+  const auto plates = plate("x < 1", "reduce = \"error\", exact = \"x*(1 + t)\"");  // columns at x = 0.25 and 0.75
+  CHECK(recorded(
+            *plates, [](double x, double) { return 3 * x; }, 2) == doctest::Approx(0).epsilon(1e-15));
+  CHECK(recorded(*plates, [](double x, double) { return 1.1 * x; }) == doctest::Approx(0.1).epsilon(1e-12));
+  CHECK(recorded(*plates, [](double x, double) { return x < 0.5 ? x + 0.25 : x; }) ==
+        doctest::Approx(0.25 / std::hypot(0.25, 0.75)).epsilon(1e-12));
+  const auto nothing = plate("x < 1", "reduce = \"error\", exact = \"0*x\"");
+  CHECK(recorded(*nothing, [](double, double) { return 0; }) == 0);
+  CHECK_THROWS_WITH_AS(recorded(*nothing, [](double x, double) { return x; }),
+                       "history column u: `exact` is 0 at every point of \"some\" at t = 0, and nothing to relate an error to",
+                       RunError);
+}
+
+TEST_CASE("at and exact go with their reductions, and these with them") {
+  const auto refused = [](const std::string& record) { return message_of([&] { plate("x < 1", record); }); };
+  const auto contains = [](const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; };
+  for (const auto& [record, part] : std::vector<std::pair<std::string, std::string>>{
+           {"reduce = \"fit\"", "output.history.0.reduce: found \"fit\" without at; allowed: "},
+           {"reduce = \"error\"", "output.history.0.reduce: found \"error\" without exact; allowed: "},
+           {"at = [1, 2]", "output.history.0.at: found it with reduce = \"mean\"; allowed: only with reduce = \"fit\""},
+           {"reduce = \"max\", exact = \"x\"",
+            "output.history.0.exact: found it with reduce = \"max\"; allowed: only with reduce = \"error\""},
+           {"reduce = \"fit\", at = [1]", "output.history.0.at: found a list of 1"},
+           {"reduce = \"error\", exact = \"x + q\"", "output.history.0.exact: "}}) {
+    const std::string message = refused(record);
+    CHECK_MESSAGE(contains(message, part), message);
+  }
+}
