@@ -25,7 +25,7 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
       "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
   const bool wide = std::ranges::any_of(lines, [](const StudySeries& line) { return line.name.size() > 24; });  // would leave no room beside it
   script += plot.series.empty() ? "unset key\n"
-                                : wide                ? fmt::format("set key below center maxrows {} samplen 2 width -2 font ',14'\n", (lines.size() + 1) / 2)
+                                : wide                ? fmt::format("set key below center maxrows {} samplen 1.5 width -3 font ',12'\n", (lines.size() + 1) / 2)
                                   : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     script += fmt::format("$line{} << end\n", i);
