@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "perikit/plugin/abi.hpp"
 #include "robustness/desk.hpp"
 
 using namespace perikit::test;
@@ -64,7 +65,8 @@ TEST_CASE("contract: without perikit's own parts there is nothing to test with")
   const Desk desk;
   // A framework library that has no folder of plugins beside it.
   fs::create_directories(desk.path("lib"));
-  fs::copy_file(fs::path(PERIKIT_PARTS).parent_path() / "libperikit.so.1", desk.path("lib/libperikit.so.1"));
+  const std::string library = "libperikit.so." PERIKIT_STRINGIFY(PERIKIT_ABI_VERSION);
+  fs::copy_file(fs::path(PERIKIT_PARTS).parent_path() / library, desk.path("lib/" + library));
   const Result result = desk.perikit(fmt::format("contract '{}/company.so'", PERIKIT_LIES), "unset PERIKIT_PLUGIN_PATH; LD_LIBRARY_PATH=lib");
   CHECK(result.status == 2);
   CHECK_MESSAGE(contains(result.err, "need the parts that come with perikit"), result.err);

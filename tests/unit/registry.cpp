@@ -1,6 +1,7 @@
 #include "perikit/plugin/registry.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -111,7 +112,7 @@ TEST_CASE("what the loader refuses carries its reason") {
   const Folder folder;
   check_refused(built("undefined_symbol"), "perikit_symbol_of_a_later_version");
   std::string other = bytes(built("good"));
-  const std::string soname = "libperikit.so.1";
+  const std::string soname = "libperikit.so." PERIKIT_STRINGIFY(PERIKIT_ABI_VERSION);
   REQUIRE(other.find(soname) != std::string::npos);
   other.replace(other.find(soname), soname.size(), "libperikit.so.7");
   check_refused(folder.write("other_soname.so", other), "libperikit.so.7");
@@ -119,7 +120,7 @@ TEST_CASE("what the loader refuses carries its reason") {
 
 TEST_CASE("ABI, build and symbols are compared before any object crosses") {
   check_refused(built("missing_symbol"), "symbol perikit_register missing");
-  check_refused(built("other_abi"), "ABI version 7, this program has 1");
+  check_refused(built("other_abi"), fmt::format("ABI version {}, this program has {}", PERIKIT_ABI_VERSION + 6, PERIKIT_ABI_VERSION));
   check_refused(built("other_build"), "built as 'msvc19 abacus'");
 }
 
@@ -307,12 +308,13 @@ TEST_CASE("a manifest of another ABI refuses its library without opening it") {
   const fs::path library = folder.copy("crashing_constructor", "old.so");
   write_manifest(library, {{Kind::influence, "old", ""}});
   std::string text = bytes(manifest_path(library));
-  text.replace(text.find("abi = 1"), 7, "abi = 7");
+  const std::string abi = "abi = " + std::to_string(PERIKIT_ABI_VERSION);
+  text.replace(text.find(abi), abi.size(), "abi = 7");
   folder.write("old.parts", text);
   Registry registry;
   registry.add_folder(folder.path);
   REQUIRE(registry.refused().size() == 1);
-  CHECK(registry.refused()[0].reason == "ABI version 7, this program has 1");
+  CHECK(registry.refused()[0].reason == fmt::format("ABI version 7, this program has {}", PERIKIT_ABI_VERSION));
 }
 
 TEST_CASE("an unknown name gets the nearest, the known ones and the refused libraries") {

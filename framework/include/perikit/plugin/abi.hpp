@@ -11,7 +11,7 @@
 #include "perikit/plugin/part.hpp"
 
 /// Raised whenever a public class changes its layout or its virtual functions.
-#define PERIKIT_ABI_VERSION 1
+#define PERIKIT_ABI_VERSION 2
 
 #define PERIKIT_STRINGIFY_(x) #x
 #define PERIKIT_STRINGIFY(x) PERIKIT_STRINGIFY_(x)
