@@ -349,7 +349,7 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
   const int last = points ? 2 : 3;
   if (tangent) mirror_rows(pass.w, body_.points(), w_);
   if (alone || tangent) quiet_.wake();
-  else quiet_.look(last, [&](std::size_t b) { return QuietBlocks::moves(pass.u, b * block_points, std::min(body_.points(), (b + 1) * block_points)); });
+  else quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, body_.points()); });
   const auto over_points = [&](std::size_t b, auto&& body) {
     for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) body(p);
   };

@@ -306,7 +306,7 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
 template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
-  look(pass, [&](std::size_t b) { return QuietBlocks::moves(pass.u, b * cloud_block_points, std::min(body_.points(), (b + 1) * cloud_block_points)); });
+  look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, body_.points()); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
   mirror_rows(pass.u, body_.points(), u_);
   if (pass.w.data) mirror_rows(pass.w, body_.points(), w_);

@@ -35,7 +35,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
     mirror_rows(u, points_, u_);
     std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
-    quiet_.look(2, [&](std::size_t b) { return QuietBlocks::moves(u, b * cloud_block_points, std::min(points_, (b + 1) * cloud_block_points)); });
+    quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
     over_points([&](std::size_t b) { return quiet_.begins(b); }, [&](std::size_t p) {
       model_.gradient_rows(p, u_, flux_);
       if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);

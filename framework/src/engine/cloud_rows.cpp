@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "quiet_blocks.hpp"
+
 namespace perikit {
 
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows) {
@@ -33,6 +35,10 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
     units.erase(std::unique(units.begin(), units.end()), units.end());
   }
   return reach;
+}
+
+bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
+  return QuietBlocks::moves(u, b * block_points, std::min(points, (b + 1) * block_points));
 }
 
 }  // namespace perikit

@@ -554,7 +554,7 @@ EvaluationStatus WeightedModel<D>::run(Pass& pass) {
   if (pass.work.tangent()) quiet_.wake();
   else quiet_.look(1, [&](std::size_t b) {
     if (lattice_) return lattice_->moves(b, pass.u);
-    return QuietBlocks::moves(pass.u, b * cloud_block, std::min(body_.points(), (b + 1) * cloud_block));
+    return cloud_moves(pass.u, b, body_.points(), cloud_block);
   });
   (lattice_ ? lattice_->colouring : cloud_colouring_).for_each([&](std::size_t b) {
     if (quiet_.awake(b, 1)) block(b, pass);
