@@ -7,9 +7,12 @@
 #include <cmath>
 #include <fstream>
 
+#include "data_folder.hpp"
+#include "operations.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/simd.hpp"
 #include "perikit/output/machine_limits.hpp"
 #include "perikit/run/simulation.hpp"
 
@@ -22,6 +25,8 @@ class StepTimer final : public Observer {
  public:
   bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
+    operations_ = counted_operations() - counted_;
+    counted_ += operations_;
     const auto now = std::chrono::steady_clock::now();
     if (report.step > 2) best_ = std::min(best_, std::chrono::duration<double>(now - last_).count());
     last_ = now;
@@ -29,8 +34,11 @@ class StepTimer final : public Observer {
   void log(std::string_view) override {}
   /// The fastest step: other programs on the machine can only slow a step down [s].
   double best() const noexcept { return best_; }
+  /// Of the last step, where they are counted.
+  std::uint64_t operations() const noexcept { return operations_; }
 
  private:
+  std::uint64_t counted_ = 0, operations_ = 0;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   double best_ = INFINITY;
 };
@@ -41,7 +49,7 @@ struct Row {
   int dimension = 3;
   bool cloud = false;
   std::size_t points = 0;
-  double step = INFINITY, bytes = 0, set_up = INFINITY, tangent = INFINITY, assembly = NAN;
+  double step = INFINITY, bytes = 0, set_up = INFINITY, tangent = INFINITY, assembly = NAN, operations = NAN;
 };
 
 std::string scene_of(const Row& row, const std::string& kinematics, const std::string& material, int cells, int steps) {
@@ -94,17 +102,22 @@ void measure(Registry& registry, Row& row, const std::string& kinematics, const 
     const auto points = static_cast<double>(row.points);
     row.bytes = static_cast<double>(simulation.problem().bytes()) / points;
     row.step = std::min(row.step, timer.best() / points);
+    if (counts_operations) row.operations = static_cast<double>(timer.operations()) / points;
     if (!all) return;
     row.set_up /= points;
     Field w = problem.make_field(row.dimension), Kw = problem.make_field(row.dimension);
     std::copy_n(problem.displacement().data, w.components() * w.stride(), w.data());
-    row.tangent = fastest([&] { problem.tangent_action(problem.displacement(), w, Kw); }) / points;
+    const auto check = [](const EvaluationStatus& status) {
+      if (!status.ok()) throw RunError(fmt::format("bench: {}", status.description));
+    };
+    row.tangent = fastest([&] { check(problem.tangent_action(problem.displacement(), w, Kw)); }) / points;
     if (!options.assembly) return;
     BlockMatrix K;
-    problem.assemble_tangent(problem.displacement(), K);   // with the pattern, which later ones keep
-    row.assembly = fastest([&] { problem.assemble_tangent(problem.displacement(), K); }) / points;
+    check(problem.assemble_tangent(problem.displacement(), K));   // with the pattern, which later ones keep
+    row.assembly = fastest([&] { check(problem.assemble_tangent(problem.displacement(), K)); }) / points;
   };
   timed(4, false);
+  if (counts_operations) return;
   timed(std::clamp(static_cast<int>(1.5 / (row.step * static_cast<double>(row.points))), 4, 200), true);
 }
 
@@ -115,6 +128,15 @@ std::vector<std::string> every_row(const Registry& registry) {
   return rows;
 }
 
+/// "12.3 (45 %)": a rate and its share of the limit.
+std::string rate(double value, double limit) {
+  return std::isfinite(value) ? fmt::format("{:.1f} ({:.0f} %)", value, 100 * value / limit) : std::string("-");
+}
+
+/// What a step reads and writes at least, every byte of a point once [GB/s], and what it computes [GFLOP/s].
+double traffic(const Row& row) { return 1e-9 * row.bytes / row.step; }
+double arithmetic(const Row& row) { return 1e-9 * row.operations / row.step; }
+
 std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
   const auto number = [](double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string("null"); };
   std::string text = fmt::format(
@@ -123,24 +145,16 @@ std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
   for (const Row& row : rows)
     text += fmt::format(
         "{}\n    {{\"kinematics\": \"{}\", \"material\": \"{}\", \"dimension\": {}, \"body\": \"{}\", \"points\": {}, \"step_ns\": {}, "
-        "\"bytes\": {}, \"set_up_ns\": {}, \"tangent_action_ns\": {}, \"assembly_ns\": {}}}",
+        "\"bytes\": {}, \"operations\": {}, \"of_triad\": {}, \"of_multiply_add\": {}, \"set_up_ns\": {}, \"tangent_action_ns\": {}, \"assembly_ns\": {}}}",
         &row == rows.data() ? "" : ",", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice", row.points, number(1e9 * row.step),
-        number(row.bytes), number(1e9 * row.set_up), number(1e9 * row.tangent), number(1e9 * row.assembly));
+        number(row.bytes), number(row.operations), number(traffic(row) / limits.triad_all), number(arithmetic(row) / limits.multiply_add_all),
+        number(1e9 * row.set_up), number(1e9 * row.tangent), number(1e9 * row.assembly));
   return text + "\n  ]\n}\n";
 }
 
-}  // namespace
-
-void bench(Registry& registry, const BenchOptions& options) {
-  std::ofstream file;
-  const auto refuse = [&] { throw RunError(fmt::format("{}: cannot be written", options.json)); };
-  if (!options.json.empty() && (file.open(options.json), !file)) refuse();   // before minutes of measuring, not after
-  const MachineLimits limits = measure_machine_limits();
-  fmt::print("machine: triad {:.1f} GB/s, multiply-add {:.1f} GFLOP/s, gather of 32-byte rows {:.1f} GB/s (one thread); {} threads: {:.1f}, {:.1f}, {:.1f}\n\n",
-             limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
-  fmt::print("{} points a side, horizon 3.015 spacings, verlet, {} thread(s). ns a point: of the fastest step; of the set-up, the tangent action and the\n"
-             "assembly of the tangent. Traffic: the bytes of a point, once a step, against the triad.\n\n", options.cells, thread_count());
-  fmt::print("| kinematics | material | D | body | step [ns] | bytes a point | traffic | set-up [ns] | tangent action [ns] | assembly [ns] |\n|---|---|---|---|---|---|---|---|---|---|\n");
+/// Measures every row that the options ask for, and shows each as soon as it is there.
+template <class Show>
+std::vector<Row> measure_rows(Registry& registry, const BenchOptions& options, Show&& show) {
   std::vector<Row> rows;
   for (const std::string& name : options.kinematics.empty() ? every_row(registry) : options.kinematics)
     for (const std::string& material : options.materials)
@@ -152,11 +166,50 @@ void bench(Registry& registry, const BenchOptions& options) {
           Row& row = rows.emplace_back(Row{name, material, dimension, cloud});
           measure(registry, row, fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
                   fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()), options);
-          fmt::print("| {} | {} | {} | {} | {:.1f} | {:.0f} | {:.0f} % | {:.0f} | {:.1f} | {} |\n", name, material, dimension, cloud ? "cloud" : "lattice", 1e9 * row.step,
-                     row.bytes, 100e-9 * row.bytes / row.step / limits.triad_all, 1e9 * row.set_up, 1e9 * row.tangent,
-                     std::isfinite(row.assembly) ? fmt::format("{:.0f}", 1e9 * row.assembly) : "-");
+          fmt::print("| {} | {} | {} | {} | ", name, material, dimension, cloud ? "cloud" : "lattice");
+          show(row);
           std::fflush(stdout);
         }
+  return rows;
+}
+
+std::string key_of(const Row& row, const BenchOptions& options) {
+  return Operations::key(row.kinematics, row.material, row.dimension, row.cloud, options.cells);
+}
+
+void count(Registry& registry, const BenchOptions& options) {
+  fmt::print("{} points a side, horizon 3.015 spacings, verlet. Floating-point operations of a step.\n\n"
+             "| kinematics | material | D | body | operations a point |\n|---|---|---|---|---|\n", options.cells);
+  Operations operations;
+  measure_rows(registry, options, [&](const Row& row) {
+    fmt::print("{:.0f} |\n", row.operations);
+    operations.set(key_of(row, options), row.operations);
+    if (!options.operations.empty()) operations.write(options.operations);
+  });
+}
+
+}  // namespace
+
+void bench(Registry& registry, const BenchOptions& options) {
+  if constexpr (counts_operations) return count(registry, options);
+  const Operations operations(options.operations.empty() ? data_folder() / "operations.csv" : std::filesystem::path(options.operations));
+  std::ofstream file;
+  const auto refuse = [&] { throw RunError(fmt::format("{}: cannot be written", options.json)); };
+  if (!options.json.empty() && (file.open(options.json), !file)) refuse();   // before minutes of measuring, not after
+  const MachineLimits limits = measure_machine_limits();
+  fmt::print("machine: triad {:.1f} GB/s, multiply-add {:.1f} GFLOP/s, gather of 32-byte rows {:.1f} GB/s (one thread); {} threads: {:.1f}, {:.1f}, {:.1f}\n\n",
+             limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
+  fmt::print("{} points a side, horizon 3.015 spacings, verlet, {} thread(s). ns a point: of the fastest step; of the set-up, the tangent action and the\n"
+             "assembly of the tangent. Traffic: the bytes of a point, once a step, in GB/s and of the triad. Arithmetic: the operations of a step (-: not\n"
+             "counted for this row, see --operations), in GFLOP/s and of the multiply-add peak.\n\n", options.cells, thread_count());
+  fmt::print("| kinematics | material | D | body | step [ns] | bytes a point | traffic | operations a point | arithmetic | set-up [ns] | tangent action [ns] | assembly [ns] |\n"
+             "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  const auto whole = [](double value) { return std::isfinite(value) ? fmt::format("{:.0f}", value) : std::string("-"); };
+  const std::vector<Row> rows = measure_rows(registry, options, [&](Row& row) {
+    row.operations = operations.of(key_of(row, options));
+    fmt::print("{:.1f} | {:.0f} | {} | {} | {} | {:.0f} | {:.1f} | {} |\n", 1e9 * row.step, row.bytes, rate(traffic(row), limits.triad_all), whole(row.operations),
+               rate(arithmetic(row), limits.multiply_add_all), 1e9 * row.set_up, 1e9 * row.tangent, whole(1e9 * row.assembly));
+  });
   if (options.json.empty()) return;
   file << json_of(limits, rows);
   if (!file.flush()) refuse();

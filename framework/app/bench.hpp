@@ -13,10 +13,13 @@ struct BenchOptions {
   int cells = 32;                                               ///< points along each side
   bool assembly = false;                                        ///< time the assembly of the tangent too: it may need much memory
   std::string json;                                             ///< file that the figures are written to as well
+  /// File of operations a point and step, see Operations; empty: the one that comes with perikit. A program that counts them writes it.
+  std::string operations;
 };
 
 /// Prints the limits of this machine, then for each kinematics, material and dimension, on a lattice and on a jittered cloud: time
-/// per point of an explicit step (everything in it, no output), of the set-up and of the tangent action, and bytes per point.
+/// per point of an explicit step (everything in it, no output), of the set-up and of the tangent action, and bytes per point; the traffic and the
+/// arithmetic of a step against the limits. A program with PERIKIT_COUNT_OPERATIONS prints the operations of a step instead.
 void bench(Registry& registry, const BenchOptions& options);
 
 }  // namespace perikit::app

@@ -1,5 +1,7 @@
 #include "new_project.hpp"
 
+#include "data_folder.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -17,8 +19,6 @@ namespace perikit::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path prefix() { return fs::read_symlink("/proc/self/exe").parent_path().parent_path(); }
 
 /// Kinds with a template: a folder each, beside `common`.
 std::vector<std::string> kinds_with_template(const fs::path& templates) {
@@ -64,7 +64,7 @@ std::string filled(const fs::path& file, const std::vector<std::pair<std::string
 }  // namespace
 
 std::string new_project(const Registry& registry, const std::string& kind, const std::string& part) {
-  const fs::path templates = prefix() / PERIKIT_DATA / "templates";
+  const fs::path templates = data_folder() / "templates";
   const std::vector<std::string> kinds = kinds_with_template(templates);
   if (std::ranges::find(kinds, kind) == kinds.end()) {
     throw InputError(fmt::format("no template for kind '{}'{}; allowed: {}", kind, did_you_mean(kind, kinds), fmt::join(kinds, ", ")));

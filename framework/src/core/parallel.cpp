@@ -6,15 +6,16 @@
 #include <vector>
 
 #include "core/thread_team.hpp"
+#include "perikit/core/simd.hpp"
 
 namespace perikit {
 
 namespace {
-int threads = std::max(1, omp_get_max_threads());
+int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 }
 
 int thread_count() noexcept { return threads; }
-void set_thread_count(int n) noexcept { threads = std::max(1, n); }
+void set_thread_count(int n) noexcept { threads = counts_operations ? 1 : std::max(1, n); }
 int thread_index() noexcept { return detail::team_index(); }
 
 namespace detail {

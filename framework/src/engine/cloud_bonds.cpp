@@ -63,7 +63,7 @@ void CloudMonitor::make_cells() {
 void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   over_cells([&](std::size_t cell) {
-    Row low{infinite, infinite, infinite}, high = -low;
+    Row low{infinite, infinite, infinite}, high{-infinite, -infinite, -infinite};
     for (const Group& group : groups_of(cell))
       for (int l = 0; l < static_cast<int>(padding); ++l) {
         if (!(group.live >> l & 1)) continue;
@@ -80,8 +80,10 @@ void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
     Row low = low_[cell], high = high_[cell];
     for (const std::int32_t k : near_[cell]) {
       const Row below = low_[static_cast<std::size_t>(k)], above = high_[static_cast<std::size_t>(k)];
-      low = below < low ? below : low;
-      high = above > high ? above : high;
+      for (int c = 0; c < u.components; ++c) {
+        low[c] = std::min(low[c], below[c]);
+        high[c] = std::max(high[c], above[c]);
+      }
     }
     double square = 0;
     for (int c = 0; c < u.components; ++c) square += (high[c] - low[c]) * (high[c] - low[c]);

@@ -112,17 +112,23 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   }
 
   Row times(std::size_t p, Row x) const noexcept {
-    if constexpr (isotropic) return M_[p] * x;
-    Row y{};
-    for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * M_[columns * p + e];
-    return y;
+    if constexpr (isotropic) {
+      return M_[p] * x;
+    } else {
+      Row y{};
+      for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * M_[columns * p + e];
+      return y;
+    }
   }
   /// (M_p + M_j) x
   Row times_both(std::size_t p, std::size_t j, Row x) const noexcept {
-    if constexpr (isotropic) return (M_[p] + M_[j]) * x;
-    Row y{};
-    for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * (M_[columns * p + e] + M_[columns * j + e]);
-    return y;
+    if constexpr (isotropic) {
+      return (M_[p] + M_[j]) * x;
+    } else {
+      Row y{};
+      for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * (M_[columns * p + e] + M_[columns * j + e]);
+      return y;
+    }
   }
 
   /// 1/2 V_p sum_j V_j omega z . M_p z, of the columns of H_p.

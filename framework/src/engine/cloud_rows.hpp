@@ -2,13 +2,18 @@
 /// What the loops over clouds share: point-major mirrors of fields, and blocks of points.
 
 #include "blocks.hpp"
+#include "counted_row.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
 
 /// Four doubles: a point-major row, so that one neighbour costs one cache line.
+#if defined(PERIKIT_COUNT_OPERATIONS)
+using Row = CountedRow;
+#else
 typedef double Row __attribute__((vector_size(32)));
+#endif
 
 inline constexpr std::size_t cloud_block_points = 256;
 

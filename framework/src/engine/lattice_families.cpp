@@ -12,7 +12,7 @@
 
 namespace perikit {
 
-LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influence, BondWeight weight)
+LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influence, BondWeight weight, bool whole_rows)
     : body(b), lattice(*b.lattice()), spacing(lattice.spacing), volume(b.uniform_volume()), offsets(family_offsets(lattice, b.horizon())), weight_(weight) {
   half = offsets.size() / 2;
   std::vector<double> r;
@@ -29,8 +29,9 @@ LatticeFamilies::LatticeFamilies(const Body& b, const InfluenceFunction& influen
     for (double& w : omega) w /= top;
   }
   collect_rows();
-  make_blocks();
+  make_blocks(whole_rows);
   make_patterns();
+  shared_ = patterns.size();
 }
 
 void LatticeFamilies::collect_rows() {
@@ -56,17 +57,18 @@ void LatticeFamilies::collect_rows() {
   std::stable_sort(row_pairs.begin(), row_pairs.end(), [](const RowPair& a, const RowPair& b) { return a.profile < b.profile; });
 }
 
-void LatticeFamilies::make_blocks() {
+void LatticeFamilies::make_blocks(bool whole_rows) {
   // Tiles of rows times segments along the rows, small enough for the second-level cache and to share out among threads.
   constexpr std::int64_t segment = 32;   // chunks
   const auto& n = lattice.extent;
-  const std::int64_t row_chunks = (n[0] + chunk_points - 1) / chunk_points, segments = (row_chunks + segment - 1) / segment;
+  const std::int64_t row_chunks = (n[0] + chunk_points - 1) / chunk_points, segments = whole_rows ? 1 : (row_chunks + segment - 1) / segment;
   const std::int64_t points = n[0] * n[1] * n[2];
   std::int64_t tile1 = 16, tile2 = 8;
   while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * chunk_points)) < 16 && tile1 * tile2 > 1) {
     (tile1 > tile2 ? tile1 : tile2) /= 2;
   }
-  const std::int64_t length = segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, row_chunks / 16);
+  const std::int64_t length = whole_rows ? row_chunks : segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, row_chunks / 16);
+  const std::int64_t reach_chunks = (row_reach + chunk_points - 1) / chunk_points;
   struct Box {
     std::int64_t low[3], high[3];   // chunk along the row, then rows
   };
@@ -80,7 +82,8 @@ void LatticeFamilies::make_blocks() {
         for (std::int64_t k2 = b2; k2 <= box.high[2]; ++k2)
           for (std::int64_t k1 = b1; k1 <= box.high[1]; ++k1) {
             const std::int64_t first = lattice.index(b0 * chunk_points, k1, k2);
-            rows.push_back({static_cast<std::int32_t>(first), static_cast<std::int32_t>(box.high[0] - b0 + 1), static_cast<std::int32_t>(k1), static_cast<std::int32_t>(k2)});
+            rows.push_back({static_cast<std::int32_t>(first), static_cast<std::int32_t>(box.high[0] - b0 + 1), static_cast<std::int32_t>(k1), static_cast<std::int32_t>(k2),
+                            static_cast<std::int32_t>(std::min(reach_chunks, b0)), static_cast<std::int32_t>(std::min(reach_chunks, row_chunks - 1 - box.high[0]))});
             for (std::int64_t c = 0; c <= box.high[0] - b0; ++c) {
               const std::int64_t index = first + c * chunk_points;
               if (alive[static_cast<std::size_t>(index / chunk_points)]) chunks.push_back({static_cast<std::int32_t>(index), -1});
@@ -113,6 +116,13 @@ void LatticeFamilies::make_blocks() {
     reach.own.push_back(tile(boxes[b].low[0] / size[0], boxes[b].low[1] / size[1], boxes[b].low[2] / size[2]));
   }
   colouring = Colouring(reach);
+  if (length < row_chunks) index_chunks();
+}
+
+void LatticeFamilies::index_chunks() {
+  if (!chunk_at_.empty()) return;
+  chunk_at_.assign(body.stride() / chunk_points, -1);
+  for (std::size_t c = 0; c < chunks.size(); ++c) chunk_at_[static_cast<std::size_t>(chunks[c].first) / chunk_points] = static_cast<std::int32_t>(c);
 }
 
 bool LatticeFamilies::moves(std::size_t b, ConstFieldView u) const noexcept {
@@ -245,11 +255,7 @@ LatticePattern& LatticeFamilies::own_pattern(LatticeChunk& chunk) {
 }
 
 std::vector<std::int32_t> LatticeFamilies::break_bonds(std::span<const BondChange> changes) {
-  if (chunk_at_.empty()) {
-    shared_ = patterns.size();
-    chunk_at_.assign(body.stride() / chunk_points, -1);
-    for (std::size_t c = 0; c < chunks.size(); ++c) chunk_at_[static_cast<std::size_t>(chunks[c].first) / chunk_points] = static_cast<std::int32_t>(c);
-  }
+  index_chunks();
   std::vector<std::int32_t> ends;
   const auto clear = [&](std::int32_t point, std::size_t slot) {
     LatticePattern& p = own_pattern(chunks[static_cast<std::size_t>(chunk_of(point))]);
@@ -326,7 +332,7 @@ std::vector<std::int32_t> LatticeFamilies::mend() {
   broken -= failed;
   failed = 0;
   owned_.clear();
-  if (!chunk_at_.empty()) patterns.resize(shared_);
+  patterns.resize(shared_);
   std::sort(points.begin(), points.end());
   return points;
 }

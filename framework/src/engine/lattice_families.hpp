@@ -38,11 +38,14 @@ struct LatticeChunk {
   std::int32_t pattern;                        ///< -1: whole
 };
 
-/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence.
+/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence. Where it is not the whole
+/// row, families reach into so many chunks before it and after it.
 struct LatticeRow {
   std::int32_t first;
   std::int32_t chunks;
   std::int32_t k1, k2;
+  std::int32_t before = 0, after = 0;
+  bool holds(std::int32_t point) const noexcept { return point >= first && point < first + chunks * chunk_points; }
 };
 
 struct LatticeBlock {
@@ -65,7 +68,8 @@ struct RowProfile {
 
 class LatticeFamilies {
  public:
-  LatticeFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight);
+  /// whole_rows: a block takes in its rows from end to end, however long they are.
+  LatticeFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight, bool whole_rows = false);
 
   const Body& body;
   const Lattice& lattice;
@@ -103,7 +107,7 @@ class LatticeFamilies {
   /// The family of the bonds at these slots as arrays; its inverse shape tensor is left alone.
   void load(std::span<const std::uint16_t> slots, FamilyArrays& out) const;
   std::size_t reverse(std::size_t slot) const noexcept { return slot < half ? slot + half : slot - half; }
-  /// Index into `chunks` of the chunk with this point; -1: none. Filled by the first call of `break_bonds`.
+  /// Index into `chunks` of the chunk with this point; -1: none. Known where rows are split, and after `break_bonds`.
   std::int32_t chunk_of(std::int64_t point) const noexcept { return chunk_at_[static_cast<std::size_t>(point) / chunk_points]; }
   /// Breaks the bonds `slot` at `point` and their reverses. Chunks that they touch get patterns of their own; only the lanes that
   /// they touch are computed anew. Returns the ends, ascending.
@@ -124,8 +128,9 @@ class LatticeFamilies {
 
  private:
   void collect_rows();
-  void make_blocks();
+  void make_blocks(bool whole_rows);
   void make_patterns();
+  void index_chunks();
   /// All that follows from the masks, for some of the lanes.
   void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, unsigned lanes = 0xff) const;
   /// Live cells of a chunk, and for each slot those whose far ends are live too.

@@ -31,8 +31,8 @@ class LatticeOperator {
     runs<true>(chunks, count, u, H, stride, sums);
   }
 
-  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at p = chunk.first + lane. Also f = Q m.
-  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, FieldView f) const noexcept {
+  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at at + lane. Also f += Q m, unless f is null.
+  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at, FieldView f) const noexcept {
     const LatticePattern& pattern = f_.pattern(chunk);
     const Pack scale(1.0 / f_.spacing);
     for (int l = 0; l < chunk_points; l += pack_width) {
@@ -45,36 +45,40 @@ class LatticeOperator {
         for (int e = 0; e < D; ++e) {
           Pack q(0.0);
           for (int k = 0; k < D; ++k) q += s[k] * inverse[symmetric_index(D, k, e)];
-          q.store(Q.component(c * D + e) + chunk.first + l);
+          q.store(Q.component(c * D + e) + at + l);
           own += q * Pack::load(pattern.moment[e] + l);
         }
-        if (chunk.pattern >= 0) (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
+        if (f.data && chunk.pattern >= 0) (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
       }
     }
   }
 
-  /// f += div Q for the target rows that the sources in `row` reach; sources are read along the row at will.
-  void divergence(const LatticeRow& row, ConstFieldView Q, FieldView f) const noexcept {
-    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter<false>(row, p, Q, {}, f);
+  /// f += div Q for the target rows that the sources in `row` reach. Q of the cell row.first is at `from`; sources are read along the row,
+  /// as far as a family reaches beyond its ends.
+  void divergence(const LatticeRow& row, ConstFieldView Q, std::int64_t from, FieldView f) const noexcept {
+    for (std::int64_t k = 0; k < std::int64_t(row.chunks) * chunk_points; k += pack_width) scatter<false>(row, row.first + k, Q, from + k, {}, f);
   }
-  /// The same and f_k += sum_s omega_s v_{k+s}; v is 0 in dead cells.
+  /// The same and f_k += sum_s omega_s v_{k+s}; v is 0 in dead cells. Q and v are fields of the body.
   void divergence(const LatticeRow& row, ConstFieldView Q, ConstFieldView v, FieldView f) const noexcept {
-    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter<true>(row, p, Q, v, f);
+    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter<true>(row, p, Q, p, v, f);
   }
 
-  /// Takes the broken bonds of irregular lanes back out of the divergence (v: its source, if it had one).
-  void remove_broken(const LatticeChunk& chunk, ConstFieldView Q, FieldView f, ConstFieldView v = {}) const noexcept {
+  /// Takes what the sources in irregular lanes have sent along broken bonds back out of the divergence (v: null if there was none). Q of the
+  /// chunk begins at `from`.
+  void remove_broken(const LatticeChunk& chunk, ConstFieldView Q, std::int64_t from, ConstFieldView v, FieldView f) const noexcept {
     const LatticePattern& pattern = f_.pattern(chunk);
     for (int l = 0; l < chunk_points; ++l) {
       if (!(pattern.irregular >> l & 1)) continue;
       const std::int64_t p = chunk.first + l;
       for (std::size_t s = 0; s < f_.offsets.size(); ++s) {
-        if (LatticeFamilies::intact(pattern, s, l)) continue;   // dead ends hold Q = 0 and v = 0
-        for (int c = 0; c < D && v.data; ++c) f.component(c)[p] -= f_.omega[s] * v.component(c)[p + f_.shifts[s]];
-        for (int c = 0; c < D; ++c)
-          for (int e = 0; e < D; ++e) {
-            f.component(c)[p] -= f_.omega[s] * f_.offsets[s][static_cast<std::size_t>(e)] * Q.component(c * D + e)[p + f_.shifts[s]];
-          }
+        if (LatticeFamilies::intact(pattern, s, l)) continue;
+        const std::int64_t far = p + f_.shifts[s];
+        if (!(f_.live_bits(far) & 1)) continue;
+        for (int c = 0; c < D; ++c) {
+          double sent = v.data ? -v.component(c)[p] : 0.0;
+          for (int e = 0; e < D; ++e) sent += f_.offsets[s][static_cast<std::size_t>(e)] * Q.component(c * D + e)[from + l];
+          f.component(c)[far] += f_.omega[s] * sent;
+        }
       }
     }
   }
@@ -198,25 +202,26 @@ class LatticeOperator {
     }
   }
 
+  /// From the sources at p, whose Q is at `from`, and their neighbours along the row.
   template <bool with_source>
-  void scatter(const LatticeRow& row, std::int64_t p, ConstFieldView Q, ConstFieldView source, FieldView f) const noexcept {
+  void scatter(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
     // Sums and differences of mirrored neighbours along the row, used by every profile.
     constexpr int most = 16;
     if (f_.row_reach > most) {
-      scatter_far<with_source>(row, p, Q, source, f);
+      scatter_far<with_source>(row, p, Q, from, source, f);
       return;
     }
     Pack difference[most + 1][D], sum1[most + 1][D], sum2[most + 1][D], sum0[most + 1][D];
     for (int c = 0; c < D; ++c) {
-      const double* q0 = Q.component(c * D) + p;
+      const double* q0 = Q.component(c * D) + from;
       for (int k = 1; k <= f_.row_reach; ++k) difference[k][c] = Pack::load(q0 + k) - Pack::load(q0 - k);
       if constexpr (D > 1) {
-        const double* q1 = Q.component(c * D + 1) + p;
+        const double* q1 = Q.component(c * D + 1) + from;
         sum1[0][c] = Pack::load(q1);
         for (int k = 1; k <= f_.row_reach; ++k) sum1[k][c] = Pack::load(q1 + k) + Pack::load(q1 - k);
       }
       if constexpr (D > 2) {
-        const double* q2 = Q.component(c * D + 2) + p;
+        const double* q2 = Q.component(c * D + 2) + from;
         sum2[0][c] = Pack::load(q2);
         for (int k = 1; k <= f_.row_reach; ++k) sum2[k][c] = Pack::load(q2 + k) + Pack::load(q2 - k);
       }
@@ -276,11 +281,11 @@ class LatticeOperator {
 
   /// Horizons of many cells: no buffers.
   template <bool with_source>
-  void scatter_far(const LatticeRow& row, std::int64_t p, ConstFieldView Q, ConstFieldView source, FieldView f) const noexcept {
+  void scatter_far(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
     const auto sums = [&](int profile_index, int c, Pack (&out)[3]) {
       const RowProfile& profile = f_.profiles[static_cast<std::size_t>(profile_index)];
       for (int e = 0; e < D; ++e) {
-        const double* q = Q.component(c * D + e) + p;
+        const double* q = Q.component(c * D + e) + from;
         out[e] = e == 0 ? Pack(0.0) : Pack(profile.omega[0]) * Pack::load(q);
         for (int k = 1; k <= profile.reach; ++k) {
           out[e] += e == 0 ? Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * (Pack::load(q + k) - Pack::load(q - k))

@@ -30,13 +30,16 @@ const LaneFactors& lane_factors() {
   return factors;
 }
 
+/// Rows of a block that are taken together: whole batches for the law where rows are short.
+std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<std::size_t>(std::max(1, slots_at_once / row.chunks)); }
+
 }  // namespace
 
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
     : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
       pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.share && !laws_.history()),
-      families_(body_, *parts.influence, traits_.weight), operator_(families_), flux_(body_.make_field(D * D)),
+      families_(body_, *parts.influence, traits_.weight, laws_.history() && traits_.at == EvaluationPoints::points), operator_(families_),
       slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
   if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(families_.reach);
   if (parts.damage) this->watch_bonds(bonds_.emplace(families_));
@@ -47,8 +50,13 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
       const std::uint8_t live = alive[static_cast<std::size_t>(first / chunk_points)];
       if (live != 0xff) partly_dead_.emplace_back(first, live);
     }
-  if (traits_.at != EvaluationPoints::bonds) return;
+  if (traits_.at != EvaluationPoints::bonds) {
+    row_gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.row_reach)));
+    for (const LatticeRow& row : families_.rows) most_cells_ = std::max(most_cells_, static_cast<std::int64_t>(rows_at_once(row)) * row_width(row));
+    return;
+  }
   if (traits_.order > 1) stencils_.emplace(families_, traits_.order);
+  flux_ = body_.make_field(D * D);
   gradient_ = body_.make_field(D * D);
   if (traits_.selective) {
     volume_ = body_.make_field(volume_components);
@@ -125,52 +133,138 @@ static int run_length(const std::vector<LatticeChunk>& chunks, std::size_t c, st
   return n;
 }
 
+/// The law of n chunks, whose gradients are in the lanes of s. Returns the first bad point or -1.
+template <int D>
+std::int64_t LatticeModel<D>::evaluate_chunks(const std::int32_t* index, int n, BatchScratch& s, const Pass& pass, double* energy) const {
+  const auto chunk = [&](int i) -> const LatticeChunk& { return families_.chunks[static_cast<std::size_t>(index[i])]; };
+  for (int i = 0; i < n; ++i) {
+    const int lane = i * chunk_points;
+    std::memcpy(s.weight + lane, families_.pattern(chunk(i)).weight, sizeof families_.whole.weight);
+    if (!laws_.single() || pass.alone()) {
+      for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk(i).first + l;
+    }
+  }
+  const int bad = pass.work.evaluate(n * chunk_points, s, false, energy);
+  return bad < 0 ? -1 : chunk(bad / chunk_points).first + bad % chunk_points;
+}
+
+/// Energies or samples of points, one by one.
 template <int D>
 void LatticeModel<D>::points_block(std::size_t b, Pass& pass) {
   const LatticeBlock& block = families_.blocks[b];
   BatchScratch& s = scratch_.begin_block(b);
-  const bool sample = pass.work.work() == Work::sample;
-  if (!pass.alone()) zero_rows(block, pass.out);
   double energy = 0;
-  for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
-    // Several short runs share one batch.
-    int lanes = 0;
-    while (c < block.chunk_end && !pass.wanted(families_.chunks[c].first)) ++c;
-    const std::size_t first = c;
-    while (c < block.chunk_end && lanes < batch_points && pass.wanted(families_.chunks[c].first)) {
-      const int n = pass.only ? 1 : run_length(families_.chunks, c, block.chunk_end, slots_at_once - lanes / chunk_points);
-      operator_.gradient(&families_.chunks[c], n, pass.u, s.H + lanes, batch_points);
-      if (pass.work.tangent()) operator_.gradient(&families_.chunks[c], n, pass.w, s.dH + lanes, batch_points);
-      c += static_cast<std::size_t>(n);
-      lanes += n * chunk_points;
+  std::int32_t index[slots_at_once];
+  int n = 0;
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+    if (pass.wanted(families_.chunks[c].first)) {
+      operator_.gradient(&families_.chunks[c], 1, pass.u, s.H + n * chunk_points, batch_points);
+      index[n++] = static_cast<std::int32_t>(c);
     }
-    if (lanes == 0) break;
-    for (std::size_t i = first; i < c; ++i) {
-      const LatticeChunk& chunk = families_.chunks[i];
-      const int lane = static_cast<int>(i - first) * chunk_points;
-      std::memcpy(s.weight + lane, families_.pattern(chunk).weight, sizeof families_.whole.weight);
-      if (!laws_.single() || sample) {
-        for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk.first + l;
-      }
-    }
-    const int bad = pass.work.evaluate(lanes, s, false, &energy);
+    if (n == 0 || (n < slots_at_once && c + 1 < block.chunk_end)) continue;
+    const std::int64_t bad = evaluate_chunks(index, n, s, pass, &energy);
     if (bad >= 0) {
-      pass.report(families_.chunks[first + static_cast<std::size_t>(bad / chunk_points)].first + bad % chunk_points);
+      pass.report(bad);
       return;
     }
-    if (sample) {
+    if (pass.work.work() == Work::sample) {
       // The average over one evaluation point is its value, whatever its weight.
-      for (int l = 0; l < lanes; ++l) {
-        const LatticePattern& pattern = families_.pattern(families_.chunks[first + static_cast<std::size_t>(l / chunk_points)]);
+      for (int l = 0; l < n * chunk_points; ++l) {
+        const LatticePattern& pattern = families_.pattern(families_.chunks[static_cast<std::size_t>(index[l / chunk_points])]);
         if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
       }
-      pass.work.add_samples(lanes, s, *pass.sums);
-      continue;
+      pass.work.add_samples(n * chunk_points, s, *pass.sums);
     }
-    if (pass.only) continue;
-    for (std::size_t i = first; i < c; ++i) {
-      operator_.stress_to_flux(families_.chunks[i], s.P + static_cast<int>(i - first) * chunk_points, batch_points, flux_, pass.out);
+    n = 0;
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+/// Cells of a row in the memory of Q: with a gap before it and after it, zero, or Q of the chunks that families reach there.
+template <int D>
+std::int64_t LatticeModel<D>::row_width(const LatticeRow& row) const noexcept {
+  return std::int64_t(row.chunks) * chunk_points + 2 * row_gap_;
+}
+
+/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `chunk` is the first chunk of the rows, and then the
+/// one after their last.
+template <int D>
+void LatticeModel<D>::place_rows(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, RowScratch& r) const {
+  const auto zero = [&](std::int64_t from, std::int64_t to) {
+    for (int c = 0; c < D * D && to > from; ++c) std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
+  };
+  r.index.clear();
+  r.at.clear();
+  std::int64_t start = row_gap_;
+  for (const LatticeRow& row : rows) {
+    std::int64_t filled = start - row_gap_;
+    for (; chunk < end && row.holds(families_.chunks[chunk].first); ++chunk) {
+      const std::int64_t to = start + families_.chunks[chunk].first - row.first;
+      zero(filled, to);
+      filled = to + chunk_points;
+      r.index.push_back(static_cast<std::int32_t>(chunk));
+      r.at.push_back(to);
     }
+    start += row_width(row);
+    zero(filled, start - row_gap_);
+  }
+  r.own = r.index.size();
+  // Where a row goes on in another block, families reach into Q of its chunks: computed here, too.
+  start = row_gap_;
+  for (const LatticeRow& row : rows) {
+    const auto place = [&](std::int32_t k) {
+      const std::int32_t outside = families_.chunk_of(row.first + k * chunk_points);
+      if (outside < 0) return;
+      r.index.push_back(outside);
+      r.at.push_back(start + k * chunk_points);
+    };
+    for (std::int32_t k = -row.before; k < 0; ++k) place(k);
+    for (std::int32_t k = row.chunks; k < row.chunks + row.after; ++k) place(k);
+    start += row_width(row);
+  }
+}
+
+/// Gradients of n chunks that place_rows has found, in the lanes of a batch.
+template <int D>
+void LatticeModel<D>::gradients_of_rows(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept {
+  for (int i = 0, next = 1; i < n; i = next++) {
+    while (next < n && index[next] == index[next - 1] + 1) ++next;
+    operator_.gradient(&families_.chunks[static_cast<std::size_t>(index[i])], next - i, u, H + i * chunk_points, batch_points);
+  }
+}
+
+/// Gradient, law and divergence of a block, a few rows at a time: Q stays in the nearest caches.
+template <int D>
+void LatticeModel<D>::rows_block(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = families_.blocks[b];
+  BatchScratch& s = scratch_.begin_block(b);
+  RowScratch& r = row_scratch_[static_cast<std::size_t>(thread_index())];
+  double energy = 0, of_others = 0;
+  std::size_t chunk = block.chunk_begin;
+  for (std::size_t first = block.row_begin; first < block.row_end;) {
+    const std::span rows = std::span(families_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(families_.rows[first])));
+    place_rows(rows, chunk, block.chunk_end, r);
+    for (std::size_t i = 0; i < r.index.size();) {
+      const bool own = i < r.own;
+      const int n = static_cast<int>(std::min<std::size_t>(slots_at_once, (own ? r.own : r.index.size()) - i));
+      gradients_of_rows(&r.index[i], n, pass.u, s.H);
+      if (pass.work.tangent()) gradients_of_rows(&r.index[i], n, pass.w, s.dH);
+      const std::int64_t bad = evaluate_chunks(&r.index[i], n, s, pass, own ? &energy : &of_others);
+      if (bad >= 0) {
+        pass.report(bad);
+        return;
+      }
+      for (int k = 0; k < n; ++k, ++i)
+        operator_.stress_to_flux(families_.chunks[static_cast<std::size_t>(r.index[i])], s.P + k * chunk_points, batch_points, r.flux, r.at[i], own ? pass.out : FieldView{});
+    }
+    std::int64_t start = row_gap_;
+    for (const LatticeRow& row : rows) {
+      operator_.divergence(row, r.flux, start, pass.out);
+      start += row_width(row);
+    }
+    for (std::size_t i = 0; i < r.own && families_.broken > 0; ++i)
+      operator_.remove_broken(families_.chunks[static_cast<std::size_t>(r.index[i])], r.flux, r.at[i], {}, pass.out);
+    first += rows.size();
   }
   if (pass.energies) pass.energies[b] = energy;
 }
@@ -383,11 +477,11 @@ void LatticeModel<D>::finish_stress(std::size_t b, Pass& pass) {
       add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
                        stress, flux_.stride());
     }
-    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, pass.out);
+    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, chunk.first, pass.out);
   }
 }
 
-/// Adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
+/// Bonds: adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
 template <int D>
 void LatticeModel<D>::divergence(Pass& pass, int number) const {
   const auto chunks_of = [&](std::size_t b, auto&& each) {
@@ -400,13 +494,9 @@ void LatticeModel<D>::divergence(Pass& pass, int number) const {
   }
   families_.colouring.for_each([&](std::size_t b) {
     if (!quiet_.awake(b, number)) return;
-    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) operator_.divergence(families_.rows[r], flux_, pass.out);
-  });
-  if (families_.broken == 0) return;
-  parallel_for(families_.blocks.size(), [&](std::size_t b) {
-    chunks_of(b, [&](const LatticeChunk& chunk) {
-      if (chunk.pattern >= 0 && families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, pass.out);
-    });
+    for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
+      operator_.divergence(families_.rows[r], flux_, families_.rows[r].first, pass.out);
+    if (families_.broken > 0) chunks_of(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, {}, pass.out); });
   });
 }
 
@@ -426,23 +516,26 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
   const int last = points ? 2 : 3;
   if (alone || pass.work.tangent()) quiet_.wake();
   else quiet_.look(last, [&](std::size_t b) { return families_.moves(b, pass.u); });
-  const auto first_pass = [&](auto&& block) {
-    parallel_for(blocks, [&](std::size_t b) { quiet_.begins(b) ? block(b) : zero_rows(families_.blocks[b], pass.out); });
-  };
-  if (points) {
-    first_pass([&](std::size_t b) { points_block(b, pass); });
+  const auto awake = [&](int number, auto&& block) { return [&, number](std::size_t b) { if (quiet_.awake(b, number)) block(b); }; };
+  if (points && alone) {
+    parallel_for(blocks, [&](std::size_t b) { points_block(b, pass); });
+  } else if (points) {
+    row_scratch_.resize(static_cast<std::size_t>(thread_count()));
+    for (RowScratch& r : row_scratch_)
+      if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_cells_)));
+    parallel_for(blocks, [&](std::size_t b) { zero_rows(families_.blocks[b], pass.out); });
+    families_.colouring.for_each(awake(1, [&](std::size_t b) { rows_block(b, pass); }));
   } else {
-    first_pass([&](std::size_t b) { gradient_block(b, pass); });
+    parallel_for(blocks, [&](std::size_t b) { quiet_.begins(b) ? gradient_block(b, pass) : zero_rows(families_.blocks[b], pass.out); });
     if (alone) {
       parallel_for(blocks, [&](std::size_t b) { bonds_block(b, pass); });
     } else {
-      const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
-      families_.colouring.for_each(awake([&](std::size_t b) { bonds_block(b, pass); }));
-      parallel_for(blocks, awake([&](std::size_t b) { finish_stress(b, pass); }));
+      families_.colouring.for_each(awake(2, [&](std::size_t b) { bonds_block(b, pass); }));
+      parallel_for(blocks, awake(2, [&](std::size_t b) { finish_stress(b, pass); }));
+      if (pass.bad < 0) divergence(pass, last);
     }
   }
   if (pass.bad >= 0 || alone) return status_at(body_, pass.bad);
-  divergence(pass, last);
   clean(pass.out);
   return {};
 }
@@ -492,7 +585,9 @@ ModelReport LatticeModel<D>::report() const {
   report.broken_bonds = families_.broken - families_.failed;
   report.singular_families = families_.singular;
   report.fallbacks = stencils_ ? stencils_->fallbacks() : 0;
-  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() +
+  std::size_t row_bytes = 0;
+  for (const RowScratch& r : row_scratch_) row_bytes += r.flux.bytes();
+  report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + row_bytes + flux_.bytes() + gradient_.bytes() +
                  direction_.bytes() + scale_.bytes() + volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
                  (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + this->fracture_bytes();
   const bool bonds = traits_.at == EvaluationPoints::bonds;

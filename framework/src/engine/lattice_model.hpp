@@ -41,7 +41,19 @@ class LatticeModel final : public AssemblingModel {
   }
   EvaluationStatus run(Pass& pass);
   void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;
+  /// Points: memory of a thread for a few rows of a block.
+  struct RowScratch {
+    Field flux;                        ///< Q
+    std::vector<std::int32_t> index;   ///< of the chunks: `own` of the block, then those beyond the ends of its rows
+    std::vector<std::int64_t> at;      ///< where their Q is
+    std::size_t own = 0;
+  };
+  std::int64_t evaluate_chunks(const std::int32_t* index, int n, BatchScratch& s, const Pass& pass, double* energy) const;
   void points_block(std::size_t b, Pass& pass);
+  void place_rows(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, RowScratch& r) const;
+  void gradients_of_rows(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept;
+  void rows_block(std::size_t b, Pass& pass);
+  std::int64_t row_width(const LatticeRow& row) const noexcept;
   void gradient_block(std::size_t b, Pass& pass);
   void bonds_block(std::size_t b, Pass& pass);
   int bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
@@ -61,7 +73,9 @@ class LatticeModel final : public AssemblingModel {
   LatticeFamilies families_;
   LatticeOperator<D> operator_;      ///< order 1
   std::optional<LatticeStencils<D>> stencils_;   ///< higher orders
-  Field flux_;                       ///< Q; for bonds also the stress on Hbar
+  Field flux_;                       ///< bonds: the stress on Hbar, then Q
+  std::vector<RowScratch> row_scratch_;         ///< by thread
+  std::int64_t row_gap_ = 0, most_cells_ = 0;   ///< cells between rows there; of all rows at once
   Field gradient_, direction_;       ///< Hbar of u and of w (bonds)
   Field scale_;                      ///< V_i / N_i of bond weights
   Field volume_, pressure_;          ///< selective: volume changes of points; pressures (and their rates) on them

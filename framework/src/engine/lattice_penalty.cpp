@@ -52,15 +52,9 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       if (!quiet_.awake(b, 2)) return;
       for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
         operator_.divergence(families_.rows[r], flux_, source_, force);
+      if (families_.broken == 0) return;
+      for_chunks(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, source_, force); });
     });
-    if (families_.broken > 0) {
-      parallel_for(families_.blocks.size(), [&](std::size_t b) {
-        if (!quiet_.awake(b, 2)) return;
-        for_chunks(b, [&](const LatticeChunk& chunk) {
-          if (families_.pattern(chunk).irregular) operator_.remove_broken(chunk, flux_, force, source_);
-        });
-      });
-    }
     model_.clean(force);
     if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
   }

@@ -10,14 +10,20 @@
 
 namespace perikit {
 
+namespace detail {
+/// 64-byte aligned memory; large pieces ask for huge pages, for lattices jump by whole planes and clouds at random. Throws std::bad_alloc.
+void* allocate_aligned(std::size_t bytes);
+void free_aligned(void* memory) noexcept;
+}  // namespace detail
+
 template <class T>
 struct AlignedAllocator {
   using value_type = T;
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) noexcept {}
-  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t{64})); }
-  void deallocate(T* p, std::size_t) noexcept { ::operator delete(p, std::align_val_t{64}); }
+  T* allocate(std::size_t n) { return static_cast<T*>(detail::allocate_aligned(n * sizeof(T))); }
+  void deallocate(T* p, std::size_t) noexcept { detail::free_aligned(p); }
   bool operator==(const AlignedAllocator&) const = default;
 };
 

@@ -25,7 +25,24 @@ namespace detail {
 typedef double Lanes __attribute__((vector_size(8 * pack_width)));
 typedef double UnalignedLanes __attribute__((vector_size(8 * pack_width), aligned(8), may_alias));
 typedef std::int64_t Bits __attribute__((vector_size(8 * pack_width)));
+#if defined(PERIKIT_COUNT_OPERATIONS)
+extern std::uint64_t operations;
+inline void count(int n) noexcept { operations += static_cast<std::uint64_t>(n); }
+#else
+inline constexpr std::uint64_t operations = 0;
+inline void count(int) noexcept {}
+#endif
 }  // namespace detail
+
+/// A build with PERIKIT_COUNT_OPERATIONS counts additions, multiplications, divisions and roots of Packs, one each lane (a fused multiply-add is
+/// two), and those of the rows that loops over clouds work on; loops then run on one thread. Other builds pay nothing for it.
+#if defined(PERIKIT_COUNT_OPERATIONS)
+inline constexpr bool counts_operations = true;
+#else
+inline constexpr bool counts_operations = false;
+#endif
+/// Operations so far; 0 where they are not counted.
+inline std::uint64_t counted_operations() noexcept { return detail::operations; }
 
 /// Result of a lane-wise comparison: in each lane, whether it holds.
 struct PackMask {
@@ -66,15 +83,27 @@ struct Pack {
   }
   double operator[](int lane) const noexcept { return v[lane]; }
 
-  friend Pack operator+(Pack a, Pack b) noexcept { return {a.v + b.v}; }
-  friend Pack operator-(Pack a, Pack b) noexcept { return {a.v - b.v}; }
-  friend Pack operator*(Pack a, Pack b) noexcept { return {a.v * b.v}; }
-  friend Pack operator/(Pack a, Pack b) noexcept { return {a.v / b.v}; }
+  friend Pack operator+(Pack a, Pack b) noexcept {
+    detail::count(pack_width);
+    return {a.v + b.v};
+  }
+  friend Pack operator-(Pack a, Pack b) noexcept {
+    detail::count(pack_width);
+    return {a.v - b.v};
+  }
+  friend Pack operator*(Pack a, Pack b) noexcept {
+    detail::count(pack_width);
+    return {a.v * b.v};
+  }
+  friend Pack operator/(Pack a, Pack b) noexcept {
+    detail::count(pack_width);
+    return {a.v / b.v};
+  }
   friend Pack operator-(Pack a) noexcept { return {-a.v}; }
-  Pack& operator+=(Pack b) noexcept { v += b.v; return *this; }
-  Pack& operator-=(Pack b) noexcept { v -= b.v; return *this; }
-  Pack& operator*=(Pack b) noexcept { v *= b.v; return *this; }
-  Pack& operator/=(Pack b) noexcept { v /= b.v; return *this; }
+  Pack& operator+=(Pack b) noexcept { return *this = *this + b; }
+  Pack& operator-=(Pack b) noexcept { return *this = *this - b; }
+  Pack& operator*=(Pack b) noexcept { return *this = *this * b; }
+  Pack& operator/=(Pack b) noexcept { return *this = *this / b; }
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   friend PackMask operator<(Pack a, Pack b) noexcept { return compare<_CMP_LT_OQ>(a, b); }
@@ -123,6 +152,7 @@ inline bool all(PackMask m) noexcept {
 }
 
 inline Pack sqrt(Pack a) noexcept {
+  detail::count(pack_width);
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   return {reinterpret_cast<detail::Lanes>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
 #elif defined(__AVX__)
@@ -165,6 +195,7 @@ inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 }
 /// p[lane] -= a[lane] where the bit of the lane is set; nothing else is written.
 inline void subtract_at(double* p, std::uint8_t bits, Pack a) noexcept {
+  detail::count(pack_width);
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   const __m512d old = _mm512_maskz_loadu_pd(bits, p);
   _mm512_mask_storeu_pd(p, bits, _mm512_sub_pd(old, reinterpret_cast<__m512d>(a.v)));
@@ -215,6 +246,7 @@ inline void transpose(Pack (&rows)[pack_width]) noexcept {
 
 /// Sum of the lanes, always in the same order.
 inline double sum(Pack a) noexcept {
+  detail::count(pack_width);
   double r = 0;
   for (int i = 0; i < pack_width; ++i) r += a.v[i];
   return r;

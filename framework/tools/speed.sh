@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Measures the speed of this machine's perikit beside its limits and beside LAMMPS, on one core, and writes framework/docs/speed.md and the tables of
+# README.md with it: some minutes on an otherwise idle machine, plus a build of perikit that counts operations.
+#   speed.sh BUILD            BUILD: a release build with its benchmarks
+#   speed.sh BUILD --small    a few small bodies, no LAMMPS, no build; the page goes to BUILD/speed, the documentation stays as it is
+set -euo pipefail
+build=$(realpath "$1")
+small=${2:-}
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+export OMP_WAIT_POLICY=passive
+out=$build/speed
+mkdir -p "$out"
+bench="$build/bin/perikit bench"
+
+if [ -z "$small" ]; then
+  cmake --preset counting > /dev/null
+  cmake --build --preset counting > /dev/null
+  count="build/counting/bin/perikit bench --operations framework/tools/operations.csv"
+  $count --dimension 1 2 3
+  $count --material hencky hypoelastic linear_elastic mooney_rivlin neo_hookean
+  $bench --json "$out/bench.json" | tee "$out/bench.md"
+  $bench --dimension 1 2 --json "$out/bench_1_2.json" | tee "$out/bench_1_2.md"
+  tests/benchmarks/lammps.sh | tee "$out/lammps.txt"
+  "$build/bin/materials_benchmark" | tee "$out/materials.md"
+  page=framework/docs/speed.md
+  readme=README.md
+else
+  $bench --cells 6 --kinematics conventional baqp conventional+wan --json "$out/bench.json" | tee "$out/bench.md"
+  $bench --cells 6 --kinematics conventional --dimension 1 2 | tee "$out/bench_1_2.md"
+  printf 'LAMMPS lps 1\nLAMMPS pmb 1\n' > "$out/lammps.txt"
+  : > "$out/materials.md"
+  page=$out/speed.md
+  readme=$out/README.md
+  cp README.md "$readme"
+fi
+
+# A line a kinematics of what `perikit bench` has in two: lattice and cloud.
+kinematics_table() {
+  awk -F' *[|] *' '
+    BEGIN { print "| kinematics | lattice: ns a point and step | bytes a point | of the arithmetic peak | cloud: ns a point and step | bytes a point | of the arithmetic peak |"
+            print "|---|---|---|---|---|---|---|" }
+    $4 == 3 { name = $2; sub(/[+]/, "` with `", name); share = "-"; if (match($10, /[0-9]+ %/)) share = substr($10, RSTART, RLENGTH)
+              cell[name, $5] = sprintf("%.0f | %s | %s", $6, $7, share); if ($5 == "lattice") { order[++n] = name; step[n] = $6 } }
+    END { for (i = 1; i <= n; ++i) { best = 0; for (k = 1; k <= n; ++k) if (!done[k] && (!best || step[k] + 0 < step[best] + 0)) best = k
+            done[best] = 1; printf "| `%s` | %s | %s |\n", order[best], cell[order[best], "lattice"], cell[order[best], "cloud"] } }' "$out/bench.md"
+}
+
+# A line a law of what materials_benchmark has in two: 3D and plane strain.
+laws_table() {
+  awk -F' *[|] *' '
+    BEGIN { print "| law | stress, 3D: ns a point | plane strain | tangent, 3D | plane strain | share of the arithmetic peak, stress and tangent in 3D |"
+            print "|---|---|---|---|---|---|" }
+    $3 == "solid" { stress = $4; tangent = $9; share = $7 ", " $12 }
+    $3 == "plane strain" { printf "| `%s` | %s | %s | %s | %s | %s |\n", $2, stress, $4, tangent, $9, share }' "$out/materials.md"
+}
+
+# The lines between <!-- NAME --> and <!-- end NAME --> of the README become standard input.
+replace() {
+  local text
+  text=$(cat)
+  grep -q "<!-- $1 -->" "$readme" && grep -q "<!-- end $1 -->" "$readme" || { echo "speed.sh: $readme has no place for $1"; exit 1; }
+  TEXT=$text awk -v name="$1" '
+    $0 == "<!-- " name " -->" { print; print ENVIRON["TEXT"]; skip = 1 }
+    $0 == "<!-- end " name " -->" { skip = 0 }
+    !skip' "$readme" > "$readme.new"
+  mv "$readme.new" "$readme"
+}
+
+laws_table | replace "laws table"
+lps=$(sed -n 's/^LAMMPS lps //p' "$out/lammps.txt")
+pmb=$(sed -n 's/^LAMMPS pmb //p' "$out/lammps.txt")
+kinematics_table | replace "kinematics table"
+printf 'There: %s. On the same machine, the same 32^3 lattice and one core, Debian'"'"'s LAMMPS takes %s ns a point and step for its linear\nperidynamic solid and %s ns for its bond-based material.\n' \
+  "$(sed -n 's/^machine: \(.*\) (one thread).*/\1 on one core/p' "$out/bench.md")" "$lps" "$pmb" | replace "machine"
+
+{
+  printf '# Speed\n\nWritten by `framework/tools/speed.sh BUILD`. One core, an explicit step with everything in it; how to read the columns stands above each table.\n\n'
+  printf '## Kinematics, 3D\n\n'
+  cat "$out/bench.md"
+  printf '\n## Kinematics, 1D and 2D\n\n'
+  sed 1,2d "$out/bench_1_2.md"
+  printf '\n## LAMMPS, the same lattice\n\n`tests/benchmarks/lammps.sh`, right after: linear peridynamic solid (`lps`) %s ns a point and step, bond-based (`pmb`) %s ns.\n' "$lps" "$pmb"
+  printf '\n## Laws\n\nBatches of 128 points through the virtual call; operations counted by a scalar that knows what it shares.\n\n'
+  cat "$out/materials.md"
+} > "$page.new"
+mv "$page.new" "$page"
