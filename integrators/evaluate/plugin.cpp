@@ -25,8 +25,10 @@ class Evaluate final : public Integrator {
  private:
   void refuse_damage(Problem& problem) const {
     if (problem.bonds().empty()) return;
-    throw values_.error("type", "found \"evaluate\" in a scene with [damage], whose bonds fail at the end of steps; allowed: another integrator, or no "
-                                "[damage]: bonds that are broken from the start are those of [[crack]]");
+    throw values_.error(
+        "type",
+        "found \"evaluate\" in a scene with [damage], whose bonds fail at the end of steps; allowed: another integrator, or no "
+        "[damage]: bonds that are broken from the start are those of [[crack]]");
   }
 
   ParameterValues values_;
@@ -35,12 +37,14 @@ class Evaluate final : public Integrator {
 }  // namespace
 
 PERIKIT_PLUGIN(registrar) {
-  registrar.integrator({.name = "evaluate",
-                        .summary = "energy, forces and fields of the initial displacement",
-                        .parameters = {},
-                        .examples = {""},
-                        .equations = "Pi(u0), f(u0) = -dPi/du",
-                        .source = "used for the zero-energy modes of Partmann et al. (section 4.4) and Chowdhury et al. (section 3)",
-                        .limits = "Boundaries are not applied: the displacement is that of [initial]. Bonds of [[crack]] are cut; [damage] is refused, as no step ends."},
-                       [](const ParameterValues& values, const PartFactory&) { return std::make_unique<Evaluate>(values); });
+  registrar.integrator(
+      {.name = "evaluate",
+       .summary = "energy, forces and fields of the initial displacement",
+       .parameters = {},
+       .examples = {""},
+       .equations = "Pi(u0), f(u0) = -dPi/du",
+       .source = "used for the zero-energy modes of Partmann et al. (section 4.4) and Chowdhury et al. (section 3)",
+       .limits = "Boundaries are not applied: the displacement is that of [initial]. Bonds of [[crack]] are cut; [damage] is "
+                 "refused, as no step ends."},
+      [](const ParameterValues& values, const PartFactory&) { return std::make_unique<Evaluate>(values); });
 }

@@ -11,7 +11,8 @@ namespace {
 /// The total energy of every so many steps, and the sign changes of the displacement of one point.
 class EnergyWatcher final : public Observer {
  public:
-  EnergyWatcher(BodyProblem& problem, std::int64_t every) : problem_(problem), every_(every), end_(problem.body().internal().back()) {}
+  EnergyWatcher(BodyProblem& problem, std::int64_t every)
+      : problem_(problem), every_(every), end_(problem.body().internal().back()) {}
   bool wants_sample(std::int64_t step, double) override { return step % every_ == 0; }
   void step_done(const StepReport& report) override {
     if (report.step % every_ != 0) return;
@@ -32,7 +33,8 @@ class EnergyWatcher final : public Observer {
     };
     const double start = mean(energies_.begin());
     Drift result;
-    for (const double energy : energies_) result.largest_deviation = std::max(result.largest_deviation, std::abs(energy / start - 1));
+    for (const double energy : energies_)
+      result.largest_deviation = std::max(result.largest_deviation, std::abs(energy / start - 1));
     result.drift = mean(energies_.end() - tenth) / start - 1;
     return result;
   }

@@ -135,11 +135,15 @@ int vibration(std::int64_t steps) {
   return status;
 }
 
-/// Long explicit runs from a random perturbation, at 0.9 of the true limit of the step. Returns the exit status: 1 where the energy drifts.
+/// Long explicit runs from a random perturbation, at 0.9 of the true limit of the step. Returns the exit status: 1 where the
+/// energy drifts.
 int endurance(std::int64_t steps, const std::filesystem::path& folder) {
   std::ofstream csv(folder / "endurance.csv"), page(folder / "endurance.md");
   csv << "kinematics,dimension,jitter,steps,largest_deviation,drift\n";
-  const std::string head = fmt::format("{} steps of 0.9 of the limit; drift of the energy on lattices and clouds\n| kinematics | 1D | 2D | 3D |\n|---|---|---|---|", steps);
+  const std::string head = fmt::format(
+      "{} steps of 0.9 of the limit; drift of the energy on lattices and clouds\n| kinematics | 1D | 2D | 3D "
+      "|\n|---|---|---|---|",
+      steps);
   page << head;
   fmt::print("{}", head);
   std::map<std::string, std::map<int, std::string>> cells;
@@ -147,12 +151,15 @@ int endurance(std::int64_t steps, const std::filesystem::path& folder) {
   for (const Setting& setting : long_settings(registry())) {
     Specimen specimen(registry(), setting);
     const Drift d = specimen.endure(specimen.spectrum().largest, 0.9, steps);
-    csv << fmt::format("{},{},{},{},{:.3e},{:.3e}\n", setting.label, setting.dimension, setting.jitter, steps, d.largest_deviation, d.drift) << std::flush;
+    csv << fmt::format("{},{},{},{},{:.3e},{:.3e}\n", setting.label, setting.dimension, setting.jitter, steps,
+                       d.largest_deviation, d.drift)
+        << std::flush;
     if (!(std::abs(d.drift) <= 1e-2 && d.largest_deviation <= 2)) status = 1;
     std::string& cell = cells[setting.label][setting.dimension];
     cell += fmt::format("{}{:.0e}", cell.empty() ? "" : ", ", d.drift);
     if (setting.dimension != 3 || setting.jitter == 0) continue;
-    const std::string row = fmt::format("\n| `{}` | {} | {} | {} |", setting.label, cells[setting.label][1], cells[setting.label][2], cells[setting.label][3]);
+    const std::string row = fmt::format("\n| `{}` | {} | {} | {} |", setting.label, cells[setting.label][1],
+                                        cells[setting.label][2], cells[setting.label][3]);
     page << row << std::flush;
     fmt::print("{}", row);
     std::fflush(stdout);

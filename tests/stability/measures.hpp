@@ -68,8 +68,8 @@ class Specimen {
   std::unique_ptr<Simulation> simulation_;
 };
 
-/// What `endure` is for: every kinematics at a ratio of 3.015 with gaussian influence, lattices and clouds of jitter 0.3; 40, 7 x 7 and
-/// 4 x 4 x 4 points.
+/// What `endure` is for: every kinematics at a ratio of 3.015 with gaussian influence, lattices and clouds of jitter 0.3; 40, 7 x
+/// 7 and 4 x 4 x 4 points.
 std::vector<Setting> long_settings(Registry& registry);
 
 /// A bar of 40 points that is held at one end, pulled and let go: a strain of 1 % in its first mode.

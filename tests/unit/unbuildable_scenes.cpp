@@ -114,8 +114,8 @@ const Fault faults[]{
     {"kinematics", "type", "\"conventional\"\norder = 2\nstabilization = \"wan\"",
      "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 1001, "damage",
      "found with kinematics.stabilization over point gradients of higher order", "order 1"},
-    {"integrator", "type", "\"evaluate\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 0, "integrator.type",
-     "found \"evaluate\" in a scene with [damage]", "another integrator"},
+    {"integrator", "type", "\"evaluate\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 0,
+     "integrator.type", "found \"evaluate\" in a scene with [damage]", "another integrator"},
     // conditions
     {"boundary", "displacement", "[\"log(x - 3)\", 0]", "", 0, "boundary.0.displacement", "nan at x", "finite values"},
     {"", "format", "1", "[initial]\nvelocity = [\"1/(x - 0.5)\", 0]\n", 1002, "initial.velocity", "inf at x = (0.5",

@@ -51,14 +51,17 @@ TEST_CASE("stability: needles among the parts of a cloud do not set the stable s
     if (setting.label != "sub_horizon" || setting.jitter == 0) continue;
     Setting lattice = setting;
     lattice.jitter = 0;
-    // The step goes with 1/sqrt(largest): a fifth of the lattice's and less with parts whose eigenvalues spread by up to a factor of 1000.
+    // The step goes with 1/sqrt(largest): a fifth of the lattice's and less with parts whose eigenvalues spread by up to a factor
+    // of 1000.
     CHECK(Specimen(registry(), setting).spectrum().largest <= 4 * Specimen(registry(), lattice).spectrum().largest);
   }
 }
 
 TEST_CASE("stability: penalties over families that are almost flat do not turn negative") {
   for (const Setting& s : all_settings(registry())) {
-    if (s.kinematics.find("stabilization") == std::string::npos || s.influence != "cubic_spline" || s.horizon_ratio != 1.015 || s.dimension != 2) continue;
+    if (s.kinematics.find("stabilization") == std::string::npos || s.influence != "cubic_spline" || s.horizon_ratio != 1.015 ||
+        s.dimension != 2)
+      continue;
     INFO(s.label, " jitter ", s.jitter);
     CHECK(Specimen(registry(), s).spectrum().lowest >= -1e-13);
   }
@@ -80,7 +83,8 @@ TEST_CASE("stability: the estimated step is the true one to 2 %; at 0.99 of it r
 TEST_CASE("stability: the energy of a random perturbation does not drift") {
   // perikit_stability --endurance: 100 000 steps of every kinematics.
   for (const Setting& setting : long_settings(registry())) {
-    if (setting.dimension == 3 || (setting.label != "baqp" && setting.label != "sub_horizon" && setting.label != "conventional")) continue;
+    if (setting.dimension == 3 || (setting.label != "baqp" && setting.label != "sub_horizon" && setting.label != "conventional"))
+      continue;
     INFO(setting.label, " ", setting.dimension, "D, jitter ", setting.jitter);
     Specimen specimen(registry(), setting);
     const Drift energy = specimen.endure(specimen.spectrum().largest, 0.9, 5000);

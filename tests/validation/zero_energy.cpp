@@ -123,10 +123,11 @@ TEST_CASE("sub_horizon: parts without a gradient are dropped, their number must 
 }
 
 TEST_CASE("sub_horizon: a part is a needle beside its family, not because its family is one") {
-  // A strip of two rows: every point has two quadrants, 10 spacings long and one thick, corners have one. The eigenvalues of their shape
-  // tensors are more than 100 apart, but so are those of the whole families.
-  const std::vector<std::string> strip{"body={ dimension = 2, plane = \"strain\", lattice = { spacing = 1, lower = [0, 0], upper = [60, 2] } }",
-                                       "sets.inside={ nearest = [20, 0.5] }", "family.horizon_ratio=10.015", "initial.displacement=[0, 0]"};
+  // A strip of two rows: every point has two quadrants, 10 spacings long and one thick, corners have one. The eigenvalues of
+  // their shape tensors are more than 100 apart, but so are those of the whole families.
+  const std::vector<std::string> strip{
+      "body={ dimension = 2, plane = \"strain\", lattice = { spacing = 1, lower = [0, 0], upper = [60, 2] } }",
+      "sets.inside={ nearest = [20, 0.5] }", "family.horizon_ratio=10.015", "initial.displacement=[0, 0]"};
   CHECK(sample("partmann/zigzag.toml", "inside", strip).dropped_parts == 2 * 120 + 4);
 }
 

@@ -205,7 +205,7 @@ double LocalStencil<D>::least_part_ratio(const FamilyArrays& family) const {
       Pack total(0.0);
       for (std::size_t k = 0; k < row_; k += pack_width)
         total += Pack::load(family.omega.data() + k) * Pack::load(lever_.data() + static_cast<std::size_t>(a) * row_ + k) *
-               Pack::load(family.xi[b].data() + k);
+                 Pack::load(family.xi[b].data() + k);
       whole[symmetric_index(D, a, b)] = sum(total);
     }
   return std::max(poor_ratio, part_ratio * eigenvalue_ratio<D>(symmetric_matrix<D>(whole)));

@@ -21,9 +21,9 @@ inline constexpr double singular_ratio = 1e-8;
 /// on a line, 30 times as long as thick): their gradients magnify noise as much.
 inline constexpr double poor_ratio = 1e-3;
 
-/// A part is also ill conditioned when its eigenvalues spread by more than this times those of its whole family: a needle in a family
-/// that is none. Near the surfaces of clouds such parts are stiffer than all others and set the stable step. The parts of lattices,
-/// also one layer below a surface and at a horizon of five spacings, spread by less.
+/// A part is also ill conditioned when its eigenvalues spread by more than this times those of its whole family: a needle in a
+/// family that is none. Near the surfaces of clouds such parts are stiffer than all others and set the stable step. The parts of
+/// lattices, also one layer below a surface and at a horizon of five spacings, spread by less.
 inline constexpr double part_ratio = 0.05;
 
 template <int D>

@@ -20,7 +20,8 @@ void BodyProblem::read_constraints(bool quasi_static) {
   for (std::size_t k = 0; k < scene_.boundaries.size(); ++k) {
     const BoundaryDescription& boundary = scene_.boundaries[k];
     if (boundary.velocity && quasi_static) {
-      throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k), "found in a quasi-static run; allowed: displacement");
+      throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
+                       "found in a quasi-static run; allowed: displacement");
     }
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;

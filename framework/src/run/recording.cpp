@@ -35,10 +35,12 @@ std::string earlier_run(const std::filesystem::path& folder) {
     try {
       const Checkpoint checkpoint = read_checkpoint(folder);
       if (!ended(checkpoint.output, checkpoint.step, checkpoint.time)) {
-        return fmt::format("warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have gone on with it",
-                           folder.string(), checkpoint.step, checkpoint.time);
+        return fmt::format(
+            "warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have "
+            "gone on with it",
+            folder.string(), checkpoint.step, checkpoint.time);
       }
-    } catch (const InputError&) {   // nothing that could be gone on with
+    } catch (const InputError&) {  // nothing that could be gone on with
     }
   }
   return fmt::format("replaces the results of an earlier run in {}", folder.string());
@@ -113,7 +115,8 @@ void RunRecorder::start_fresh(RunStart start) {
   std::error_code missing;
   if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
     throw InputError({scene.file.string()}, "output",
-                     fmt::format("found {}, the folder of the scene itself, whose scene.toml the resolved scene would replace; allowed: another folder (-o)",
+                     fmt::format("found {}, the folder of the scene itself, whose scene.toml the resolved scene would replace; "
+                                 "allowed: another folder (-o)",
                                  folder_.string()));
   }
   const std::string replaced = start == RunStart::fresh ? earlier_run(folder_) : std::string();

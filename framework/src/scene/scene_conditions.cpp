@@ -120,8 +120,8 @@ void SceneReader::read_history(const toml::table& output) {
     writer_.header("output.history", true);
     writer_.lines(table, values);
     const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
-    HistoryDescription description{text("name"),      set_of(values), text("quantity"),
-                                   text("component"), text("reduce"), values.position("quantity"), {}, {}};
+    HistoryDescription description{
+        text("name"), set_of(values), text("quantity"), text("component"), text("reduce"), values.position("quantity"), {}, {}};
     const auto refuse = [&](const char* key, const std::string& message) {
       reader_.errors.add(values.position(key), join_path(path, key), message);
     };
