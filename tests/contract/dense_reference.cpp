@@ -39,6 +39,14 @@ Vector monomials(const Vector& x, int order) {
   return Eigen::Map<Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+/// Smallest over largest eigenvalue of the shape tensor of influence omega(k); 0 where it is zero.
+double eigenvalue_ratio(const Cloud& cloud, int i, const std::vector<int>& family, const std::function<double(int)>& omega) {
+  Matrix K = Matrix::Zero(cloud.dimension, cloud.dimension);
+  for (const int k : family) K += omega(k) * cloud.volume[k] * cloud.bond(i, k) * cloud.bond(i, k).transpose();
+  const Vector values = Eigen::SelfAdjointEigenSolver<Matrix>(K).eigenvalues();
+  return values[values.size() - 1] > 0 ? values[0] / values[values.size() - 1] : 0.0;
+}
+
 /// Reproducing-kernel gradient at i of exactly this order with influence omega(k); empty when the moment is singular.
 Stencil kernel_gradient(const Cloud& cloud, int i, int order, double singular, const std::vector<int>& family,
                         const std::function<double(int)>& omega) {
@@ -121,13 +129,14 @@ class Builder {
   void append_parts(int i, std::vector<EvaluationPoint>& out) {
     const int parts = description_.parts > 0 ? description_.parts : 1 << cloud_.dimension;
     const std::size_t first = out.size();
+    const auto omega = [&](int k) { return cloud_.intact(i, k) * cloud_.omega(i, k); };
+    const double limit = std::max(description_.poor, description_.part * eigenvalue_ratio(cloud_, i, family_, omega));
     double total = 0;
     for (int part = 0; part < parts; ++part) {
       double volume = 0;
       const auto in_part = [&](int k) { return share(cloud_.bond(i, k), cloud_.horizon, parts, part); };
       for (const int k : family_) volume += in_part(k) * cloud_.intact(i, k) * cloud_.volume[k];
-      Stencil g = kernel_gradient(cloud_, i, 1, description_.poor, family_,
-                                  [&](int k) { return in_part(k) * cloud_.intact(i, k) * cloud_.omega(i, k); });
+      Stencil g = kernel_gradient(cloud_, i, 1, limit, family_, [&](int k) { return in_part(k) * omega(k); });
       if (g.empty()) continue;
       const double weight = description_.part_volumes ? volume : 1.0;
       total += weight;

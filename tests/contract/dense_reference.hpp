@@ -54,6 +54,8 @@ struct Description {
   double singular = 1e-10;
   /// The same for parts of families and domains of bonds.
   double poor = 1e-3;
+  /// A part's must moreover not be below this share of the family's own fraction: a needle in a family that is none.
+  double part = 0.05;
 };
 
 /// g_k of the points k that move the gradient, ascending in k: H = sum_k u_k (x) g_k. Empty: dead, H = 0.

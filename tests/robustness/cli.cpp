@@ -210,6 +210,41 @@ TEST_CASE("cli: the folder of a run") {
   CHECK_MESSAGE(next.status == 0, next.err);
 }
 
+TEST_CASE("cli: a run says whose results it replaces, and never replaces its own scene") {
+  const Desk desk;
+  const auto run = [&](const std::string& options) { return desk.perikit("run scene.toml -o out " + options); };
+  const std::string said = "replaces the results of an earlier run in out",
+                    stopped = "warning: replaces a run in out that was stopped and kept a checkpoint at step ";
+  const Result first = run("");
+  CHECK(!contains(first.err + desk.text("out/run.log"), "replaces"));
+  for (const std::string before : {"of a run that ended", "of a run with checkpoints that ended"}) {
+    INFO(before);
+    const Result again = run("--set output.checkpoint_every=20");
+    CHECK(again.status == 0);
+    CHECK(contains(again.err, said));
+    CHECK(!contains(again.err, stopped));
+    CHECK(contains(desk.text("out/run.log"), said));
+  }
+  // A run that ends in the middle: the last checkpoint is that of step 40.
+  REQUIRE(
+      run("--quiet --set output.checkpoint_every=20 --set 'boundary=[{set=\"right\",velocity=[\"-400*(t > 0.85)\",\"free\"]}]'")
+          .status == 1);
+  const Result after = run("");
+  CHECK(after.status == 0);
+  CHECK(contains(after.err, stopped + "40, time 0.8 s: --resume would have gone on with it"));
+  CHECK(contains(desk.text("out/run.log"), stopped));
+  CHECK(!contains(run("--quiet").err, "replaces"));
+
+  const std::string own = desk.text("scene.toml");
+  const Result refused = desk.perikit("run scene.toml -o .");
+  CHECK(refused.status == 2);
+  CHECK(contains(refused.err,
+                 "output: found ., the folder of the scene itself, whose scene.toml the resolved scene would replace; allowed: "
+                 "another folder (-o)"));
+  CHECK(desk.text("scene.toml") == own);
+  CHECK(desk.perikit("run out/scene.toml -o out").status == 0);  // this is what it would write
+}
+
 TEST_CASE("cli: frames, every and times give the frames that they promise") {
   const auto frames_of = [](const std::string& output) {
     const Desk desk(replaced(plate, "frames = 5", output));

@@ -54,3 +54,20 @@ TEST_CASE("errors: a load that no state carries ends with the step, the load and
   const Desk desk(scene);
   check_said(desk.perikit("run scene.toml --quiet -o out"), 1, {"the run failed: newton: no equilibrium found beyond load parameter ", "the smallest step, ", "snap-through", "last good frame: "});
 }
+
+TEST_CASE("errors: a body that memory does not hold is one line" * doctest::skip(unlimited_addresses)) {
+  const Desk desk(replaced(plate, "upper = [8, 5]", "upper = [3000, 3000]"));
+  check_said(desk.perikit("run scene.toml --quiet -o out --threads 1", "ulimit -v 1000000;"), 1,
+             {"the run failed: not enough memory\n"});
+}
+
+TEST_CASE("errors: a study of which nothing came to its end says why the first run failed") {
+  const Desk desk;
+  desk.write("study.toml",
+             "format = 1\nscene = \"scene.toml\"\n[values]\nmaterial.density = [1.0, 2.0]\n[[quantity]]\nname = \"energy\"\nfrom "
+             "= \"strain_energy\"\n");
+  CHECK(desk.perikit("study study.toml --quiet -o good").status == 0);
+  const std::string faster = "--set 'initial={velocity=[\"-60*(x > 4)\",0]}'";
+  check_said(desk.perikit("study study.toml --quiet -o bad " + faster), 1,
+             {"the run failed: no run of the study came to its end; the first: ", "inadmissible", "point "});
+}

@@ -16,8 +16,8 @@ namespace {
 constexpr double spacing = 1.0;
 constexpr double rough = 0.35;
 
-int points_along(int dimension) {
-  return dimension == 1 ? 40 : dimension == 2 ? 11 : 5;
+int points_along(const Setting& s) {
+  return s.side > 0 ? s.side : s.dimension == 1 ? 40 : s.dimension == 2 ? 11 : 5;
 }
 
 std::string list(int dimension, double value) {
@@ -31,7 +31,7 @@ std::string scene_text(const Setting& s, const std::string& integrator) {
   if (s.dimension == 2) text += "plane = \"strain\"\n";
   if (s.dimension == 1) text += "line = \"strain\"\n";
   text += fmt::format("[body.lattice]\nspacing = {}\nlower = {}\nupper = {}\njitter = {}\nseed = 3\n", spacing,
-                      list(s.dimension, 0), list(s.dimension, points_along(s.dimension) * spacing), s.jitter);
+                      list(s.dimension, 0), list(s.dimension, points_along(s) * spacing), s.jitter);
   text += fmt::format("[family]\nhorizon_ratio = {}\ninfluence = \"{}\"\n[kinematics]\n{}\n", s.horizon_ratio, s.influence,
                       s.kinematics);
   return text +
@@ -204,7 +204,7 @@ Accuracy Specimen::accuracy() {
                                                          Q[static_cast<std::size_t>(a)][static_cast<std::size_t>(3 * c + b)]));
     }
   Accuracy result;
-  const double middle = 0.5 * points_along(d) * spacing;
+  const double middle = 0.5 * points_along(setting_) * spacing;
   for (const bool quadratic : {false, true}) {
     Field u = problem.make_field(d);
     contract::set_field(body, u, [&](const Point& x) {
@@ -234,9 +234,10 @@ Accuracy Specimen::accuracy() {
   return result;
 }
 
-double Specimen::growth(double largest, double share, int steps) const {
+std::unique_ptr<Simulation> Specimen::shaken(double largest, double share, std::int64_t steps) const {
   const double step = share * 2 / std::sqrt(largest);
-  const auto simulation = make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", steps * step, step));
+  auto simulation =
+      make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
   BodyProblem& problem = simulation->problem();
   contract::Noise random(5);
   contract::set_field(problem.body(), problem.velocity(), [&](const Point&) {
@@ -244,72 +245,18 @@ double Specimen::growth(double largest, double share, int steps) const {
     for (int c = 0; c < problem.dimension(); ++c) v[static_cast<std::size_t>(c)] = 1e-8 * random();
     return v;
   });
-  Watcher watcher(problem);
+  return simulation;
+}
+
+double Specimen::growth(double largest, double share, std::int64_t steps) const {
+  const auto simulation = shaken(largest, share, steps);
+  Watcher watcher(simulation->problem());
   try {
     simulation->run(watcher);
   } catch (const RunError&) {
     return std::numeric_limits<double>::infinity();
   }
   return watcher.growth();
-}
-
-Vibration vibrate(Registry& registry, const std::string& kinematics, std::int64_t steps) {
-  // Steps at 0.9 of the stable one; their number, not the end time, is what is asked for.
-  const auto scene = [&](const std::string& integrator) {
-    return fmt::format(
-        "format = 1\n[body]\ndimension = 1\nline = \"strain\"\n[body.lattice]\nspacing = 1.0\nlower = [0]\nupper = "
-        "[40]\n[sets]\nend = "
-        "\"x < 1\"\n[family]\nhorizon_ratio = 3.015\ninfluence = \"gaussian\"\n"
-        "[kinematics]\ntype = \"{}\"\n{}\n[material]\ntype = \"neo_hookean\"\ndensity = 1.0\nyoungs_modulus = 1.0\npoisson_ratio "
-        "= 0.25\n"
-        "[initial]\ndisplacement = [\"0.25 * sin(pi * (x - 0.5) / 80)\"]\n[[boundary]]\nset = \"end\"\ndisplacement = "
-        "[0]\n[run]\nthreads = "
-        "1\n[integrator]\n{}\n",
-        kinematics, registry.describe(Kind::kinematics, kinematics).examples.front(), integrator);
-  };
-  const auto build = [&](const std::string& integrator) {
-    return std::make_unique<Simulation>(parse_scene(scene(integrator), "vibration.toml", registry), registry);
-  };
-  const auto first = build("type = \"verlet\"\nend_time = 1.0");
-  const double step = 0.9 * 2 / std::sqrt(first->problem().largest_eigenvalue(first->problem().displacement()));
-  const auto simulation =
-      build(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
-
-  class EnergyWatcher final : public Observer {
-   public:
-    explicit EnergyWatcher(BodyProblem& problem) : problem_(problem), end_(problem.body().internal().back()) {}
-    bool wants_sample(std::int64_t step, double) override { return step % 10 == 0; }
-    void step_done(const StepReport& report) override {
-      if (report.step % 10 != 0) return;
-      energies.push_back(problem_.energies().strain + problem_.kinetic_energy(problem_.velocity()));
-      const double u = problem_.displacement().component(0)[end_];
-      signs += u * last_ < 0;
-      last_ = u;
-    }
-    void log(std::string_view) override {}
-    std::vector<double> energies;
-    std::int64_t signs = 0;
-
-   private:
-    BodyProblem& problem_;
-    std::int32_t end_;
-    double last_ = 0;
-  };
-  EnergyWatcher watcher(simulation->problem());
-  simulation->run(watcher);
-  const auto mean = [](auto begin, auto end) {
-    double sum = 0;
-    for (auto e = begin; e != end; ++e) sum += *e;
-    return sum / static_cast<double>(end - begin);
-  };
-  const auto tenth = static_cast<std::ptrdiff_t>(watcher.energies.size() / 10);
-  const double start = mean(watcher.energies.begin(), watcher.energies.begin() + tenth);
-  Vibration result;
-  for (const double energy : watcher.energies)
-    result.largest_deviation = std::max(result.largest_deviation, std::abs(energy / start - 1));
-  result.drift = mean(watcher.energies.end() - tenth, watcher.energies.end()) / start - 1;
-  result.periods = 0.5 * static_cast<double>(watcher.signs);
-  return result;
 }
 
 }  // namespace perikit::stability

@@ -122,6 +122,9 @@ TEST_CASE("ABI, build and symbols are compared before any object crosses") {
   check_refused(built("missing_symbol"), "symbol perikit_register missing");
   check_refused(built("other_abi"), fmt::format("ABI version {}, this program has {}", PERIKIT_ABI_VERSION + 6, PERIKIT_ABI_VERSION));
   check_refused(built("other_build"), "built as 'msvc19 abacus'");
+  check_refused(built("other_headers"),
+                fmt::format("headers-000000000000', this program as '{}': perikit's headers are others now; build it again",
+                            PERIKIT_BUILD_ID));
 }
 
 TEST_CASE("a failed registration leaves nothing behind") {

@@ -127,7 +127,7 @@ TEST_CASE("a whole scene is read") {
   CHECK(!scene.boundaries.at(0).components.at(1));
   CHECK(scene.boundaries.at(1).velocity);
   CHECK(scene.boundaries.at(1).components.at(0)->depends_on_time());
-  CHECK(scene.boundaries.at(1).position.line == 46);
+  CHECK(scene.boundaries.at(1).position.line == 48);
   CHECK(scene.loads.at(1).type == LoadDescription::Type::traction);
   CHECK(scene.loads.at(1).face == "-x");
   CHECK(scene.integrator->values.integer("steps") == 10);

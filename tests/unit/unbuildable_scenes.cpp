@@ -114,18 +114,20 @@ const Fault faults[]{
     {"kinematics", "type", "\"conventional\"\norder = 2\nstabilization = \"wan\"",
      "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 1001, "damage",
      "found with kinematics.stabilization over point gradients of higher order", "order 1"},
+    {"integrator", "type", "\"evaluate\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 0,
+     "integrator.type", "found \"evaluate\" in a scene with [damage]", "another integrator"},
     // conditions
     {"boundary", "displacement", "[\"log(x - 3)\", 0]", "", 0, "boundary.0.displacement", "nan at x", "finite values"},
     {"", "format", "1", "[initial]\nvelocity = [\"1/(x - 0.5)\", 0]\n", 1002, "initial.velocity", "inf at x = (0.5",
      "finite values"},
     {"", "format", "1", "[initial]\ndisplacement = [0, \"sqrt(1 - y)\"]\n", 1002, "initial.displacement", "nan at x",
      "finite values"},
-    {"integrator", "type", "\"newton\"\n[constants]", "[[boundary]]\nset = \"left\"\nvelocity = [0, 0]\n", 1001,
-     "boundary.velocity", "found in a quasi-static run", "displacement"},
-    {"sets", "middle", "\"x > 2 && x < 3\"", "[[load]]\nset = \"middle\"\ntraction = [1, 0]\nface = \"+x\"\n", 1001, "load.face",
+    {"integrator", "type", "\"newton\"\n[constants]", "[[boundary]]\nset = \"left\"\nvelocity = [0, 0]\n", 1003,
+     "boundary.1.velocity", "found in a quasi-static run", "displacement"},
+    {"sets", "middle", "\"x > 2 && x < 3\"", "[[load]]\nset = \"middle\"\ntraction = [1, 0]\nface = \"+x\"\n", 1004, "load.face",
      "on which no point of the set \"middle\" lies", "a face of the set"},
     {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"cauchy\"\ncomponent = \"xx\"\n",
-     1001, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
+     1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
 };
 
 class Bench {

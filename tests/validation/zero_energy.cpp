@@ -122,6 +122,15 @@ TEST_CASE("sub_horizon: parts without a gradient are dropped, their number must 
                        doctest::Contains("found 4 in a body of dimension 3; allowed: 8"), InputError);
 }
 
+TEST_CASE("sub_horizon: a part is a needle beside its family, not because its family is one") {
+  // A strip of two rows: every point has two quadrants, 10 spacings long and one thick, corners have one. The eigenvalues of
+  // their shape tensors are more than 100 apart, but so are those of the whole families.
+  const std::vector<std::string> strip{
+      "body={ dimension = 2, plane = \"strain\", lattice = { spacing = 1, lower = [0, 0], upper = [60, 2] } }",
+      "sets.inside={ nearest = [20, 0.5] }", "family.horizon_ratio=10.015", "initial.displacement=[0, 0]"};
+  CHECK(sample("partmann/zigzag.toml", "inside", strip).dropped_parts == 2 * 120 + 4);
+}
+
 TEST_CASE("sub_horizon: shares of the parts, equal or by volume") {
   // The second point of the bar, by hand: F - 1 = -0.2 in the half with one bond, 0.04 in the half with two.
   const double psi[] = {0.5 * 1000 * 0.2 * 0.2, 0.5 * 1000 * 0.04 * 0.04};

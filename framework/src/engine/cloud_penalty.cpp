@@ -90,7 +90,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   void set_matrix(std::size_t p) {
     const double* inverse = &families_.inverse[6 * p];
     std::fill_n(&M_[columns * p], columns, Column{});
-    if (!std::isfinite(families_.condition.data()[p])) return;   // singular: M = 0
+    if (!penalised(families_.condition.data()[p])) return;  // M = 0
     double intact = 0, M[6];
     for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
     const double damage = families_.damage.data()[p];

@@ -111,7 +111,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     const LatticePattern& pattern = families_.pattern(chunk);
     for (int l = 0; l < chunk_points; ++l) {
       for (int c = 0; c < Matrix::components; ++c) M_.component(c)[chunk.first + l] = 0;
-      if (!(pattern.live >> l & 1) || pattern.singular >> l & 1) continue;   // M = 0
+      if (!(pattern.live >> l & 1) || !penalised(pattern.condition[l])) continue;  // M = 0
       const auto p = static_cast<std::size_t>(chunk.first + l);
       double intact = 0, inverse[6], M[6];
       for (std::size_t s = 0; s < families_.offsets.size(); ++s)

@@ -86,9 +86,9 @@ void adjoint_tile(const double* weight, std::size_t row, int points, const doubl
 }
 
 /// Inverse of symmetric K by cofactors; `regular` and `poor` where it is sure that the eigenvalues spread by less, or more, than
-/// 1 / poor_ratio: the product of the norms of K and K^-1 is at least their spread, and at most D times as much.
+/// 1 / ratio: the product of the norms of K and K^-1 is at least their spread, and at most D times as much.
 template <int D>
-void invert_lanes(const Pack* K, Pack* inverse, PackMask& regular, PackMask& poor) noexcept {
+void invert_lanes(const Pack* K, double ratio, Pack* inverse, PackMask& regular, PackMask& poor) noexcept {
   Pack square(0.0), m[6];
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) square += K[symmetric_index(D, a, b)] * K[symmetric_index(D, a, b)];
@@ -116,7 +116,7 @@ void invert_lanes(const Pack* K, Pack* inverse, PackMask& regular, PackMask& poo
   Pack norm(0.0);
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) norm += cofactor[symmetric_index(D, a, b)] * cofactor[symmetric_index(D, a, b)];
-  const Pack bound = sqrt(norm) * poor_ratio;
+  const Pack bound = sqrt(norm) * ratio;
   regular = (det > Pack(1e-12)) & (bound < det);
   poor = !(det > Pack(1e-12)) | (det * Pack(D) < bound);  // K has norm 1: such a determinant means a spread above 1e5
   const Pack by = scale / det;
@@ -181,20 +181,34 @@ void LocalStencil<D>::invert_one(int q, double ratio) {
 }
 
 template <int D>
-void LocalStencil<D>::invert_all() {
+void LocalStencil<D>::invert_all(double ratio) {
   constexpr int entries = symmetric_components(D);
   for (std::size_t q = 0; q < lanes_; q += pack_width) {
     Pack K[entries], inverse[entries];
     PackMask regular, poor;
     for (std::size_t c = 0; c < entries; ++c) K[c] = Pack::load(moments_.data() + c * lanes_ + q);
-    invert_lanes<D>(K, inverse, regular, poor);
+    invert_lanes<D>(K, ratio, inverse, regular, poor);
     for (std::size_t c = 0; c < entries; ++c) inverse[c].store(inverse_.data() + c * lanes_ + q);
     for (int i = 0; i < pack_width; ++i) {
       const std::size_t at = q + static_cast<std::size_t>(i);
       regular_[at] = regular[i];
-      if (!regular[i] && !poor[i]) invert_one(static_cast<int>(at), poor_ratio);
+      if (!regular[i] && !poor[i]) invert_one(static_cast<int>(at), ratio);
     }
   }
+}
+
+template <int D>
+double LocalStencil<D>::least_part_ratio(const FamilyArrays& family) const {
+  double whole[6] = {};
+  for (int a = 0; a < D; ++a)
+    for (int b = a; b < D; ++b) {
+      Pack total(0.0);
+      for (std::size_t k = 0; k < row_; k += pack_width)
+        total += Pack::load(family.omega.data() + k) * Pack::load(lever_.data() + static_cast<std::size_t>(a) * row_ + k) *
+                 Pack::load(family.xi[b].data() + k);
+      whole[symmetric_index(D, a, b)] = sum(total);
+    }
+  return std::max(poor_ratio, part_ratio * eigenvalue_ratio<D>(symmetric_matrix<D>(whole)));
 }
 
 template <int D>
@@ -268,7 +282,7 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   weigh(rules, family, row(first));
   if (first == 1) std::copy_n(family.omega.data(), row_, row(0));
   multiply(0, points_);
-  invert_all();
+  invert_all(by_bond ? poor_ratio : least_part_ratio(family));
   if (first == 1 && !regular_[0]) invert_one(0, singular_ratio);
   double total = 0;
   for (int q = first; q < points_; ++q) {

@@ -67,7 +67,9 @@ class LocalStencil {
   void multiply(int begin, int end) noexcept;
   /// K_q^-1 of row q, or of all rows, and whether they are regular: the eigenvalues of K spread by less than 1 / ratio.
   void invert_one(int q, double ratio);
-  void invert_all();
+  void invert_all(double ratio);
+  /// What the eigenvalues of a part's K must not spread beyond: part_ratio times those of the family, or poor_ratio.
+  double least_part_ratio(const FamilyArrays& family) const;
 
   int bonds_ = 0, points_ = 0, fallbacks_ = 0, dropped_ = 0;
   std::size_t row_ = 0;            ///< padded(bonds)

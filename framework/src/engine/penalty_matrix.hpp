@@ -4,6 +4,13 @@
 
 namespace perikit {
 
+/// Whether a point with a shape tensor of this condition is penalised. The force counts on K^-1 K = I, which rounding breaks by
+/// eps times the condition, and M can be as large as K^-1: beyond 1 / poor_ratio the sum of squares would show as negative
+/// eigenvalues. Such a family has hardly more bonds that matter than the gradient sees.
+inline bool penalised(double condition) noexcept {
+  return condition * poor_ratio < 1;
+}
+
 /// Symmetric matrices M_i: one number where M_i = m_i I, else the components of a shape tensor.
 template <int D, bool isotropic>
 struct PenaltyMatrix {

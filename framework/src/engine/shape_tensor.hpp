@@ -21,6 +21,11 @@ inline constexpr double singular_ratio = 1e-8;
 /// on a line, 30 times as long as thick): their gradients magnify noise as much.
 inline constexpr double poor_ratio = 1e-3;
 
+/// A part is also ill conditioned when its eigenvalues spread by more than this times those of its whole family: a needle in a
+/// family that is none. Near the surfaces of clouds such parts are stiffer than all others and set the stable step. The parts of
+/// lattices, also one layer below a surface and at a horizon of five spacings, spread by less.
+inline constexpr double part_ratio = 0.05;
+
 template <int D>
 using Square = Eigen::Matrix<double, D, D>;
 
@@ -30,6 +35,14 @@ Square<D> symmetric_matrix(const double* k) {
   for (int a = 0; a < D; ++a)
     for (int b = 0; b < D; ++b) m(a, b) = k[symmetric_index(D, a, b)];
   return m;
+}
+
+/// Smallest eigenvalue of K over the largest one; 0 where K is zero.
+template <int D>
+double eigenvalue_ratio(const Square<D>& K) {
+  const Eigen::SelfAdjointEigenSolver<Square<D>> eigen(K, Eigen::EigenvaluesOnly);
+  const double high = eigen.eigenvalues()(D - 1);
+  return high > 0 ? std::max(0.0, eigen.eigenvalues()(0) / high) : 0.0;
 }
 
 /// Inverse of K by its eigen-decomposition; zero, and false, where K is singular. condition: ratio of its eigenvalues.

@@ -95,7 +95,10 @@ void check_abi(int version, const std::string& build_id) {
   if (version != PERIKIT_ABI_VERSION) {
     throw Refusal(fmt::format("ABI version {}, this program has {}", version, PERIKIT_ABI_VERSION));
   }
-  if (build_id != PERIKIT_BUILD_ID) throw Refusal(fmt::format("built as '{}', this program as '{}'", build_id, PERIKIT_BUILD_ID));
+  if (build_id == PERIKIT_BUILD_ID) return;
+  const bool same_toolchain = build_id.starts_with(PERIKIT_TOOLCHAIN_ID);
+  throw Refusal(fmt::format("built as '{}', this program as '{}'{}", build_id, PERIKIT_BUILD_ID,
+                            same_toolchain ? ": perikit's headers are others now; build it again" : ""));
 }
 
 void load_library(const fs::path& file, Registrar& registrar) {

@@ -103,7 +103,8 @@ bool ParameterValues::is_expression(std::string_view key) const noexcept {
 
 std::vector<std::string> ParameterValues::keys() const {
   std::vector<std::string> names;
-  for (const auto& [key, entry] : entries_) names.push_back(key);
+  for (const auto& [key, entry] : entries_)
+    if (key != "type") names.push_back(key);
   return names;
 }
 

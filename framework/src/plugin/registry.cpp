@@ -175,7 +175,7 @@ struct Registry::Implementation {
 
   InputError not_made(Kind kind, const PartValues& values, std::string_view reason) const {
     return InputError(
-        values.values.position("type"), values.values.path(),
+        values.values.position(""), values.values.path(),
         fmt::format("{} '{}' of {} cannot be made: {}", name(kind), values.type, owner(kind, values.type).string(), reason));
   }
 

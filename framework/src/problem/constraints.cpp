@@ -17,9 +17,11 @@ double BodyProblem::Constraint::at(const Body& body, std::size_t k, double t) co
 void BodyProblem::read_constraints(bool quasi_static) {
   // A later [[boundary]] governs the components that it prescribes, whatever an earlier one says of them.
   std::vector<std::int32_t> governor(stride() * static_cast<std::size_t>(dimension()), -1);
-  for (const BoundaryDescription& boundary : scene_.boundaries) {
+  for (std::size_t k = 0; k < scene_.boundaries.size(); ++k) {
+    const BoundaryDescription& boundary = scene_.boundaries[k];
     if (boundary.velocity && quasi_static) {
-      throw InputError(boundary.position, "boundary.velocity", "found in a quasi-static run; allowed: displacement");
+      throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
+                       "found in a quasi-static run; allowed: displacement");
     }
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;

@@ -72,7 +72,7 @@ void BodyProblem::read_materials(const PartFactory& factory) {
                                                 : fmt::format("{}, at ({:.6g}, {:.6g}, {:.6g})", error.what(), x[0], x[1], x[2]);
         for (const auto& [key, value] : values)
           if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
-        throw InputError(part.values.position("type"), part.values.path(), text);
+        throw InputError(part.values.position(""), part.values.path(), text);
       }
     };
     const auto count = static_cast<std::size_t>(record.traits.constants);

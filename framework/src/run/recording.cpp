@@ -24,6 +24,28 @@ constexpr std::int64_t default_history_rows = 1000;
 
 bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
+bool ended(const OutputProgress& run, std::int64_t step, double time) {
+  return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
+}
+
+/// What a run that does not go on does to the one whose results the folder holds; empty where it holds none.
+std::string earlier_run(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / "scene.toml")) return {};
+  if (std::filesystem::exists(checkpoint_file(folder))) {
+    try {
+      const Checkpoint checkpoint = read_checkpoint(folder);
+      if (!ended(checkpoint.output, checkpoint.step, checkpoint.time)) {
+        return fmt::format(
+            "warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have "
+            "gone on with it",
+            folder.string(), checkpoint.step, checkpoint.time);
+      }
+    } catch (const InputError&) {  // nothing that could be gone on with
+    }
+  }
+  return fmt::format("replaces the results of an earlier run in {}", folder.string());
+}
+
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.body();
   ReferenceData data;
@@ -90,8 +112,20 @@ void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
   if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml")) check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
+  std::error_code missing;
+  if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
+    throw InputError({scene.file.string()}, "output",
+                     fmt::format("found {}, the folder of the scene itself, whose scene.toml the resolved scene would replace; "
+                                 "allowed: another folder (-o)",
+                                 folder_.string()));
+  }
+  const std::string replaced = start == RunStart::fresh ? earlier_run(folder_) : std::string();
   // Before any other file: no checkpoint may stand beside the frames of another run.
   remove_file(checkpoint_file(folder_));
+  if (!replaced.empty()) {
+    log(replaced);
+    if (show_progress_) fmt::print(stderr, "{}\n", replaced);
+  }
   write_file_atomically(folder_ / "scene.toml", scene.resolved);
 }
 
@@ -125,7 +159,7 @@ void RunRecorder::log(std::string_view message) {
 bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
-  return (done_.steps_expected > 0 && step >= done_.steps_expected) || (done_.end_time > 0 && time >= done_.end_time * (1 - 1e-12));
+  return ended(done_, step, time);
 }
 
 bool RunRecorder::frame_due(std::int64_t step, double time) const {

@@ -39,7 +39,7 @@ void SceneReader::read_boundaries(const toml::table& root) {
     for (const char* key : {"displacement", "velocity"}) {
       if (values.has(key)) description.components = components(values, key);
     }
-    description.position = reader_.position(*boundary);
+    description.position = values.position(description.velocity ? "velocity" : "displacement");
     scene_.boundaries.push_back(std::move(description));
   }
 }
@@ -52,7 +52,7 @@ void SceneReader::read_loads(const toml::table& root) {
     writer_.header("load", true);
     writer_.lines(table, values);
     LoadDescription description;
-    description.position = reader_.position(*load);
+    description.position = values.position("face");
     description.set = set_of(values);
     using Type = LoadDescription::Type;
     for (const auto& [key, type] :
@@ -62,7 +62,7 @@ void SceneReader::read_loads(const toml::table& root) {
       description.components = expressions(values, key, true);
     }
     if (load->contains("traction") && !load->contains("face")) {
-      reader_.errors.add(description.position, path + ".face",
+      reader_.errors.add(reader_.position(*load), path + ".face",
                          "found nothing beside traction; allowed: " + allowed(*table.find("face")));
     }
     if (values.has("face")) {
@@ -120,8 +120,8 @@ void SceneReader::read_history(const toml::table& output) {
     writer_.header("output.history", true);
     writer_.lines(table, values);
     const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
-    HistoryDescription description{text("name"),      set_of(values), text("quantity"),
-                                   text("component"), text("reduce"), reader_.position(*record), {}, {}};
+    HistoryDescription description{
+        text("name"), set_of(values), text("quantity"), text("component"), text("reduce"), values.position("quantity"), {}, {}};
     const auto refuse = [&](const char* key, const std::string& message) {
       reader_.errors.add(values.position(key), join_path(path, key), message);
     };

@@ -148,6 +148,7 @@ std::shared_ptr<const PartValues> TomlReader::part(Kind kind, const std::string&
   values->kind = kind;
   values->type = type;
   values->values = read(table, table.empty() ? at : position(table), part_table(*description, kind, path), path, {"type"});
+  values->values.set("type", type, at);  // no parameter, but a place that refusals of the part itself point at
   return values;
 }
 

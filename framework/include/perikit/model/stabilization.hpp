@@ -30,7 +30,7 @@ class Stabilization {
   virtual ~Stabilization() = default;
   virtual StabilizationTraits traits() const noexcept = 0;
   /// M_i [N/m^7 over the unit of omega], symmetric with the components of inverse_shape, or m_i; positive semi-definite. Asked for at
-  /// set-up, for points with a regular shape tensor; the others carry no penalty. Fully overwritten.
+  /// set-up, for points whose shape tensor has eigenvalues less than a factor of 1000 apart; others carry none. Fully overwritten.
   virtual void penalty(const PenaltyPoint& point, double* M) const noexcept = 0;
 };
 

@@ -2,15 +2,17 @@
 /// The C symbols that every perikit library exports. They are read and compared before any C++ object crosses the boundary.
 ///
 ///   int         perikit_abi_version()     equals PERIKIT_ABI_VERSION
-///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width: see PERIKIT_BUILD_ID
+///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width, hash of the public headers: see PERIKIT_BUILD_ID
 ///   void        perikit_register(void*)   called with a perikit::Registrar*
 ///
 /// PERIKIT_PLUGIN(registrar) { registrar.material({...}, ...); } writes all three.
 
 #include "perikit/core/simd.hpp"
+#include "perikit/plugin/headers_id.hpp"
 #include "perikit/plugin/part.hpp"
 
-/// Raised whenever a public class changes its layout or its virtual functions.
+/// Raised whenever a released public class changes its layout or its virtual functions. Between releases the hash in the build id keeps
+/// libraries of other headers out.
 #define PERIKIT_ABI_VERSION 2
 
 #define PERIKIT_STRINGIFY_(x) #x
@@ -36,7 +38,9 @@
 #define PERIKIT_COMPILER_ID "gcc" PERIKIT_STRINGIFY(__GNUC__)
 #endif
 
-#define PERIKIT_BUILD_ID PERIKIT_COMPILER_ID " " PERIKIT_STDLIB_ID " " PERIKIT_SIMD_ID
+#define PERIKIT_TOOLCHAIN_ID PERIKIT_COMPILER_ID " " PERIKIT_STDLIB_ID " " PERIKIT_SIMD_ID
+/// As in "gcc12 libstdc++-cxx11abi1 simd512 headers-0123456789ab".
+#define PERIKIT_BUILD_ID PERIKIT_TOOLCHAIN_ID " headers-" PERIKIT_HEADERS_ID
 
 #define PERIKIT_EXPORT extern "C" __attribute__((visibility("default")))
 

@@ -60,7 +60,7 @@ struct BoundaryDescription {
   std::string set;
   bool velocity = false;                     ///< else displacement
   std::vector<std::optional<Expression>> components;
-  SourcePosition position;
+  SourcePosition position;                   ///< of the key
 };
 
 struct LoadDescription {
@@ -68,12 +68,12 @@ struct LoadDescription {
   std::string set;
   std::vector<Expression> components;
   std::string face;                          ///< "+x" ... "-z" for traction
-  SourcePosition position;
+  SourcePosition position;                   ///< of it
 };
 
 struct HistoryDescription {
   std::string name, set, quantity, component, reduce;
-  SourcePosition position;
+  SourcePosition position;                   ///< of the quantity
   std::optional<Expression> exact;           ///< with reduce "error"
   std::array<double, 3> at{};                ///< with reduce "fit" [m]
 };

@@ -1,6 +1,7 @@
 #include "engine/assembly/penalty_element.hpp"
 
 #include "engine/family_point.hpp"
+#include "engine/penalty_matrix.hpp"
 
 namespace perikit {
 
@@ -22,6 +23,7 @@ bool PenaltyElement<D>::load(const ModelParts& parts, const PointFamilies& famil
     for (int e = 0; e < D; ++e)
       for (int f = 0; f < D; ++f) S_(e, f) += spring_[k] * family_.xi[e][k] * family_.xi[f][k];
   }
+  if (!penalised(1 / eigenvalue_ratio<D>(S_))) return false;
   const PenaltyPoint point = penalty_point(*parts.body, *parts.laws, families.point(row), intact, families.damage(row),
                                            families.normaliser(row), family_.inverse_shape);
   parts.stabilization->penalty(point, M);

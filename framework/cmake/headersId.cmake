@@ -1,0 +1,16 @@
+# perikit_headers_id(folder variable): what the headers under a folder say to the compiler, as 12 hexadecimal digits. Comments, blank
+# lines and indentation do not count.
+function(perikit_headers_id folder variable)
+  file(GLOB_RECURSE headers RELATIVE ${folder} ${folder}/*.hpp)
+  list(SORT headers)
+  set(code "")
+  foreach(header IN LISTS headers)
+    file(READ ${folder}/${header} text)
+    string(REGEX REPLACE "//[^\n]*" "" text "${text}")
+    string(REGEX REPLACE "[ \t]*\n[ \t\n]*" "\n" text "${text}")
+    string(APPEND code "${header}\n${text}\n")
+  endforeach()
+  string(SHA256 hash "${code}")
+  string(SUBSTRING ${hash} 0 12 hash)
+  set(${variable} ${hash} PARENT_SCOPE)
+endfunction()
