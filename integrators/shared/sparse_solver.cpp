@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "free_matrix.hpp"
-#include "perikit/core/memory.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
@@ -62,9 +61,9 @@ struct SparseSolver::Implementation {
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   void *symbolic = nullptr, *numeric = nullptr;
   bool analysed = false, definite = false, ready = false;
-  double entries = 0;
+  double entries = 0, limit;
 
-  Implementation() {
+  explicit Implementation(double memory) : limit(memory) {
     if (openblas_set_num_threads) openblas_set_num_threads(1);
     cholmod_l_start(&common);
     common.print = 0;
@@ -117,7 +116,7 @@ struct SparseSolver::Implementation {
 
   /// Memory that a system promises and does not have ends a program without a word: the factor is refused while it is a pattern.
   bool affordable(std::string& failure) const {
-    const double numbers = cholesky->is_super ? static_cast<double>(cholesky->xsize) : common.lnz, limit = memory_limit();
+    const double numbers = cholesky->is_super ? static_cast<double>(cholesky->xsize) : common.lnz;
     if (numbers * sizeof(double) <= limit) return true;
     failure = fmt::format("the Cholesky factor of {} unknowns needs {:.3g} GB; this machine offers {:.3g} GB", free.unknowns(),
                           numbers * sizeof(double) / 1e9, limit / 1e9);
@@ -158,7 +157,7 @@ struct SparseSolver::Implementation {
   }
 };
 
-SparseSolver::SparseSolver() : implementation_(std::make_unique<Implementation>()) {}
+SparseSolver::SparseSolver(double memory) : implementation_(std::make_unique<Implementation>(memory)) {}
 SparseSolver::~SparseSolver() = default;
 
 bool SparseSolver::factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure) {

@@ -7,6 +7,7 @@
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/field.hpp"
+#include "perikit/core/memory.hpp"
 
 namespace perikit {
 
@@ -15,7 +16,8 @@ namespace perikit {
 /// points, once for all matrices of the same pattern and mask. BLAS runs on one thread, so that results do not depend on threads.
 class SparseSolver {
  public:
-  SparseSolver();
+  /// Factors that need more than `memory` bytes are refused while they are patterns.
+  explicit SparseSolver(double memory = memory_limit());
   ~SparseSolver();
   SparseSolver(const SparseSolver&) = delete;
   SparseSolver& operator=(const SparseSolver&) = delete;
