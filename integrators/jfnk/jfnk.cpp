@@ -6,13 +6,18 @@
 #include <cmath>
 #include <limits>
 
+#include "../shared/assembled_tangent.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
 
 KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<Preconditioner> preconditioner)
-    : problem_(problem), options_(options), preconditioner_(std::move(preconditioner)), right_(problem.make_field(problem.dimension())),
-      u_(problem.make_field(problem.dimension())), right_vector_(wrap(problem, right_, context_)) {
+    : problem_(problem),
+      options_(options),
+      preconditioner_(std::move(preconditioner)),
+      right_(problem.make_field(problem.dimension())),
+      u_(problem.make_field(problem.dimension())),
+      right_vector_(wrap(problem, right_, context_)) {
   if (options.differences) {
     moved_ = problem.make_field(problem.dimension());
     force_ = problem.make_field(problem.dimension());
@@ -20,7 +25,6 @@ KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, s
   // Preconditioned from the right: GMRES then watches the true residual.
   gmres_.reset(SUNLinSol_SPGMR(right_vector_.get(), preconditioner_ ? SUN_PREC_RIGHT : SUN_PREC_NONE, options.restart, context_));
   if (!gmres_) throw RunError("SUNDIALS gives no GMRES solver: not enough memory?");
-  SUNLinSol_SPGMRSetMaxRestarts(gmres_.get(), options.max_restarts);
   SUNLinSolSetATimes(gmres_.get(), this, multiply);
   if (preconditioner_) SUNLinSolSetPreconditioner(gmres_.get(), this, nullptr, precondition);
   SUNLinSolInitialize(gmres_.get());
@@ -39,7 +43,8 @@ bool KrylovEquations::apply(Equilibrium& equilibrium, ConstFieldView w, FieldVie
 }
 
 bool KrylovEquations::difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
-  // P 3.73-3.74: K w = -(f(u + eps w) - f(u - eps w))/(2 eps); eps w moves points by the cube root of the rounding unit times the spacing.
+  // P 3.73-3.74: K w = -(f(u + eps w) - f(u - eps w))/(2 eps); eps w moves points by the cube root of the rounding unit times the
+  // spacing.
   const double largest = largest_magnitude(w);
   if (largest == 0) {
     fill(0.0, Kw);
@@ -69,23 +74,45 @@ int KrylovEquations::precondition(void* self, N_Vector r, N_Vector z, realtype, 
   return 0;
 }
 
-bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) {
-  equilibrium_ = &equilibrium;
+bool KrylovEquations::iterate(ConstFieldView rhs, double accuracy, int max_restarts, FieldView du, std::string& note) {
   failure_.clear();
+  fill(0.0, du);
   copy(rhs, right_);
   const double size = norm(rhs);
   const FieldVector solution = wrap(problem_, du, context_);
+  SUNLinSol_SPGMRSetMaxRestarts(gmres_.get(), max_restarts);
   SUNLinSolSetZeroGuess(gmres_.get(), SUNTRUE);
   SUNLinSolSetup(gmres_.get(), nullptr);
   const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution.get(), right_vector_.get(), accuracy * size);
-  const int iterations = SUNLinSolNumIters(gmres_.get());
-  const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
-  if (preconditioner_) preconditioner_->took(iterations, reached);
-  note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
+  iterations_ = SUNLinSolNumIters(gmres_.get());
+  reached_ = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
+  note += fmt::format("  gmres {:4} to {:.1e}", iterations_, reached_);
   // A direction that was not solved to the accuracy asked for is still one that lowers the residual.
-  if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;
+  return flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached_ < 0.9);
+}
+
+bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
+                            std::string& failure) {
+  equilibrium_ = &equilibrium;
+  // Where the tangent is indefinite far from equilibrium, GMRES takes long, or finds a direction that leads uphill.
+  const bool doubtful = preconditioner_ && preconditioner_->tangent() && far_from(equilibrium) && !problem_.constant_stiffness();
+  bool convex = preconditioner_ && preconditioner_->convex();
+  bool solved = !convex && iterate(rhs, accuracy, doubtful ? 0 : options_.max_restarts, du, note);
+  if (doubtful && !convex && (!solved || reached_ > accuracy || dot(du, rhs) <= 0)) {
+    if (!preconditioner_->renew(equilibrium, u_, failure)) return false;
+    convex = preconditioner_->convex();
+    if (!convex) solved = iterate(rhs, accuracy, options_.max_restarts, du, note);
+  }
+  if (convex) {
+    preconditioner_->apply(rhs, du);
+    note += "  tangent made convex";
+    return true;
+  }
+  if (preconditioner_) preconditioner_->took(iterations_, reached_);
+  if (solved) return true;
   failure = !failure_.empty() ? failure_
-                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})", reached, iterations, options_.restart);
+                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})",
+                                            reached_, iterations_, options_.restart);
   return false;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-#include <memory>
-
 #include <sundials/sundials_linearsolver.h>
+
+#include <memory>
 
 #include "../shared/field_vector.hpp"
 #include "../shared/preconditioner.hpp"
@@ -11,9 +11,9 @@ namespace perikit {
 
 struct JfnkOptions {
   LoadStepOptions load_steps;
-  bool differences = false;          ///< tangent by central differences instead of exactly
+  bool differences = false;  ///< tangent by central differences instead of exactly
   std::string preconditioner = "auto";
-  int restart = 60;                  ///< Krylov vectors before GMRES restarts
+  int restart = 60;  ///< Krylov vectors before GMRES restarts
   int max_restarts = 20;
   bool line_search = true;
 };
@@ -24,7 +24,8 @@ class KrylovEquations final : public LinearisedProblem {
   KrylovEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<Preconditioner> preconditioner);
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
   bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
-  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) override;
+  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
+             std::string& failure) override;
   bool exact() const noexcept override { return false; }
   void bonds_changed() override {
     if (preconditioner_) preconditioner_->discard();
@@ -36,6 +37,8 @@ class KrylovEquations final : public LinearisedProblem {
   };
   static int multiply(void* self, N_Vector w, N_Vector Kw);
   static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
+  /// One run of GMRES on the exact tangent. False where it fails; failure_ then says why, if it knows.
+  bool iterate(ConstFieldView rhs, double accuracy, int max_restarts, FieldView du, std::string& note);
   bool difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure);
 
   Problem& problem_;
@@ -45,7 +48,9 @@ class KrylovEquations final : public LinearisedProblem {
   Field right_, u_, moved_, force_;
   FieldVector right_vector_;
   std::unique_ptr<_generic_SUNLinearSolver, SolverDeleter> gmres_;
-  Equilibrium* equilibrium_ = nullptr;   ///< of the solve in progress
+  Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
+  int iterations_ = 0;                  ///< of the last run of GMRES
+  double reached_ = 0;                  ///< linear residual over the right-hand side after it
   std::string failure_;
 };
 

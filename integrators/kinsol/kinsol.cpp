@@ -12,6 +12,7 @@
 #include <cmath>
 #include <utility>
 
+#include "../shared/assembled_tangent.hpp"
 #include "flags.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/sdk/eigenvalue.hpp"
@@ -43,21 +44,30 @@ void check(int flag, const char* what) {
 }  // namespace
 
 KinsolSolver::KinsolSolver(Problem& problem, const KinsolOptions& options, std::unique_ptr<Preconditioner> preconditioner)
-    : options_(options), strategy_(strategy_number(options.strategy)), start_(problem.make_field(problem.dimension())),
-      displacement_scale_(problem.make_field(problem.dimension())), force_scale_(problem.make_field(problem.dimension())),
-      preconditioner_(std::move(preconditioner)), template_(wrap(problem, start_, context_)), displacement_scale_vector_(wrap(problem, displacement_scale_, context_)),
+    : options_(options),
+      strategy_(strategy_number(options.strategy)),
+      start_(problem.make_field(problem.dimension())),
+      displacement_scale_(problem.make_field(problem.dimension())),
+      force_scale_(problem.make_field(problem.dimension())),
+      preconditioner_(std::move(preconditioner)),
+      template_(wrap(problem, start_, context_)),
+      displacement_scale_vector_(wrap(problem, displacement_scale_, context_)),
       force_scale_vector_(wrap(problem, force_scale_, context_)) {
   memory_ = KINCreate(context_);
   if (!memory_) throw RunError("kinsol: not enough memory");
-  KINSetErrHandlerFn(memory_, [](int, const char*, const char*, char*, void*) {}, nullptr);
+  KINSetErrHandlerFn(
+      memory_, [](int, const char*, const char*, char*, void*) {}, nullptr);
   check(KINSetUserData(memory_, this), "the problem");
   // The depth must stand before KINInit, and below the number of iterations.
-  if (fixed_point() || picard()) check(KINSetMAA(memory_, std::min(options.anderson, options.load_steps.max_iterations - 1)), "anderson");
+  if (fixed_point() || picard())
+    check(KINSetMAA(memory_, std::min(options.anderson, options.load_steps.max_iterations - 1)), "anderson");
   check(KINSetNumMaxIters(memory_, options.load_steps.max_iterations), "max_iterations");
   check(KINInit(memory_, system_function, template_.get()), "the system");
   if (fixed_point()) return;
-  if (options.linear_solver == "klu") create_direct_solver(problem);
-  else create_krylov_solver();
+  if (options.linear_solver == "klu")
+    create_direct_solver(problem);
+  else
+    create_krylov_solver();
   // The tangent, or the question whether the preconditioner still serves, at every iteration.
   check(KINSetMaxSetupCalls(memory_, 1), "the renewal of the tangent");
 }
@@ -92,6 +102,12 @@ void KinsolSolver::create_direct_solver(Problem& problem) {
   matrix_ = std::make_unique<TangentMatrix>(problem, context_);
   linear_.reset(SUNLinSol_KLU(template_.get(), matrix_->get(), context_));
   if (!linear_) throw RunError("kinsol: KLU cannot be set up: not enough memory?");
+  // The tangent is symmetric in structure and irreducible: KLU's own orderings, for circuits, fill it up.
+  sun_klu_common* common = SUNLinSol_KLUGetCommon(linear_.get());
+  common->btf = 0;
+  common->ordering = 3;  // by the function
+  common->user_order = [](SuiteSparse_long n, SuiteSparse_long* first, SuiteSparse_long* row, SuiteSparse_long* order,
+                          sun_klu_common*) -> SuiteSparse_long { return find_elimination_order(n, first, row, order) ? 1 : 0; };
   check(KINSetLinearSolver(memory_, linear_.get(), matrix_->get()), "the linear solver");
   check(KINSetJacFn(memory_, assemble), "the tangent");
 }
@@ -101,13 +117,15 @@ int KinsolSolver::system_function(N_Vector u, N_Vector value, void* self) {
   return guarded(solver.thrown_, [&] {
     Equilibrium& equilibrium = *solver.equilibrium_;
     const FieldView to = field_of(value);
-    if (!equilibrium.residual(field_of(u), to)) return 1;   // KINSOL tries shorter steps
+    if (!equilibrium.residual(field_of(u), to)) return 1;  // KINSOL tries shorter steps
     ++solver.evaluations_;
     if (!solver.fixed_point() || solver.evaluations_ % 100 == 1) {
       equilibrium.note(fmt::format("  evaluation {:5}  residual {:.3e}", solver.evaluations_, equilibrium.relative_residual()));
     }
-    if (solver.fixed_point()) combine(1, field_of(u), 1 / solver.mass_, to, to);   // G(u) = u + r/m
-    else combine(-1, to, 0, to, to);
+    if (solver.fixed_point())
+      combine(1, field_of(u), 1 / solver.mass_, to, to);  // G(u) = u + r/m
+    else
+      combine(-1, to, 0, to, to);
     return 0;
   });
 }
@@ -115,14 +133,27 @@ int KinsolSolver::system_function(N_Vector u, N_Vector value, void* self) {
 int KinsolSolver::tangent_action(N_Vector w, N_Vector Kw, N_Vector u, booleantype*, void* self) {
   auto& solver = *static_cast<KinsolSolver*>(self);
   return guarded(solver.thrown_, [&] {
-    return solver.equilibrium_->tangent(solver.linearisation_point(u), field_of(w), field_of(Kw)) ? 0 : 1;
+    Equilibrium& equilibrium = *solver.equilibrium_;
+    const Preconditioner* preconditioner = solver.preconditioner_.get();
+    if (!preconditioner || !preconditioner->convex())
+      return equilibrium.tangent(solver.linearisation_point(u), field_of(w), field_of(Kw)) ? 0 : 1;
+    preconditioner->tangent()->multiply(equilibrium.free(), field_of(w), field_of(Kw));
+    return 0;
   });
 }
 
 int KinsolSolver::set_up_preconditioner(N_Vector u, N_Vector, N_Vector, N_Vector, void* self) {
   auto& solver = *static_cast<KinsolSolver*>(self);
   return guarded(solver.thrown_, [&] {
-    return solver.preconditioner_->prepare(*solver.equilibrium_, solver.linearisation_point(u), solver.callback_failure_) ? 0 : 1;
+    solver.report_linear_iterations();
+    Preconditioner& preconditioner = *solver.preconditioner_;
+    // KINSOL cannot be told to solve once more: what could be indefinite is looked at before.
+    const bool anew = preconditioner.tangent() && far_from(*solver.equilibrium_);
+    const ConstFieldView at = solver.linearisation_point(u);
+    return (anew ? preconditioner.renew(*solver.equilibrium_, at, solver.callback_failure_)
+                 : preconditioner.prepare(*solver.equilibrium_, at, solver.callback_failure_))
+               ? 0
+               : 1;
   });
 }
 
@@ -137,19 +168,53 @@ int KinsolSolver::precondition(N_Vector, N_Vector, N_Vector, N_Vector, N_Vector 
 int KinsolSolver::assemble(N_Vector u, N_Vector, SUNMatrix, void* self, N_Vector, N_Vector) {
   auto& solver = *static_cast<KinsolSolver*>(self);
   return guarded(solver.thrown_, [&] {
-    return solver.matrix_->assemble(solver.equilibrium_->problem(), solver.linearisation_point(u), solver.callback_failure_) ? 0 : 1;
+    return solver.matrix_->assemble(*solver.equilibrium_, solver.linearisation_point(u), solver.callback_failure_) ? 0 : 1;
   });
+}
+
+void KinsolSolver::report_linear_iterations() {
+  long all = 0;
+  KINGetNumLinIters(memory_, &all);
+  // KINSOL asks for alike accuracies from solve to solve: counted as a digit each.
+  if (all > linear_iterations_) preconditioner_->took(static_cast<int>(all - linear_iterations_), 0.1);
+  linear_iterations_ = all;
+}
+
+bool KinsolSolver::predict(Equilibrium& equilibrium, bool extrapolated, std::string& failure) {
+  PreconditionerAction action;
+  const ConstFieldView u = equilibrium.displacement();
+  if (!extrapolated && (preconditioner_ || matrix_)) {
+    // Made at the start as it is: that is where the tangent of the prediction is taken.
+    Field r = equilibrium.problem().make_field(equilibrium.problem().dimension());
+    if (!equilibrium.residual(u, r)) {
+      failure = equilibrium.failure();
+      return false;
+    }
+    if (preconditioner_ ? !preconditioner_->prepare(equilibrium, u, failure)
+                        : !matrix_->tangent().make(equilibrium, u, true, failure))
+      return false;
+    action = [this](ConstFieldView from, FieldView to) {
+      if (preconditioner_)
+        preconditioner_->apply(from, to);
+      else
+        matrix_->tangent().solve(from, to);
+    };
+  }
+  if (predict_by_tangent(equilibrium, extrapolated, action)) return true;
+  failure = equilibrium.failure();
+  return false;
 }
 
 int KinsolSolver::run_once(Equilibrium& equilibrium, double target, Solution& solution) {
   check(KINSetFuncNormTol(memory_, target), "tolerance");
   const FieldVector u = wrap(equilibrium.problem(), equilibrium.displacement(), context_);
+  linear_iterations_ = 0;  // KINSOL counts anew
   const int flag = KINSol(memory_, u.get(), strategy_, displacement_scale_vector_.get(), force_scale_vector_.get());
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   long iterations = 0, linear = 0;
   KINGetNumNonlinSolvIters(memory_, &iterations);
   if (linear_ && !matrix_) KINGetNumLinIters(memory_, &linear);
-  if (preconditioner_ && iterations > 0) preconditioner_->took(static_cast<int>(linear / iterations), 0.1);   // alike from solve to solve: counted as a digit each
+  if (preconditioner_) report_linear_iterations();
   solution.iterations += static_cast<int>(iterations);
   equilibrium.note(fmt::format("  {} iterations{}", iterations, linear > 0 ? fmt::format(", {} linear ones", linear) : ""));
   return flag;
@@ -162,10 +227,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   callback_failure_.clear();
   Problem& problem = equilibrium.problem();
   const FieldView u = equilibrium.displacement();
-  if (!predict_by_tangent(equilibrium, extrapolated)) {
-    solution.failure = equilibrium.failure();
-    return solution;
-  }
+  if (!predict(equilibrium, extrapolated, solution.failure)) return solution;
   copy(u, start_);
   Field r = problem.make_field(problem.dimension());
   const auto evaluate = [&] {
@@ -188,10 +250,12 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   const double free_components = std::sqrt(std::max(1.0, dot(equilibrium.free(), equilibrium.free())));
   check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.spacing())), "the largest step");
   check(KINSetScaledStepTol(memory_, 1e-15), "the smallest step");
-  // Reactions, and with them the reference, change on the way: the target is set anew until the equilibrium itself says that it is met.
+  // Reactions, and with them the reference, change on the way: the target is set anew until the equilibrium itself says that it
+  // is met.
   double strictness = 1;
   for (int attempt = 0; attempt < 5 && !equilibrium.converged(); ++attempt, strictness /= 4) {
-    const int flag = run_once(equilibrium, strictness * equilibrium.tolerance() * equilibrium.reference() / free_components, solution);
+    const int flag =
+        run_once(equilibrium, strictness * equilibrium.tolerance() * equilibrium.reference() / free_components, solution);
     if (flag < 0) {
       solution.failure = callback_failure_.empty() ? kinsol_flag_meaning(flag) : callback_failure_;
       // The state is kept where the norm that counts is met after all.
@@ -206,7 +270,8 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   }
   solution.converged = equilibrium.converged();
   if (!solution.converged && solution.failure.empty()) {
-    solution.failure = fmt::format("KINSOL leaves a residual of {:.3g} (tolerance {:.3g})", equilibrium.relative_residual(), equilibrium.tolerance());
+    solution.failure = fmt::format("KINSOL leaves a residual of {:.3g} (tolerance {:.3g})", equilibrium.relative_residual(),
+                                   equilibrium.tolerance());
   }
   return solution;
 }

@@ -1,9 +1,9 @@
 #pragma once
+#include <sundials/sundials_linearsolver.h>
+
 #include <exception>
 #include <memory>
 #include <string>
-
-#include <sundials/sundials_linearsolver.h>
 
 #include "../shared/field_vector.hpp"
 #include "../shared/preconditioner.hpp"
@@ -14,12 +14,12 @@ namespace perikit {
 
 struct KinsolOptions {
   LoadStepOptions load_steps;
-  std::string strategy = "linesearch";    ///< none, linesearch, picard, fixed_point
-  std::string linear_solver = "spgmr";    ///< spgmr, spfgmr, spbcgs, sptfqmr, klu
-  std::string preconditioner = "auto";    ///< of the Krylov solvers
-  int restart = 60;                       ///< Krylov vectors of spgmr and spfgmr
+  std::string strategy = "linesearch";  ///< none, linesearch, picard, fixed_point
+  std::string linear_solver = "spgmr";  ///< spgmr, spfgmr, spbcgs, sptfqmr, klu
+  std::string preconditioner = "auto";  ///< of the Krylov solvers
+  int restart = 60;                     ///< Krylov vectors of spgmr and spfgmr
   int max_restarts = 20;
-  std::int64_t anderson = 10;             ///< depth of Anderson acceleration
+  std::int64_t anderson = 10;  ///< depth of Anderson acceleration
 };
 
 /// One equilibrium by KINSOL: F(u) = -r(u), whose Jacobian is the stiffness; prescribed components have F = 0 and never move.
@@ -46,6 +46,10 @@ class KinsolSolver final : public EquilibriumSolver {
   static int assemble(N_Vector u, N_Vector value, SUNMatrix K, void* self, N_Vector, N_Vector);
   void create_krylov_solver();
   void create_direct_solver(Problem& problem);
+  /// Start values of a step, by the tangent where they are not extrapolated.
+  bool predict(Equilibrium& equilibrium, bool extrapolated, std::string& failure);
+  /// Tells the preconditioner how many iterations the last linear solve took.
+  void report_linear_iterations();
   /// Where the linear operator is taken: at u, for Picard at the start of the step.
   ConstFieldView linearisation_point(N_Vector u) const { return picard() ? ConstFieldView(start_) : ConstFieldView(field_of(u)); }
   /// Runs KINSol from the present state to a largest component of `target` [N]; returns its flag.
@@ -58,14 +62,15 @@ class KinsolSolver final : public EquilibriumSolver {
   SundialsContext context_;
   Field start_, displacement_scale_, force_scale_, eigenvector_;
   std::unique_ptr<Preconditioner> preconditioner_;
-  std::unique_ptr<TangentMatrix> matrix_;   ///< klu only
+  std::unique_ptr<TangentMatrix> matrix_;  ///< klu only
   FieldVector template_, displacement_scale_vector_, force_scale_vector_;
   std::unique_ptr<_generic_SUNLinearSolver, SolverDeleter> linear_;
   void* memory_ = nullptr;
-  Equilibrium* equilibrium_ = nullptr;   ///< of the solve in progress
-  double mass_ = 0;                      ///< m of the fixed-point map u + r/m [N/m]
+  Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
+  double mass_ = 0;                     ///< m of the fixed-point map u + r/m [N/m]
   std::int64_t evaluations_ = 0;
-  std::string callback_failure_;         ///< why a callback gave up
+  long linear_iterations_ = 0;    ///< of the run of KINSOL in progress, as far as reported
+  std::string callback_failure_;  ///< why a callback gave up
   std::exception_ptr thrown_;
 };
 

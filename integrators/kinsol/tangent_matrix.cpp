@@ -7,10 +7,11 @@ namespace perikit {
 TangentMatrix::TangentMatrix(Problem& problem, SUNContext context) {
   // The pattern does not depend on the state.
   const Field rest = problem.make_field(problem.dimension());
-  if (!problem.assemble_tangent(rest, tangent_).ok()) throw RunError("kinsol: the tangent of the undeformed body cannot be assembled");
+  BlockMatrix K;
+  if (!problem.assemble_tangent(rest, K).ok()) throw RunError("kinsol: the tangent of the undeformed body cannot be assembled");
   const ConstFieldView mask = problem.free_mask();
-  free_ = FreeMatrix(tangent_, mask);
-  free_.pattern(tangent_, false, first_, row_);
+  free_ = FreeMatrix(K, mask);
+  free_.pattern(K, false, first_, row_);
   unknown_at_.assign(mask.size(), -1);
   for (std::size_t k = 0; k < free_.unknowns(); ++k) unknown_at_[free_.place(k)] = static_cast<FreeMatrix::Index>(k);
   const auto n = static_cast<sunindextype>(mask.size());
@@ -18,15 +19,13 @@ TangentMatrix::TangentMatrix(Problem& problem, SUNContext context) {
   if (!matrix_) throw RunError("kinsol: not enough memory for the assembled tangent");
 }
 
-TangentMatrix::~TangentMatrix() { SUNMatDestroy(matrix_); }
+TangentMatrix::~TangentMatrix() {
+  SUNMatDestroy(matrix_);
+}
 
-bool TangentMatrix::assemble(Problem& problem, ConstFieldView u, std::string& failure) {
-  const EvaluationStatus status = problem.assemble_tangent(u, tangent_);
-  if (!status.ok()) {
-    failure = status.description;
-    return false;
-  }
-  free_.values(tangent_, false, first_, value_);
+bool TangentMatrix::assemble(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  if (!tangent_.assemble(equilibrium, u, true, failure)) return false;
+  free_.values(tangent_.matrix(), false, first_, value_);
   sunindextype* pointers = SUNSparseMatrix_IndexPointers(matrix_);
   sunindextype* rows = SUNSparseMatrix_IndexValues(matrix_);
   double* values = SUNSparseMatrix_Data(matrix_);
@@ -39,7 +38,8 @@ bool TangentMatrix::assemble(Problem& problem, ConstFieldView u, std::string& fa
       values[at++] = 1.0;
       continue;
     }
-    for (auto k = static_cast<std::size_t>(first_[static_cast<std::size_t>(unknown)]); k < static_cast<std::size_t>(first_[static_cast<std::size_t>(unknown) + 1]); ++k) {
+    for (auto k = static_cast<std::size_t>(first_[static_cast<std::size_t>(unknown)]);
+         k < static_cast<std::size_t>(first_[static_cast<std::size_t>(unknown) + 1]); ++k) {
       rows[at] = static_cast<sunindextype>(free_.place(static_cast<std::size_t>(row_[k])));
       values[at++] = value_[k];
     }

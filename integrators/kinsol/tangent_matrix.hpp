@@ -1,11 +1,11 @@
 #pragma once
+#include <sundials/sundials_matrix.h>
+
 #include <string>
 #include <vector>
 
-#include <sundials/sundials_matrix.h>
-
+#include "../shared/assembled_tangent.hpp"
 #include "../shared/free_matrix.hpp"
-#include "perikit/problem/integrator.hpp"
 
 namespace perikit {
 
@@ -18,13 +18,15 @@ class TangentMatrix {
   TangentMatrix& operator=(const TangentMatrix&) = delete;
 
   SUNMatrix get() const noexcept { return matrix_; }
-  /// Writes pattern and values at u. False where u is inadmissible; `failure` says why.
-  bool assemble(Problem& problem, ConstFieldView u, std::string& failure);
+  /// Writes pattern and values at u, of a convex tangent where AssembledTangent says so. False where u is inadmissible; `failure`
+  /// says why.
+  bool assemble(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
+  AssembledTangent& tangent() noexcept { return tangent_; }
 
  private:
-  BlockMatrix tangent_;
+  AssembledTangent tangent_;
   FreeMatrix free_;
-  std::vector<FreeMatrix::Index> first_, row_, unknown_at_;   ///< of the free part; unknown of a field component or -1
+  std::vector<FreeMatrix::Index> first_, row_, unknown_at_;  ///< of the free part; unknown of a field component or -1
   std::vector<double> value_;
   SUNMatrix matrix_ = nullptr;
 };

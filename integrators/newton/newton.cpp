@@ -7,28 +7,15 @@
 
 namespace perikit {
 
-bool FactorisedEquations::assemble(Equilibrium& equilibrium, bool convex, std::string& failure) {
-  tangent_.convex = convex;
-  const EvaluationStatus status = equilibrium.problem().assemble_tangent(u_, tangent_);
-  if (status.ok()) return true;
-  failure = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
-  return false;
-}
-
 bool FactorisedEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   u_ = u;
-  convex_ = false;
-  if (equilibrium.problem().constant_stiffness() && solver_.factorised()) return true;
-  const bool first = solver_.unknowns() == 0;
-  if (!assemble(equilibrium, false, failure)) return false;
-  if (!solver_.factorise_definite(tangent_, equilibrium.free(), failure)) {
-    if (!failure.empty()) return false;
-    convex_ = tangent_.symmetric && equilibrium.relative_residual() > far;
-    if (convex_ && !assemble(equilibrium, true, failure)) return false;
-    if (!solver_.factorise(tangent_, equilibrium.free(), failure)) return false;
-  }
+  const SparseSolver& factors = tangent_.factors();
+  if (equilibrium.problem().constant_stiffness() && factors.factorised()) return true;
+  const bool first = factors.unknowns() == 0;
+  if (!tangent_.make(equilibrium, u, true, failure)) return false;
   if (first) {
-    equilibrium.note(fmt::format("  tangent: {} unknowns, {:.3g} numbers, {:.3g} in its factors", solver_.unknowns(), static_cast<double>(tangent_.values.size()), solver_.factor_entries()));
+    equilibrium.note(fmt::format("  tangent: {} unknowns, {:.3g} numbers, {:.3g} in its factors", factors.unknowns(),
+                                 static_cast<double>(tangent_.matrix().values.size()), factors.factor_entries()));
   }
   return true;
 }
@@ -40,19 +27,22 @@ bool FactorisedEquations::apply(Equilibrium& equilibrium, ConstFieldView w, Fiel
 }
 
 bool FactorisedEquations::solve(Equilibrium&, ConstFieldView rhs, double, FieldView du, std::string& note, std::string&) {
-  solver_.solve(rhs, du);
+  tangent_.solve(rhs, du);
   // Past a bifurcation or a limit point equilibria are unstable: worth knowing, and no reason to stop.
-  if (convex_) note += "  tangent made convex";
-  else if (tangent_.symmetric && !solver_.positive_definite()) note += "  tangent not positive definite";
+  if (tangent_.convex())
+    note += "  tangent made convex";
+  else if (tangent_.matrix().symmetric && !tangent_.factors().positive_definite())
+    note += "  tangent not positive definite";
   return true;
 }
 
 void Newton::run(Problem& problem, Observer& observer) {
   const AssembledSize size = problem.assembled_size();
   if (const double bytes = static_cast<double>(size.bytes), limit = memory_limit(); bytes > limit) {
-    throw RunError(fmt::format("newton: the assembled tangent of {} blocks needs {:.3g} GB before it is factorised; "
-                               "this machine offers {:.3g} GB; jfnk solves the same problem without it",
-                               size.blocks, bytes / 1e9, limit / 1e9));
+    throw RunError(
+        fmt::format("newton: the assembled tangent of {} blocks needs {:.3g} GB before it is factorised; "
+                    "this machine offers {:.3g} GB; jfnk solves the same problem without it",
+                    size.blocks, bytes / 1e9, limit / 1e9));
   }
   FactorisedEquations equations;
   NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);

@@ -1,5 +1,5 @@
 #pragma once
-#include "../shared/sparse_solver.hpp"
+#include "../shared/assembled_tangent.hpp"
 #include "perikit/sdk/newton_iteration.hpp"
 
 namespace perikit {
@@ -14,17 +14,13 @@ class FactorisedEquations final : public LinearisedProblem {
  public:
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
   bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
-  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) override;
+  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
+             std::string& failure) override;
   bool exact() const noexcept override { return true; }
 
  private:
-  static constexpr double far = 1e-3;   ///< residuals above it are not yet those of an equilibrium
-  bool assemble(Equilibrium& equilibrium, bool convex, std::string& failure);
-
-  BlockMatrix tangent_;
-  SparseSolver solver_;
-  ConstFieldView u_;      ///< where the equations are linearised
-  bool convex_ = false;   ///< without the negative curvatures of evaluation points
+  AssembledTangent tangent_;
+  ConstFieldView u_;  ///< where the equations are linearised
 };
 
 /// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.

@@ -3,45 +3,33 @@
 #include <algorithm>
 #include <cmath>
 
+#include "assembled_tangent.hpp"
+#include "multigrid.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
-#include "multigrid.hpp"
-#include "sparse_solver.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// Made of the assembled tangent.
-class FromTangent : public Preconditioner {
- protected:
-  using Preconditioner::Preconditioner;
-  virtual bool make(const BlockMatrix& K, ConstFieldView free, std::string& failure) = 0;
-
- private:
-  bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string& failure) final {
-    const EvaluationStatus status = problem.assemble_tangent(u, tangent_);
-    if (!status.ok()) failure = status.description;
-    return status.ok() && make(tangent_, free, failure);
-  }
-  BlockMatrix tangent_;
-};
-
-class Factorisation final : public FromTangent {
+class Factorisation final : public Preconditioner {
  public:
-  explicit Factorisation(Problem& problem) : FromTangent(problem) {}
-  void apply(ConstFieldView r, FieldView z) override { solver_.solve(r, z); }
+  explicit Factorisation(Problem& problem) : Preconditioner(problem) {}
+  void apply(ConstFieldView r, FieldView z) override { tangent_.solve(r, z); }
+  const AssembledTangent* tangent() const noexcept override { return &tangent_; }
 
  private:
-  bool make(const BlockMatrix& K, ConstFieldView free, std::string& failure) override { return solver_.factorise(K, free, failure); }
-  SparseSolver solver_;
+  bool make(Equilibrium& equilibrium, ConstFieldView u, bool kept, std::string& failure) override {
+    return tangent_.make(equilibrium, u, !kept, failure);
+  }
+  AssembledTangent tangent_;
 };
 
 /// Inverses of the diagonal blocks, prescribed components left out.
-class BlockJacobi final : public FromTangent {
+class BlockJacobi final : public Preconditioner {
  public:
-  explicit BlockJacobi(Problem& problem) : FromTangent(problem) {}
+  explicit BlockJacobi(Problem& problem) : Preconditioner(problem) {}
 
   void apply(ConstFieldView r, FieldView z) override {
     if (z.data != r.data) fill(0.0, z);
@@ -56,7 +44,10 @@ class BlockJacobi final : public FromTangent {
   }
 
  private:
-  bool make(const BlockMatrix& K, ConstFieldView free, std::string&) override {
+  bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string& failure) override {
+    if (!tangent_.assemble(equilibrium, u, false, failure)) return false;
+    const BlockMatrix& K = tangent_.matrix();
+    const ConstFieldView free = equilibrium.free();
     d_ = K.dimension;
     point_ = K.point;
     const auto size = static_cast<std::size_t>(d_ * d_);
@@ -64,13 +55,14 @@ class BlockJacobi final : public FromTangent {
     parallel_for(K.rows(), [&](std::size_t row) {
       const auto begin = K.column.begin() + K.row_first[row], end = K.column.begin() + K.row_first[row + 1];
       const std::int64_t block = std::lower_bound(begin, end, static_cast<std::int32_t>(row)) - K.column.begin();
-      invert(&K.values[static_cast<std::size_t>(block) * size], free, static_cast<std::size_t>(point_[row]), &inverse_[row * size]);
+      invert(&K.values[static_cast<std::size_t>(block) * size], free, static_cast<std::size_t>(point_[row]),
+             &inverse_[row * size]);
     });
     return true;
   }
 
-  /// Gauss-Jordan elimination over the free components; rows and columns of the others are 0. A vanishing pivot (nothing holds the
-  /// point) counts as free of stiffness: its inverse is 0.
+  /// Gauss-Jordan elimination over the free components; rows and columns of the others are 0. A vanishing pivot (nothing holds
+  /// the point) counts as free of stiffness: its inverse is 0.
   void invert(const double* block, ConstFieldView free, std::size_t p, double* inverse) const {
     double a[3][6] = {};
     double largest = 0;
@@ -97,6 +89,7 @@ class BlockJacobi final : public FromTangent {
       for (int j = 0; j < d_; ++j) inverse[i * d_ + j] = kept[i] && kept[j] ? a[i][d_ + j] : 0.0;
   }
 
+  AssembledTangent tangent_;
   int d_ = 0;
   std::vector<std::int32_t> point_;
   std::vector<double> inverse_;
@@ -109,12 +102,12 @@ class CompanionCycle final : public Preconditioner {
   void apply(ConstFieldView r, FieldView z) override { multigrid_.apply(r, z); }
 
  private:
-  bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string&) override {
-    problem.assemble_companion(u, springs_);
-    multigrid_.make(springs_, free, problem.rigid_motions(u));
+  bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
+    equilibrium.problem().assemble_companion(u, springs_);
+    multigrid_.make(springs_, equilibrium.free(), equilibrium.problem().rigid_motions(u));
     return true;
   }
-  double patience() const noexcept override { return 1.3; }   // it is cheap
+  double patience() const noexcept override { return 1.3; }  // it is cheap
 
   BlockMatrix springs_;
   Multigrid multigrid_;
@@ -123,20 +116,27 @@ class CompanionCycle final : public Preconditioner {
 }  // namespace
 
 Preconditioner::Preconditioner(Problem& problem)
-    : state_(problem.declare("preconditioner_state", problem.dimension())), numbers_(problem.declare_numbers("preconditioner", 3)) {}
+    : state_(problem.declare("preconditioner_state", problem.dimension())),
+      numbers_(problem.declare_numbers("preconditioner", 4)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
-  Problem& problem = equilibrium.problem();
-  const bool worn = !problem.constant_stiffness() && lately() > patience() * at_first() + 2;
-  if (in_hand_ && !worn) return true;
-  if (made() == 0 || worn) {
-    copy(u, state_);
-    made() = 1;
-    at_first() = lately() = 0;
-  }
-  in_hand_ = make(problem, state_, equilibrium.free(), failure);
-  if (!in_hand_) made() = 0;
+  const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;
+  if (made() == 0 || worn || (wary() != 0 && far_from(equilibrium))) return renew(equilibrium, u, failure);
+  return in_hand_ || (in_hand_ = make(equilibrium, state_, true, failure));
+}
+
+bool Preconditioner::renew(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  copy(u, state_);
+  at_first() = lately() = 0;
+  in_hand_ = make(equilibrium, state_, false, failure);
+  // A convex tangent serves at its own state only.
+  made() = in_hand_ && !convex() ? 1 : 0;
+  if (far_from(equilibrium)) wary() = convex() ? 1 : 0;
   return in_hand_;
+}
+
+bool Preconditioner::convex() const noexcept {
+  return tangent() && tangent()->convex();
 }
 
 void Preconditioner::took(int iterations, double reduction) {
@@ -147,16 +147,20 @@ void Preconditioner::took(int iterations, double reduction) {
 }
 
 void add_preconditioner_key(ParameterTable& table) {
-  table.choice("preconditioner", {"auto", "none", "jacobi", "factorisation", "companion"}, "Of Krylov solvers: the assembled tangent (its factors, or the blocks of its diagonal), or springs between nearest neighbours (companion).")
+  table
+      .choice("preconditioner", {"auto", "none", "jacobi", "factorisation", "companion"},
+              "Of Krylov solvers: the assembled tangent (its factors, or the blocks of its diagonal), or springs between nearest "
+              "neighbours (companion).")
       .by_default("\"auto\"");
 }
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
   chosen = name;
   if (name == "auto" && communicator().size() > 1) {
-    chosen = "none";   // the assembled tangent needs the whole body on one rank
+    chosen = "none";  // the assembled tangent needs the whole body on one rank
   } else if (name == "auto") {
-    chosen = problem.dimension() < 3 && static_cast<double>(problem.assembled_size().bytes) <= 2e9 ? "factorisation" : "companion";
+    chosen =
+        problem.dimension() < 3 && static_cast<double>(problem.assembled_size().bytes) <= 2e9 ? "factorisation" : "companion";
   }
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
   if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);

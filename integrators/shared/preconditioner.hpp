@@ -12,9 +12,11 @@
 
 namespace perikit {
 
-/// An approximate inverse of the tangent on the free components, made at one state and kept over iterations and steps until solves
-/// take clearly more iterations for each digit than they took with it at first. The state and the counts are kept with the problem: a restored
-/// run makes the same preconditioner again.
+class AssembledTangent;
+
+/// An approximate inverse of the tangent on the free components, made at one state and kept over iterations and steps until
+/// solves take clearly more iterations for each digit than they took with it at first. The state and the counts are kept with the
+/// problem: a restored run makes the same preconditioner again.
 class Preconditioner {
  public:
   virtual ~Preconditioner() = default;
@@ -22,6 +24,13 @@ class Preconditioner {
   bool prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
   /// z <- M^-1 r, 0 on prescribed components; r and z may be the same field.
   virtual void apply(ConstFieldView r, FieldView z) = 0;
+  /// Makes it anew, at u.
+  bool renew(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
+  /// What it is the exact inverse of; null where there is no such matrix.
+  virtual const AssembledTangent* tangent() const noexcept { return nullptr; }
+  /// True where the tangent at the state of the last prepare() was made convex: the linear equations are then to be those of
+  /// tangent().
+  bool convex() const noexcept;
   /// To be made anew before the next solve.
   void discard() noexcept { made() = in_hand_ = false; }
   /// Iterations that a solve took to make its residual smaller by the factor `reduction` < 1.
@@ -31,14 +40,18 @@ class Preconditioner {
   explicit Preconditioner(Problem& problem);
   /// How many times as many iterations a digit as at first it may take before it is made anew.
   virtual double patience() const noexcept { return 2; }
-  /// Makes it at u.
-  virtual bool make(Problem& problem, ConstFieldView u, ConstFieldView free, std::string& failure) = 0;
+  /// Makes it at u. kept: u is not the present state, but where the preconditioner in use was made before the run was
+  /// interrupted.
+  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, bool kept, std::string& failure) = 0;
 
  private:
-  double& made() noexcept { return numbers_[0]; }
-  double& at_first() noexcept { return numbers_[1]; }   ///< iterations a digit of the first solve with it
-  double& lately() noexcept { return numbers_[2]; }     ///< and of the last
-  FieldView state_;                                     ///< where it was made
+  double& made() noexcept { return numbers_[0]; }      ///< 0: not, or not to be kept
+  double& at_first() noexcept { return numbers_[1]; }  ///< iterations a digit of the first solve with it
+  double& lately() noexcept { return numbers_[2]; }    ///< and of the last
+  double& wary() noexcept {
+    return numbers_[3];
+  }                  ///< not 0: the last tangent that it was made of far from equilibrium was indefinite
+  FieldView state_;  ///< where it was made
   std::span<double> numbers_;
   bool in_hand_ = false;
 };
@@ -46,10 +59,9 @@ class Preconditioner {
 /// The key `preconditioner` of an integrator.
 void add_preconditioner_key(ParameterTable& table);
 
-/// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion" (a
-/// multigrid cycle on springs between nearest neighbours, never the tangent), "auto": in 3D the companion, else the factorisation where the
-/// assembled tangent takes at most 2 GB.
-/// `chosen` <- what auto chose, for the log.
+/// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"
+/// (a multigrid cycle on springs between nearest neighbours, never the tangent), "auto": in 3D the companion, else the
+/// factorisation where the assembled tangent takes at most 2 GB. `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
 }  // namespace perikit

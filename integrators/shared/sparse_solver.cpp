@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 #include <umfpack.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "free_matrix.hpp"
-#include "perikit/core/memory.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
@@ -17,15 +17,17 @@ static_assert(sizeof(SuiteSparse_long) == sizeof(FreeMatrix::Index));
 
 namespace {
 
-SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) { return reinterpret_cast<SuiteSparse_long*>(v.data()); }
+SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) {
+  return reinterpret_cast<SuiteSparse_long*>(v.data());
+}
 
 /// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
-cholmod_sparse view(std::size_t n, std::vector<FreeMatrix::Index>& first, std::vector<FreeMatrix::Index>& row, double* value) {
+cholmod_sparse view(std::size_t n, FreeMatrix::Index* first, FreeMatrix::Index* row, double* value) {
   cholmod_sparse A{};
   A.nrow = A.ncol = n;
-  A.nzmax = row.size();
-  A.p = as_long(first);
-  A.i = as_long(row);
+  A.nzmax = static_cast<std::size_t>(first[n]);
+  A.p = first;
+  A.i = row;
   A.x = value;
   A.stype = 1;
   A.itype = CHOLMOD_LONG;
@@ -37,6 +39,19 @@ cholmod_sparse view(std::size_t n, std::vector<FreeMatrix::Index>& first, std::v
 
 }  // namespace
 
+bool find_elimination_order(std::int64_t n, std::int64_t* first, std::int64_t* row, std::int64_t* order) {
+  cholmod_common common;
+  cholmod_l_start(&common);
+  common.print = 0;
+  cholmod_sparse graph = view(static_cast<std::size_t>(n), first, row, nullptr);
+  cholmod_factor* factor = cholmod_l_analyze(&graph, &common);
+  if (factor) std::copy_n(static_cast<const SuiteSparse_long*>(factor->Perm), n, order);
+  const bool found = factor != nullptr;
+  cholmod_l_free_factor(&factor, &common);
+  cholmod_l_finish(&common);
+  return found;
+}
+
 struct SparseSolver::Implementation {
   cholmod_common common{};
   FreeMatrix free;
@@ -46,9 +61,9 @@ struct SparseSolver::Implementation {
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   void *symbolic = nullptr, *numeric = nullptr;
   bool analysed = false, definite = false, ready = false;
-  double entries = 0;
+  double entries = 0, limit;
 
-  Implementation() {
+  explicit Implementation(double memory) : limit(memory) {
     if (openblas_set_num_threads) openblas_set_num_threads(1);
     cholmod_l_start(&common);
     common.print = 0;
@@ -67,42 +82,41 @@ struct SparseSolver::Implementation {
   std::vector<FreeMatrix::Index> ordering(const BlockMatrix& K) {
     std::vector<FreeMatrix::Index> begin(1, 0), rows;
     for (std::size_t r = 0; r < K.rows(); ++r) {
-      for (std::int64_t b = K.row_first[r]; b < K.row_first[r + 1] && K.column[static_cast<std::size_t>(b)] <= static_cast<std::int32_t>(r); ++b) {
+      for (std::int64_t b = K.row_first[r];
+           b < K.row_first[r + 1] && K.column[static_cast<std::size_t>(b)] <= static_cast<std::int32_t>(r); ++b) {
         rows.push_back(K.column[static_cast<std::size_t>(b)]);
       }
       begin.push_back(static_cast<FreeMatrix::Index>(rows.size()));
     }
-    cholmod_sparse graph = view(K.rows(), begin, rows, nullptr);
-    cholmod_factor* of_points = cholmod_l_analyze(&graph, &common);
-    std::vector<FreeMatrix::Index> order;
-    if (!of_points) return order;
-    const auto* permutation = static_cast<const SuiteSparse_long*>(of_points->Perm);
-    for (std::size_t k = 0; k < K.rows(); ++k)
+    std::vector<FreeMatrix::Index> points(K.rows()), order;
+    if (!find_elimination_order(static_cast<FreeMatrix::Index>(K.rows()), begin.data(), rows.data(), points.data())) return order;
+    for (const FreeMatrix::Index point : points)
       for (int a = 0; a < K.dimension; ++a) {
-        const FreeMatrix::Index unknown = free.unknown(static_cast<std::size_t>(permutation[k]), a);
+        const FreeMatrix::Index unknown = free.unknown(static_cast<std::size_t>(point), a);
         if (unknown >= 0) order.push_back(unknown);
       }
-    cholmod_l_free_factor(&of_points, &common);
     return order;
   }
 
   bool analyse(const BlockMatrix& K, std::string& failure) {
     free.pattern(K, true, upper_first, upper_row);
     std::vector<FreeMatrix::Index> order = ordering(K);
-    cholmod_sparse A = view(free.unknowns(), upper_first, upper_row, nullptr);
+    cholmod_sparse A = view(free.unknowns(), upper_first.data(), upper_row.data(), nullptr);
     // Only the given ordering is tried from here on.
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_GIVEN;
     common.postorder = 1;
     cholesky = order.empty() ? nullptr : cholmod_l_analyze_p(&A, as_long(order), nullptr, 0, &common);
-    if (!cholesky) failure = fmt::format("CHOLMOD cannot analyse a matrix of {} unknowns: {}", free.unknowns(), common.status == CHOLMOD_OUT_OF_MEMORY ? "not enough memory" : "an internal error");
+    if (!cholesky)
+      failure = fmt::format("CHOLMOD cannot analyse a matrix of {} unknowns: {}", free.unknowns(),
+                            common.status == CHOLMOD_OUT_OF_MEMORY ? "not enough memory" : "an internal error");
     if (cholesky && !affordable(failure)) cholmod_l_free_factor(&cholesky, &common);
     return cholesky != nullptr;
   }
 
   /// Memory that a system promises and does not have ends a program without a word: the factor is refused while it is a pattern.
   bool affordable(std::string& failure) const {
-    const double numbers = cholesky->is_super ? static_cast<double>(cholesky->xsize) : common.lnz, limit = memory_limit();
+    const double numbers = cholesky->is_super ? static_cast<double>(cholesky->xsize) : common.lnz;
     if (numbers * sizeof(double) <= limit) return true;
     failure = fmt::format("the Cholesky factor of {} unknowns needs {:.3g} GB; this machine offers {:.3g} GB", free.unknowns(),
                           numbers * sizeof(double) / 1e9, limit / 1e9);
@@ -112,10 +126,12 @@ struct SparseSolver::Implementation {
   bool factorise_symmetric(const BlockMatrix& K, std::string& failure) {
     if (!cholesky && !analyse(K, failure)) return false;
     free.values(K, true, upper_first, value);
-    cholmod_sparse A = view(free.unknowns(), upper_first, upper_row, value.data());
+    cholmod_sparse A = view(free.unknowns(), upper_first.data(), upper_row.data(), value.data());
     cholmod_l_factorize(&A, cholesky, &common);
     definite = common.status == CHOLMOD_OK && cholesky->minor == free.unknowns();
-    if (common.status == CHOLMOD_OUT_OF_MEMORY) failure = fmt::format("not enough memory for the Cholesky factor of {} unknowns ({:.3g} numbers)", free.unknowns(), common.lnz);
+    if (common.status == CHOLMOD_OUT_OF_MEMORY)
+      failure =
+          fmt::format("not enough memory for the Cholesky factor of {} unknowns ({:.3g} numbers)", free.unknowns(), common.lnz);
     entries = common.lnz;
     return definite;
   }
@@ -128,7 +144,8 @@ struct SparseSolver::Implementation {
     double info[UMFPACK_INFO];
     SuiteSparse_long status = UMFPACK_OK;
     if (!symbolic) status = umfpack_dl_symbolic(n, n, as_long(first), as_long(row), value.data(), &symbolic, nullptr, info);
-    if (status == UMFPACK_OK) status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
+    if (status == UMFPACK_OK)
+      status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
     if (status == UMFPACK_OK) {
       entries = info[UMFPACK_LNZ] + info[UMFPACK_UNZ];
       return true;
@@ -140,7 +157,7 @@ struct SparseSolver::Implementation {
   }
 };
 
-SparseSolver::SparseSolver() : implementation_(std::make_unique<Implementation>()) {}
+SparseSolver::SparseSolver(double memory) : implementation_(std::make_unique<Implementation>(memory)) {}
 SparseSolver::~SparseSolver() = default;
 
 bool SparseSolver::factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
@@ -178,15 +195,24 @@ void SparseSolver::solve(ConstFieldView b, FieldView x) {
     cholmod_l_solve2(CHOLMOD_A, own.cholesky, &right, nullptr, &own.solution, nullptr, &own.work_y, &own.work_e, &own.common);
     answer = static_cast<const double*>(own.solution->x);
   } else if (n > 0) {
-    umfpack_dl_solve(UMFPACK_A, as_long(own.first), as_long(own.row), own.value.data(), own.answer.data(), own.right.data(), own.numeric, nullptr, nullptr);
+    umfpack_dl_solve(UMFPACK_A, as_long(own.first), as_long(own.row), own.value.data(), own.answer.data(), own.right.data(),
+                     own.numeric, nullptr, nullptr);
   }
   std::fill_n(x.data, x.size(), 0.0);
   for (std::size_t k = 0; k < n; ++k) x.data[own.free.place(k)] = answer[k];
 }
 
-bool SparseSolver::factorised() const noexcept { return implementation_->ready; }
-bool SparseSolver::positive_definite() const noexcept { return implementation_->definite; }
-std::size_t SparseSolver::unknowns() const noexcept { return implementation_->free.unknowns(); }
-double SparseSolver::factor_entries() const noexcept { return implementation_->entries; }
+bool SparseSolver::factorised() const noexcept {
+  return implementation_->ready;
+}
+bool SparseSolver::positive_definite() const noexcept {
+  return implementation_->definite;
+}
+std::size_t SparseSolver::unknowns() const noexcept {
+  return implementation_->free.unknowns();
+}
+double SparseSolver::factor_entries() const noexcept {
+  return implementation_->entries;
+}
 
 }  // namespace perikit

@@ -1,11 +1,13 @@
 #pragma once
 /// Direct solution of linear systems with assembled tangents: the one place that knows SuiteSparse.
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/field.hpp"
+#include "perikit/core/memory.hpp"
 
 namespace perikit {
 
@@ -14,13 +16,14 @@ namespace perikit {
 /// points, once for all matrices of the same pattern and mask. BLAS runs on one thread, so that results do not depend on threads.
 class SparseSolver {
  public:
-  SparseSolver();
+  /// Factors that need more than `memory` bytes are refused while they are patterns.
+  explicit SparseSolver(double memory = memory_limit());
   ~SparseSolver();
   SparseSolver(const SparseSolver&) = delete;
   SparseSolver& operator=(const SparseSolver&) = delete;
 
-  /// False where K is singular to working accuracy or memory is short; `failure` says so. `free`: 1 on free components, K.dimension
-  /// components. The pattern of K and the mask must be those of the first call.
+  /// False where K is singular to working accuracy or memory is short; `failure` says so. `free`: 1 on free components,
+  /// K.dimension components. The pattern of K and the mask must be those of the first call.
   bool factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure);
   /// The same, but where K is not symmetric and positive definite there is no factorisation, and `failure` stays empty.
   bool factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure);
@@ -38,5 +41,9 @@ class SparseSolver {
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
+
+/// order[k] <- the k-th unknown to eliminate, so that factors stay sparse: the better of minimum degree (AMD) and nested
+/// dissection (METIS). Compressed columns of n unknowns, structurally symmetric. False where memory is short.
+bool find_elimination_order(std::int64_t n, std::int64_t* first, std::int64_t* row, std::int64_t* order);
 
 }  // namespace perikit

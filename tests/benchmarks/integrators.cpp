@@ -92,7 +92,6 @@ std::vector<Job> jobs(bool small) {
   std::vector<Job> all;
   for (const double parts : small ? std::vector<double>{10} : std::vector<double>{40, 120}) {
     for (const std::string name : {"newton", "jfnk", "kinsol", "dynamic_relaxation"}) {
-      if (small && name == "kinsol") continue;  // a quarter of a minute
       const std::string more = name == "dynamic_relaxation" ? ", max_iterations = 10000000" : "";
       all.push_back({fmt::format("Cook L/{:g}", parts),
                      cook,

@@ -36,7 +36,8 @@ BlockMatrix banded(bool symmetric, double shift, unsigned seed) {
     for (std::int64_t b = K.row_first[r]; b < K.row_first[r + 1]; ++b)
       for (int a = 0; a < dimension; ++a)
         for (int c = 0; c < dimension; ++c) {
-          K.values.push_back(full(static_cast<Eigen::Index>(dimension * r) + a, dimension * K.column[static_cast<std::size_t>(b)] + c));
+          K.values.push_back(
+              full(static_cast<Eigen::Index>(dimension * r) + a, dimension * K.column[static_cast<std::size_t>(b)] + c));
         }
   return K;
 }
@@ -60,7 +61,8 @@ double misfit(const BlockMatrix& K, const Field& free, const Field& x, const Fie
       double sum = b.component(a)[K.point[r]];
       for (std::int64_t block = K.row_first[r]; block < K.row_first[r + 1]; ++block)
         for (int c = 0; c < dimension; ++c) {
-          sum -= K.values[static_cast<std::size_t>((block * dimension + a) * dimension + c)] * x.component(c)[K.point[static_cast<std::size_t>(K.column[static_cast<std::size_t>(block)])]];
+          sum -= K.values[static_cast<std::size_t>((block * dimension + a) * dimension + c)] *
+                 x.component(c)[K.point[static_cast<std::size_t>(K.column[static_cast<std::size_t>(block)])]];
         }
       most = std::max(most, std::abs(sum));
     }
@@ -87,7 +89,7 @@ TEST_CASE("sparse solver: the free part of definite, indefinite and unsymmetric 
     SparseSolver solver;
     const Field b = right_side();
     Field x(dimension, stride);
-    for (const unsigned seed : {1u, 2u}) {   // the second factorisation reuses the analysis
+    for (const unsigned seed : {1u, 2u}) {  // the second factorisation reuses the analysis
       const BlockMatrix K = banded(kind.symmetric, kind.shift, seed);
       const Field free = free_components(K);
       std::string failure;
@@ -140,5 +142,18 @@ TEST_CASE("sparse solver: a singular matrix is refused with its reason") {
   std::string failure;
   CHECK(!solver.factorise(K, free_components(K), failure));
   CHECK(failure == "the tangent is singular: part of the body is free to move");
+  CHECK(!solver.factorised());
+}
+
+TEST_CASE("sparse solver: a factor that memory cannot hold is refused with both numbers, and nothing is factorised") {
+  const BlockMatrix K = banded(true, 20.0, 7);
+  const Field free = free_components(K);
+  std::string failure;
+  SparseSolver roomy(1e6);
+  REQUIRE(roomy.factorise(K, free, failure));
+  SparseSolver solver(1000);  // bytes; 77 unknowns with a band of eight need some 5000
+  CHECK(!solver.factorise(K, free, failure));
+  CHECK(failure.starts_with("the Cholesky factor of 77 unknowns needs "));
+  CHECK(failure.ends_with(" GB; this machine offers 1e-06 GB"));
   CHECK(!solver.factorised());
 }

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double reference_x = -5.840, reference_y = 6.941;  // of the corner (48, 60), mixed finite elements
 
-/// Displacement of the corner (48, 60), where no point lies: the affine fit to the points within four spacings of it. (At L/120 radii
-/// of 2.5 to 6 spacings give errors of 0.955 to 1.002 %.)
+/// Displacement of the corner (48, 60), where no point lies: the affine fit to the points within four spacings of it. (At L/120
+/// radii of 2.5 to 6 spacings give errors of 0.955 to 1.002 %.)
 Eigen::Vector2d corner(Simulation& simulation, double spacing) {
   BodyProblem& problem = simulation.problem();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -60,6 +60,40 @@ TEST_CASE("Cook's membrane: selective comes within 7 % on the coarsest lattice, 
   }
   const Membrane locked = run_cook("{ type = \"bond_associated\" }", 20);
   CHECK_MESSAGE(locked.corner[1] < 0.45 * reference_y, "corner ", locked.corner[1]);
+}
+
+TEST_CASE(
+    "Cook's membrane: every integrator with a tangent takes the planned load steps, with no more iterations on a finer lattice") {
+  struct Way {
+    std::string integrator, linear;  ///< linear: what run.log counts linear iterations by
+  };
+  double exact = 0;
+  for (const Way& way :
+       {Way{"type = \"newton\"", ""}, Way{"type = \"jfnk\"", "gmres "}, Way{"type = \"kinsol\"", "iterations, "},
+        Way{"type = \"kinsol\", strategy = \"none\"", "iterations, "}, Way{"type = \"kinsol\", linear_solver = \"klu\"", ""}}) {
+    INFO(way.integrator);
+    int iterations[2], linear[2] = {};
+    for (const int k : {0, 1}) {
+      const auto simulation = load("scabbia/cook.toml", {fmt::format("constants.h={}", k == 0 ? 4.4 : 2.2),
+                                                         "integrator={ " + way.integrator + ", steps = 5, tolerance = 1e-9 }"});
+      const Protocol protocol = run(*simulation);
+      CHECK(protocol.reports.size() == 6);
+      iterations[k] = protocol.iterations();
+      for (std::size_t at = way.linear.empty() ? std::string::npos : protocol.text.find(way.linear); at != std::string::npos;
+           at = protocol.text.find(way.linear, at + 1))
+        linear[k] += std::atoi(&protocol.text[at + way.linear.size()]);
+      if (k == 0) continue;
+      const double rise = corner(*simulation, 2.2)[1];
+      if (exact == 0) exact = rise;
+      CHECK(std::abs(rise / exact - 1) < 1e-6);
+    }
+    MESSAGE(way.integrator, ": ", iterations[0], ", ", iterations[1], " iterations, ", linear[0], ", ", linear[1],
+            " linear ones");
+    CHECK(iterations[1] <= 1.1 * iterations[0] + 1);
+    CHECK(iterations[1] <= 40);
+    CHECK(linear[1] <= 1.3 * linear[0] + 60);  // GMRES may find out once more that a tangent is indefinite
+    CHECK(linear[1] <= 200);
+  }
 }
 
 // Minutes: the target validation.cook_full.

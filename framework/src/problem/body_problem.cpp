@@ -177,7 +177,7 @@ BodyProblem::~BodyProblem() = default;
 void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K) {
   refuse_assembly();
   if (!companion_) companion_ = std::make_unique<Companion>(body_, *laws_);
-  companion_->assemble(u, K);
+  companion_->assemble(u, model_->changed_bonds(), K);
 }
 
 std::vector<Field> BodyProblem::rigid_motions(ConstFieldView u) {

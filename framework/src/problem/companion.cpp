@@ -9,6 +9,7 @@ namespace perikit {
 
 namespace {
 
+constexpr double least = 1e-3;     // share of a spring between points whose bond has failed
 constexpr double floating = 1e-9;  // of the diagonal: less than the softest bending of bodies that fit into memory
 
 /// a and b of the springs that stand for an isotropic law.
@@ -95,7 +96,28 @@ void Companion::find_pattern() {
   lists_ = std::move(whole);
 }
 
-void Companion::assemble(ConstFieldView u, BlockMatrix& K) const {
+std::vector<double> Companion::shares(std::span<const BondChange> changed) const {
+  std::vector<double> share;
+  if (changed.empty()) return share;
+  share.assign(lists_.neighbour.size(), 1.0);
+  const auto row = [&](std::int32_t point) { return std::lower_bound(point_.begin(), point_.end(), point) - point_.begin(); };
+  const auto weaken = [&](std::ptrdiff_t i, std::ptrdiff_t j, double integrity) {
+    const auto begin = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(i)],
+               end = lists_.neighbour.begin() + lists_.first[static_cast<std::size_t>(i) + 1],
+               spring = std::lower_bound(begin, end, static_cast<std::int32_t>(j));
+    if (spring != end && *spring == j)
+      share[static_cast<std::size_t>(spring - lists_.neighbour.begin())] = std::max(integrity, least);
+  };
+  for (const BondChange& bond : changed) {
+    const std::ptrdiff_t i = row(bond.point), j = row(bond.far);
+    weaken(i, j, bond.integrity);
+    weaken(j, i, bond.integrity);
+  }
+  return share;
+}
+
+void Companion::assemble(ConstFieldView u, std::span<const BondChange> changed, BlockMatrix& K) const {
+  const std::vector<double> share = shares(changed);
   const std::size_t n = point_.size(), d = static_cast<std::size_t>(dimension_), size = d * d;
   if (!K.has_pattern()) {
     K.dimension = dimension_;
@@ -117,6 +139,7 @@ void Companion::assemble(ConstFieldView u, BlockMatrix& K) const {
   parallel_for(n, [&](std::size_t i) {
     double sum[9] = {};
     double* own = nullptr;
+    auto spring = static_cast<std::size_t>(lists_.first[i]);  // the row's blocks but the diagonal one, in their order
     for (std::int64_t b = K.row_first[i]; b < K.row_first[i + 1]; ++b) {
       const auto j = static_cast<std::size_t>(K.column[static_cast<std::size_t>(b)]);
       double* block = &K.values[static_cast<std::size_t>(b) * size];
@@ -131,7 +154,8 @@ void Companion::assemble(ConstFieldView u, BlockMatrix& K) const {
         y[c] = to[c] - from[c] + u.component(static_cast<int>(c))[point_[j]] - u.component(static_cast<int>(c))[point_[i]];
         y2 += y[c] * y[c];
       }
-      const double volumes = from[3] * to[3] * influence(xi2);
+      const double left = share.empty() ? 1.0 : share[spring++];
+      const double volumes = left * from[3] * to[3] * influence(xi2);
       const double stretch = volumes * (stretch_[i] + stretch_[j]), slide = volumes * (slide_[i] + slide_[j]);
       for (std::size_t a = 0; a < d; ++a)
         for (std::size_t c = 0; c < d; ++c) {

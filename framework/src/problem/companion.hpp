@@ -1,8 +1,12 @@
 #pragma once
 /// A cheap relative of a body's tangent, for preconditioners.
 
+#include <span>
+#include <vector>
+
 #include "perikit/body/body.hpp"
 #include "perikit/core/block_matrix.hpp"
+#include "perikit/engine/fracture.hpp"
 #include "perikit/engine/laws.hpp"
 
 namespace perikit {
@@ -14,15 +18,18 @@ namespace perikit {
 ///   m_i = sum_j omega |xi|^2 V_j,   a - b = d (d + 2) lambda,  b = 2 d (mu - lambda),
 /// so that affine motions store the energy of the isotropic law where lambda <= mu (Born's model); where lambda > mu springs
 /// cannot, and a = d (d + 2) sqrt(mu (lambda + 2 mu)/3) lies between shear and volume. b is at least 0.05 a, so that the matrix
-/// is positive definite wherever every connected part is held. Bonds that a pre-crack cuts are left out.
+/// is positive definite wherever every connected part is held. Bonds that a pre-crack cuts are left out; springs weaken as the
+/// bonds between their ends do, to a thousandth: what longer bonds still hold together stays so.
 class Companion {
  public:
   Companion(const Body& body, const Laws& laws);
-  /// K at u, a pattern of nearest neighbours. Deterministic for any number of threads.
-  void assemble(ConstFieldView u, BlockMatrix& K) const;
+  /// K at u, a pattern of nearest neighbours. changed: bonds that are not whole. Deterministic for any number of threads.
+  void assemble(ConstFieldView u, std::span<const BondChange> changed, BlockMatrix& K) const;
 
  private:
   void find_pattern();
+  /// Share of the stiffness that is left, of each spring in the order of lists_; empty where all are whole.
+  std::vector<double> shares(std::span<const BondChange> changed) const;
   double influence(double xi2) const noexcept { return dimension_ == 3 ? 1 : 1 / xi2; }
 
   const Body& body_;

@@ -4,7 +4,7 @@
 
 namespace perikit {
 
-bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated) {
+bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated, const PreconditionerAction& precondition) {
   if (extrapolated) {
     equilibrium.impose(equilibrium.displacement());
     return true;
@@ -22,19 +22,21 @@ bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated) {
     combine(1, r, -1, Kw, r);
   }
   equilibrium.impose(u);
-  double squares = dot(r, r);
-  const double enough = accuracy * accuracy * squares;
-  copy(r, w);
-  for (int k = 0; k < most && squares > enough; ++k) {
+  Field z = precondition ? make() : Field{};
+  const double enough = accuracy * norm(r);
+  double last = 0;
+  for (int k = 0; k < most && norm(r) > enough; ++k) {
+    if (precondition) precondition(r, z);
+    const ConstFieldView step = precondition ? z : r;
+    const double product = dot(r, step);
+    if (!(product > 0)) break;
+    combine(1, step, k > 0 ? product / last : 0.0, w, w);
+    last = product;
     if (!equilibrium.tangent(start, w, Kw)) return false;
     const double curvature = dot(w, Kw);
     if (!(curvature > 0)) break;
-    const double alpha = squares / curvature;
-    combine(1, du, alpha, w, du);
-    combine(1, r, -alpha, Kw, r);
-    const double next = dot(r, r);
-    combine(1, r, next / squares, w, w);
-    squares = next;
+    combine(1, du, product / curvature, w, du);
+    combine(1, r, -product / curvature, Kw, r);
   }
   combine(1, u, 1, du, u);
   return true;

@@ -1,0 +1,51 @@
+#include "assembled_tangent.hpp"
+
+#include "perikit/core/field_operations.hpp"
+#include "perikit/core/parallel.hpp"
+
+namespace perikit {
+
+bool AssembledTangent::assemble_as(Equilibrium& equilibrium, ConstFieldView u, bool convex, std::string& failure) {
+  matrix_.convex = convex;
+  factorised_ = false;
+  const EvaluationStatus status = equilibrium.problem().assemble_tangent(u, matrix_);
+  if (!status.ok()) failure = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
+  return status.ok();
+}
+
+bool AssembledTangent::assemble(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure) {
+  if (equilibrium.parameter() != load_) indefinite_ = false;
+  load_ = equilibrium.parameter();
+  const bool choose = may_convex && far_from(equilibrium);
+  if (choose && indefinite_) return assemble_as(equilibrium, u, true, failure);
+  if (!assemble_as(equilibrium, u, false, failure)) return false;
+  if (!choose || !matrix_.symmetric) return true;
+  factorised_ = solver_.factorise_definite(matrix_, equilibrium.free(), failure);
+  if (factorised_ || !failure.empty()) return factorised_;
+  indefinite_ = true;
+  return assemble_as(equilibrium, u, true, failure);
+}
+
+bool AssembledTangent::make(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure) {
+  if (!assemble(equilibrium, u, may_convex, failure)) return false;
+  return factorised_ || (factorised_ = solver_.factorise(matrix_, equilibrium.free(), failure));
+}
+
+void AssembledTangent::multiply(ConstFieldView free, ConstFieldView w, FieldView Kw) const {
+  const int d = matrix_.dimension;
+  fill(0.0, Kw);
+  parallel_for(matrix_.rows(), [&](std::size_t r) {
+    double sum[3] = {};
+    for (std::int64_t b = matrix_.row_first[r]; b < matrix_.row_first[r + 1]; ++b) {
+      const double* block = &matrix_.values[static_cast<std::size_t>(b * d * d)];
+      const auto p =
+          static_cast<std::size_t>(matrix_.point[static_cast<std::size_t>(matrix_.column[static_cast<std::size_t>(b)])]);
+      for (int a = 0; a < d; ++a)
+        for (int c = 0; c < d; ++c) sum[a] += block[a * d + c] * w.component(c)[p];
+    }
+    for (int a = 0; a < d; ++a) Kw.component(a)[matrix_.point[r]] = sum[a];
+  });
+  mask(free, Kw);
+}
+
+}  // namespace perikit
