@@ -51,6 +51,7 @@ material = { type = "neo_hookean", shear_modulus = 1, bulk_modulus = 1 }
 type = "critical_stretch"
 stretch = 0.1
 no_fail = ["left"]
+gradual = true
 [[crack]]
 segment = [[0, 0], [1, 1]]
 [initial]

@@ -116,6 +116,10 @@ const Fault faults[]{
      "found with kinematics.stabilization over point gradients of higher order", "order 1"},
     {"integrator", "type", "\"evaluate\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\n", 0,
      "integrator.type", "found \"evaluate\" in a scene with [damage]", "another integrator"},
+    {"", "format", "1", "[damage]\ntype = \"smooth_degradation\"\nstretch_min = 0.1\nstretch = 0.2\ngradual = true\n", 1005, "damage.gradual",
+     "found true with \"smooth_degradation\"", "criteria that break bonds at once"},
+    {"integrator", "type", "\"newton\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\ngradual = true\n", 1004, "damage.gradual",
+     "found true with integrator \"newton\"", "explicit integrators"},
     // conditions
     {"boundary", "displacement", "[\"log(x - 3)\", 0]", "", 0, "boundary.0.displacement", "nan at x", "finite values"},
     {"", "format", "1", "[initial]\nvelocity = [\"1/(x - 0.5)\", 0]\n", 1002, "initial.velocity", "inf at x = (0.5",

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gradual_failure.hpp"
+
 namespace perikit {
 
 namespace {
@@ -13,7 +15,9 @@ bool before(const BondChange& a, const BondChange& b) noexcept { return a.point 
 
 BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy& energy, const Changed& changed) {
   ++updates_;
+  GradualFailure* const gradual = gradual_failure(damage_.law);
   std::vector<BondChange> changes = monitor_->find(u);
+  if (gradual) changes = gradual->let_go(std::move(changes));
   if (changes.empty()) return {};
   if (motion) {
     if (end_.size() == 0) end_ = body_.make_field(u.components);
@@ -38,6 +42,10 @@ BondUpdate Fracture::update(ConstFieldView u, const Motion& motion, const Energy
     update.changed += changes.size();
     update.released += here - left;
     update.dissipated += motion ? there - energy(end_, marks) : here - left;
+    if (gradual) {
+      gradual->fade(next);
+      break;
+    }
     changes = std::move(next);
   }
   return update;
@@ -75,7 +83,8 @@ void Fracture::restore(std::span<const BondChange> log, const Changed& changed) 
   ++version_;
   changed(state_.mend());
   log_.assign(log.begin(), log.end());
-  changed(state_.lower(log_));
+  const std::vector<BondChange> of_fragments = changed(state_.lower(log_));
+  if (GradualFailure* const gradual = gradual_failure(damage_.law)) gradual->restore(log_, allowed(of_fragments));
   monitor_->forget();
 }
 

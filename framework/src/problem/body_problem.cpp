@@ -7,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "engine/gradual_failure.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/recorder.hpp"
@@ -14,10 +15,23 @@
 
 namespace perikit {
 
+static std::shared_ptr<const Damage> damage_law(const Scene& scene, const PartFactory& factory, bool quasi_static) {
+  if (!scene.damage) return nullptr;
+  std::shared_ptr<const Damage> law = factory.damage(*scene.damage);
+  const ParameterValues& values = scene.damage->values;
+  if (!values.has("gradual") || !values.boolean("gradual")) return law;
+  const auto refuse = [&](const std::string& found, const char* allowed) {
+    throw InputError(values.position("gradual"), "damage.gradual", fmt::format("found true with {}; allowed: {}", found, allowed));
+  };
+  if (!law->traits().bits) refuse(fmt::format("\"{}\", whose bonds weaken of themselves", scene.damage->type), "criteria that break bonds at once");
+  if (quasi_static) refuse(fmt::format("integrator \"{}\", which knows no time", scene.integrator->type), "explicit integrators");
+  return std::make_shared<GradualFailure>(law);
+}
+
 static Body whole_body(const Scene& scene, const Damage* damage) { return Body(scene, damage && !damage->traits().bits); }
 
 BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool quasi_static)
-    : scene_(scene), damage_law_(scene.damage ? factory.damage(*scene.damage) : nullptr),
+    : scene_(scene), damage_law_(damage_law(scene, factory, quasi_static)),
       partition_(communicator().size() > 1 ? std::make_unique<Partition>(whole_body(scene, damage_law_.get()), communicator().rank(), communicator().size()) : nullptr),
       body_(partition_ ? partition_->part(static_cast<std::uint16_t>(scene.regions.size() + 1)) : whole_body(scene, damage_law_.get())) {
   if (partition_) ghosts_.emplace(*partition_, body_);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "engine/gradual_failure.hpp"
 #include "perikit/problem/body_problem.hpp"
 
 namespace perikit {
@@ -49,6 +50,8 @@ void BodyProblem::read_damage() {
   damage_->law = damage_law_;
   damage_->onset = body_.make_field(1);
   damage_->failure = body_.make_field(1);
+  GradualFailure* const gradual = gradual_failure(damage_law_);
+  Field crack_speed = gradual ? body_.make_field(1) : Field();
   DamagePoint at{{body_.space(), body_.section(), body_.horizon(), {}}, mean_bond_length(*influence_, dimension(), body_.horizon())};
   const bool uniform = laws_->same(static_cast<std::size_t>(body_.internal().front()), static_cast<std::size_t>(body_.internal().back())) && laws_->records().size() == 1;
   StretchLimits limits;
@@ -65,6 +68,11 @@ void BodyProblem::read_damage() {
     }
     damage_->onset.data()[p] = limits.onset;
     damage_->failure.data()[p] = limits.failure;
+    if (gradual) {
+      // Rayleigh waves, by Viktorov's approximation. Whether there is a density is asked with the masses.
+      const double nu = at.moduli.poisson(), density = laws_->density(p);
+      crack_speed.data()[p] = density > 0 ? std::sqrt(at.moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
+    }
     equal = equal && limits.onset == limits.failure;
   }
   for (const std::string& set : scene_.no_fail)
@@ -72,6 +80,7 @@ void BodyProblem::read_damage() {
       damage_->onset.data()[p] = damage_->failure.data()[p] = std::numeric_limits<double>::infinity();
     }
   if (equal) damage_->failure = Field();
+  if (gradual) gradual->prepare(body_, std::move(crack_speed));
 }
 
 EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
@@ -108,6 +117,7 @@ bool BodyProblem::update_bonds(double time_step, ConstFieldView velocity) {
       end.data[k] = displacement_.data()[k] + 0.5 * time_step * next;
     }
   };
+  if (GradualFailure* const gradual = gradual_failure(damage_law_)) gradual->set_time_step(time_step);
   const BondUpdate update = model_->update_bonds(displacement_, velocity.data ? half_step : Motion());
   energies_.dissipated += update.dissipated;
   energies_.strain -= update.released;

@@ -197,6 +197,7 @@ ParameterTable common_part_parameters(Kind kind) {
   if (kind == Kind::kinematics) table.part("stabilization", Kind::stabilization, "Against zero-energy modes.");
   if (kind == Kind::damage) {
     table.add(ParameterType::texts, "no_fail", "-", "Sets of points whose bonds never fail.").by_default("[]");
+    table.boolean("gradual", "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.").by_default("false");
   }
   return table;
 }

@@ -21,7 +21,7 @@ ParameterTable output_parameters();
 ParameterTable history_parameters();
 ParameterTable run_parameters();
 
-/// Keys that the framework adds to every part of a kind at the top level: stabilization, no_fail.
+/// Keys that the framework adds to every part of a kind at the top level: stabilization, no_fail, gradual.
 ParameterTable common_part_parameters(Kind kind);
 
 /// The components of a point field that history may ask for, none for scalars.

@@ -11,7 +11,7 @@
 
 namespace perikit {
 
-/// A part's table with the keys that the framework adds to the scene's own kinematics (stabilization) and damage (no_fail).
+/// A part's table with the keys that the framework adds to the scene's own kinematics (stabilization) and damage (no_fail, gradual).
 ParameterTable part_table(const PartDescription& description, Kind kind, const std::string& path);
 
 class TomlReader {
