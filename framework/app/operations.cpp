@@ -21,13 +21,13 @@ std::string Operations::key(const std::string& kinematics, const std::string& ma
 Operations::Operations(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::string line;
-  if (!std::getline(stream, line) || line != header) throw InputError({file.string(), 1}, "", fmt::format("found '{}'; allowed: the header {}", line, header));
+  if (!std::getline(stream, line) || line != header) throw InputError({file.string(), 1, 1}, "", fmt::format("found '{}'; allowed: the header {}", line, header));
   for (int number = 2; std::getline(stream, line); ++number) {
     const std::size_t comma = std::min(line.rfind(','), line.size());
     double value = NAN;
     const char* const end = line.data() + line.size();
     if (comma == line.size() || std::from_chars(line.data() + comma + 1, end, value).ptr != end || !(value >= 0)) {
-      throw InputError({file.string(), number}, "", fmt::format("found '{}'; allowed: {}", line, header));
+      throw InputError({file.string(), number, 1}, "", fmt::format("found '{}'; allowed: {}", line, header));
     }
     counts_[line.substr(0, comma)] = value;
   }

@@ -19,6 +19,7 @@ if [ -z "$small" ]; then
   plane="--dimension 2 --cells 256"
   line="--dimension 1 --cells 20000"
   $count
+  $count --material hencky hypoelastic linear_elastic mooney_rivlin neo_hookean
   $count $plane
   $count $line
   $bench --json "$out/bench.json" | tee "$out/bench.md"

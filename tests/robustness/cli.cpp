@@ -361,7 +361,10 @@ TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and 
 
 TEST_CASE("cli: bench gives a table and the same figures for other programs") {
   const Desk desk(plate);
-  const Result result = desk.perikit("bench --cells 5 --kinematics sub_horizon --material hencky --dimension 2 --assembly --json figures.json");
+  const std::string counts = "kinematics,material,dimension,body,cells,operations\n";
+  desk.write("counts.csv", counts + "sub_horizon,hencky,2,lattice,5,1234.5\nsub_horizon,hencky,2,cloud,5,2345.5\n");
+  const std::string command = "bench --cells 5 --kinematics sub_horizon --material hencky --dimension 2";
+  const Result result = desk.perikit(command + " --operations counts.csv --assembly --json figures.json");
   INFO(result.err);
   REQUIRE(result.status == 0);
   CHECK(contains(result.out, "| sub_horizon | hencky | 2 | lattice |"));
@@ -370,6 +373,14 @@ TEST_CASE("cli: bench gives a table and the same figures for other programs") {
   for (const std::string word : {"\"triad_GB_per_s\": ", "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25"})
     CHECK_MESSAGE(contains(figures, word), word, " is missing in ", figures);
   CHECK_MESSAGE(!contains(figures, "null"), figures);
+  CHECK(contains(figures, "\"operations\": 2345.5, \"of_triad\": "));
+  const Result uncounted = desk.perikit(command);   // not at this size
+  CHECK(uncounted.status == 0);
+  CHECK(contains(uncounted.out, "%) | - | - |"));
+  desk.write("counts.csv", counts + "sub_horizon,hencky,2,cloud,5,many\n");
+  const Result refused = desk.perikit(command + " --operations counts.csv");
+  CHECK(refused.status == 2);
+  CHECK(contains(refused.err, "counts.csv:2:1: found 'sub_horizon,hencky,2,cloud,5,many'"));
   const Result full = desk.perikit("bench --cells 5 --kinematics conventional --json no/such/folder.json");
   CHECK(full.status == 1);
   CHECK(contains(full.err, "no/such/folder.json: cannot be written"));
