@@ -184,8 +184,8 @@ void count(Registry& registry, const BenchOptions& options) {
   measure_rows(registry, options, [&](const Row& row) {
     fmt::print("{:.0f} |\n", row.operations);
     operations.set(key_of(row, options), row.operations);
-    if (!options.operations.empty()) operations.write(options.operations);
   });
+  if (!options.operations.empty()) operations.write(options.operations);
 }
 
 }  // namespace
