@@ -53,17 +53,17 @@ Tensor gradient(const Stencil& stencil, int d, const Vector& u) {
   return H;
 }
 
-Selective selective(const Law& law, const Tensor& H_own, const Tensor& H_bar) {
+Selective selective(const Law& law, const Tensor& H_own, const Tensor& H_bar, double share) {
   const Tensor Ft = H_own + Tensor::Identity(), Fb = H_bar + Tensor::Identity();
   const Tensor inverse_t = Ft.inverse(), inverse_b = Fb.inverse();
   const Tensor Ftm = inverse_t.transpose(), Fbm = inverse_b.transpose();
-  const double a = std::cbrt(Fb.determinant() / Ft.determinant());
+  const double q = std::cbrt(Fb.determinant() / Ft.determinant()), a = 1 - share + share * q, m = share * q;
   const Tensor Fh = a * Ft;
   Selective r;
   r.H = Fh - Tensor::Identity();
   r.psi = law.psi(r.H);
   const Tensor Ph = law.P(r.H);
-  const double p = dot(Ph, Fh);
+  const double p = m * dot(Ph, Ft);
   r.S_own = a * Ph - p / 3 * Ftm;
   r.S_bar = p / 3 * Fbm;
 
@@ -73,10 +73,10 @@ Selective selective(const Law& law, const Tensor& H_own, const Tensor& H_bar) {
     Tensor dFt = Tensor::Zero(), dFb = Tensor::Zero();
     (column < 9 ? dFt : dFb)(column % 9 / 3, column % 3) = 1;
     const double phi = ((inverse_b * dFb).trace() - (inverse_t * dFt).trace()) / 3;
-    const Tensor dFh = a * (dFt + phi * Ft);
+    const Tensor dFh = a * dFt + m * phi * Ft;
     const Tensor dPh = square(A * flat(dFh));
-    const double dp = dot(dPh, Fh) + dot(Ph, dFh);
-    r.tangent.col(column).head(9) = flat(a * (dPh + phi * Ph) - dp / 3 * Ftm + p / 3 * Ftm * dFt.transpose() * Ftm);
+    const double dp = m * (phi * dot(Ph, Ft) + dot(dPh, Ft) + dot(Ph, dFt));
+    r.tangent.col(column).head(9) = flat(a * dPh + m * phi * Ph - dp / 3 * Ftm + p / 3 * Ftm * dFt.transpose() * Ftm);
     r.tangent.col(column).tail(9) = flat(dp / 3 * Fbm - p / 3 * Fbm * dFb.transpose() * Fbm);
   }
   return r;
@@ -87,7 +87,7 @@ double energy(const Operator& op, const Law& law, const Vector& u) {
   for (const EvaluationPoint& q : op.q) {
     const auto s = stencils(op, q);
     const Tensor H = gradient(*s[0], op.dimension, u);
-    total += q.weight * (s.size() == 1 ? law.psi(H) : selective(law, H, gradient(*s[1], op.dimension, u)).psi);
+    total += q.weight * (s.size() == 1 ? law.psi(H) : selective(law, H, gradient(*s[1], op.dimension, u), op.owner_share[q.owner]).psi);
   }
   return total;
 }
@@ -105,7 +105,7 @@ Vector force(const Operator& op, const Law& law, const Vector& u) {
     if (s.size() == 1) {
       subtract_own(law.P(H));
     } else {
-      const Selective r = selective(law, H, gradient(*s[1], d, u));
+      const Selective r = selective(law, H, gradient(*s[1], d, u), op.owner_share[q.owner]);
       subtract_own(r.S_own);
       subtract_force(*s[1], d, q.weight * r.S_bar, f);
     }
@@ -119,7 +119,7 @@ Matrix stiffness(const Operator& op, const Law& law, const Vector& u) {
   for (const EvaluationPoint& q : op.q) {
     const auto s = stencils(op, q);
     const Tensor H = gradient(*s[0], d, u);
-    const Matrix A = s.size() == 1 ? law.A(H) : selective(law, H, gradient(*s[1], d, u)).tangent;
+    const Matrix A = s.size() == 1 ? law.A(H) : selective(law, H, gradient(*s[1], d, u), op.owner_share[q.owner]).tangent;
 
     // B: tensor components (of one or two gradients) from the displacements of the points that appear
     std::vector<int> rows;

@@ -221,7 +221,7 @@ Stencil point_gradient(const Cloud& cloud, int i, int order, double singular) {
 }
 
 Operator build(const Cloud& cloud, const Description& description, const std::vector<int>& owners) {
-  Operator result{cloud.dimension, cloud.points(), {}, {}, {}};
+  Operator result{cloud.dimension, cloud.points(), {}, {}, {}, {}};
   std::vector<int> chosen = owners;
   if (owners.empty())
     for (int i = 0; i < cloud.points(); ++i) chosen.push_back(i);
@@ -232,7 +232,17 @@ Operator build(const Cloud& cloud, const Description& description, const std::ve
     result = build(cloud, base, owners);
     result.owner_gradient.resize(cloud.points());
     const int order = description.base ? description.base->order : 1;
-    for (const int i : chosen) result.owner_gradient[i] = point_gradient(cloud, i, order, description.singular);
+    result.owner_share.resize(cloud.points());
+    for (const int i : chosen) {
+      result.owner_gradient[i] = point_gradient(cloud, i, order, description.singular);
+      double first = 0, left = 0;
+      for (const int k : cloud.family(i)) {
+        const double influence = cloud.omega(i, k) * cloud.volume[k];
+        left += cloud.intact(i, k) * influence;
+        first += (cloud.failed ? 1.0 : cloud.intact(i, k)) * influence;
+      }
+      result.owner_share[i] = first > 0 ? left / first : 1.0;
+    }
     return result;
   }
   Builder builder(cloud, description);

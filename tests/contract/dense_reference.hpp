@@ -26,6 +26,7 @@ struct Cloud {
   double horizon = 0;                              ///< delta [m]
   std::function<double(double)> influence;         ///< omega(r), r = |xi| / delta
   std::function<double(int, int)> integrity = {};  ///< b_ij in [0, 1], symmetric; empty: intact
+  bool failed = false;                             ///< bonds that are not intact were so at the set-up, and failed
 
   int points() const { return static_cast<int>(position.size()); }
   /// X_j - X_i [m].
@@ -75,6 +76,7 @@ struct Operator {
   std::vector<EvaluationPoint> q;
   /// selective: stencil of Hbar at each point (empty where it is dead or was not needed); other kinematics: no entries.
   std::vector<Stencil> owner_gradient;
+  std::vector<double> owner_share;    ///< selective: c of each point, the share left of its family at the set-up; otherwise no entries
   std::vector<double> owner_volume;   ///< local_force: V_i; otherwise no entries
 };
 
@@ -101,14 +103,14 @@ Vector force(const Operator&, const Law&, const Vector& u);
 /// d2E/du2.
 Matrix stiffness(const Operator&, const Law&, const Vector& u);
 
-/// `selective` at one evaluation point: Fhat = (Jbar / Jt)^(1/3) Ft, its psi, and psi's derivatives by (Ft, Fbar).
+/// `selective` at one evaluation point: Fhat = (1 - c + c (Jbar / Jt)^(1/3)) Ft, its psi, and psi's derivatives by (Ft, Fbar).
 struct Selective {
   Tensor H;  ///< Fhat - I
   double psi = 0;
   Tensor S_own, S_bar;  ///< dpsi/dFt, dpsi/dFbar
   Matrix tangent;       ///< 18 x 18, rows and columns (Ft, Fbar)
 };
-Selective selective(const Law&, const Tensor& H_own, const Tensor& H_bar);
+Selective selective(const Law&, const Tensor& H_own, const Tensor& H_bar, double share = 1);
 
 /// Lame constants as the d-dimensional body sees them (plane stress: condensed; 1D: lambda + 2 mu is the modulus), and the
 /// thickness (2D, m) or area (1D, m^2) that is contained in the volumes.

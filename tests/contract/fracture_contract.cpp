@@ -10,6 +10,7 @@
 #include <set>
 
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/contract/reference_body.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -167,6 +168,29 @@ bool suits(const Example& example, int dimension) {
   return false;
 }
 
+/// `selective` knows of bonds that fail in the course of a run: what the dense reference says of this body as it is, the bonds across the
+/// plane failed.
+Response dense_response(Simulation& simulation, double height) {
+  BodyProblem& problem = simulation.problem();
+  const Body& body = problem.body();
+  const auto influence = subject().registry.influence(*simulation.scene().influence);
+  reference::Cloud cloud = cloud_of(body, *influence);
+  cloud.failed = true;
+  cloud.integrity = [position = cloud.position, height](int i, int j) {
+    const auto below = [&](int k) { return position[static_cast<std::size_t>(k)][1] < height; };
+    return below(i) == below(j) ? 1.0 : 0.0;
+  };
+  const auto description = description_of(*simulation.scene().kinematics);
+  REQUIRE(description);
+  const reference::Operator op = reference::build(cloud, *description);
+  const reference::Vector u = dense(body, problem.displacement()), f = reference::force(op, saint_venant_kirchhoff(), u);
+  Response r{reference::energy(op, saint_venant_kirchhoff(), u), problem.make_field(problem.dimension())};
+  const auto d = static_cast<std::size_t>(problem.dimension());
+  for (std::size_t i = 0; i < body.points(); ++i)
+    for (std::size_t c = 0; c < d; ++c) r.force.component(static_cast<int>(c))[body.internal()[i]] = f[static_cast<Eigen::Index>(d * i + c)];
+  return r;
+}
+
 }  // namespace
 
 TEST_CASE("kinematics: a body whose bonds have failed is the body that was built without them") {
@@ -192,7 +216,9 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         const BondUpdate update = problem.model().update_bonds(problem.displacement());
         CHECK(2 * update.changed == cut->problem().model().report().broken_bonds);
         CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
-        const Response after = respond(problem, 6), expected = respond(cut->problem(), 6);
+        const Response after = respond(problem, 6), expected = subject().registry.kinematics(*failing->scene().kinematics)->traits().selective
+                                                                   ? dense_response(*failing, height)
+                                                                   : respond(cut->problem(), 6);
         CHECK(std::abs(after.energy - expected.energy) <= 1e-11 * expected.energy);
         CHECK(difference(body, after.force, expected.force) <= 1e-10 * largest(body, expected.force));
         const Field damage = problem.model().damage(), cut_damage = cut->problem().model().damage();

@@ -1,8 +1,11 @@
 #pragma once
 /// A body of the engine as the dense reference sees it, points in input order.
 
+#include <optional>
+
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
+#include "perikit/scene/scene.hpp"
 #include "tests/contract/dense_reference.hpp"
 
 namespace perikit::contract {
@@ -12,5 +15,9 @@ reference::Cloud cloud_of(const Body& body, const InfluenceFunction& influence);
 /// Of the fixture's material at modulus 1, as the space of the body sees it.
 reference::Elasticity elasticity(const Body& body);
 reference::Vector dense(const Body& body, ConstFieldView field);
+/// The reference's description of a kinematics; nothing where the reference does not know the part.
+std::optional<reference::Description> description_of(const PartValues& part);
+/// The fixture's material: S = lambda tr(E) I + 2 mu E.
+reference::Law saint_venant_kirchhoff();
 
 }  // namespace perikit::contract

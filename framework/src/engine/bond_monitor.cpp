@@ -16,6 +16,7 @@ void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> 
 
 std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
   const bool all_groups = renew_ || !skip_;
+  begin(u);
   if (all_groups) {
     std::copy_n(u.data, u.size(), reference_.data());
     std::fill(moved_.begin(), moved_.end(), 0.0);

@@ -39,6 +39,8 @@ class BondMonitor {
   BondMonitor(const Body& body, bool skip) : body_(body), skip_(skip), reference_(body.make_field(body.dimension())) {}
   /// Groups cell by cell; cell_first has one more entry than there are cells.
   void set_cells(std::vector<Group> groups, std::vector<std::size_t> cell_first);
+  /// Before everything else in each call of `find`.
+  virtual void begin(ConstFieldView) {}
   /// moved[c]: a bound of the change of the bonds of cell c from reference_ to u, in the units of the margins.
   virtual void bound_motion(ConstFieldView u, std::span<double> moved) = 0;
   /// Appends the bonds of the group that fail; returns the least margin of its other ones.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "cloud_rows.hpp"
+#include "perikit/core/simd.hpp"
 
 namespace perikit {
 
@@ -21,8 +22,11 @@ class CloudMonitor final : public BondMonitor {
 
  private:
   void make_cells();
+  void begin(ConstFieldView u) override { mirror_rows(u, body_.points(), u_); }
   void bound_motion(ConstFieldView u, std::span<double> moved) override;
   double check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) override;
+  bool between(std::int64_t bond, std::int32_t p, double stretch, double onset, std::vector<BondChange>& changes) const;
+  std::size_t bytes() const noexcept override { return BondMonitor::bytes() + u_.size() * sizeof(Row); }
 
   const FamilyLists& lists_;
   const CloudBonds& bonds_;
@@ -30,6 +34,7 @@ class CloudMonitor final : public BondMonitor {
   const Row* position_;
   std::vector<std::vector<std::int32_t>> near_;   ///< by cell: those with partners of its points, itself too
   std::vector<Row> low_, high_;                   ///< motion by cell
+  AlignedVector<Row> u_;                          ///< mirror
 };
 
 void CloudMonitor::make_cells() {
@@ -91,38 +96,61 @@ void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
   });
 }
 
-double CloudMonitor::check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) {
+double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondChange>& changes) {
+  constexpr std::int64_t at_once = 64;
+  alignas(64) double square[at_once], difference[at_once], limit[at_once];
   const double* onset = damage_.onset.data();
-  const double* last = damage_.last().data();
-  double margin = std::numeric_limits<double>::infinity();
+  const Pack none(std::numeric_limits<double>::infinity());
+  Pack margin = none;
   for (int l = 0; l < static_cast<int>(padding); ++l) {
     if (!(group.live >> l & 1)) continue;
     const std::int32_t p = group.first + l;
-    for (std::int64_t k = lists_.first[static_cast<std::size_t>(p)]; k < lists_.first[static_cast<std::size_t>(p) + 1]; ++k) {
-      const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k)];
-      const double b = bonds_[static_cast<std::size_t>(k)];
-      if (j < p || b == 0) continue;
-      // e = (|y|^2 - |xi|^2)/(|y| + |xi|)
-      const Row xi = position_[j] - position_[p];
-      double square = 0, difference = 0;
-      for (int c = 0; c < u.components; ++c) {
-        const double du = u.component(c)[j] - u.component(c)[p];
-        square += xi[c] * xi[c];
-        difference += du * (2 * xi[c] + du);
+    const Row own_position = position_[p], own_u = u_[static_cast<std::size_t>(p)];
+    const std::int64_t end = lists_.first[static_cast<std::size_t>(p) + 1];
+    for (std::int64_t k = bonds_.index(p, p); k < end; k += at_once) {
+      const auto n = static_cast<int>(std::min(at_once, end - k)), lanes = (n + pack_width - 1) / pack_width * pack_width;
+      for (int b = 0; b < n; ++b) {
+        const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k + b)];
+        const Row xi = position_[j] - own_position, du = u_[j] - own_u, squares = xi * xi, changes = du * (xi + xi + du);
+        square[b] = squares[0] + squares[1] + squares[2];
+        difference[b] = changes[0] + changes[1] + changes[2];
+        limit[b] = 0.5 * (onset[p] + onset[j]);
       }
-      const double length = std::sqrt(square), e = difference / (std::sqrt(square + difference) + length), limit = 0.5 * (onset[p] + onset[j]);
-      const double left = limit * length - e;
-      if (left > 1e-13 * length) {
-        margin = std::min(margin, left);
-        continue;
+      for (int b = 0; b < n; ++b)
+        if (bonds_[static_cast<std::size_t>(k + b)] == 0) square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
+      for (int b = n; b < lanes; ++b) square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
+      for (int b = 0; b < lanes; b += pack_width) {
+        // e = (|y|^2 - |xi|^2)/(|y| + |xi|)
+        const Pack squared = Pack::load(square + b), change = Pack::load(difference + b), length = sqrt(squared), e = change / (sqrt(squared + change) + length),
+                   left = Pack::load(limit + b) * length - e;
+        const PackMask far = left > Pack(1e-13) * length;
+        margin = min(margin, select(far, left, none));
+        if (all(far)) continue;
+        alignas(64) double lengths[pack_width], extensions[pack_width], rest[pack_width];
+        length.store(lengths);
+        e.store(extensions);
+        left.store(rest);
+        for (int lane = 0; lane < std::min(pack_width, n - b); ++lane) {
+          if (rest[lane] > 1e-13 * lengths[lane]) continue;
+          if (between(k + b + lane, p, extensions[lane] / lengths[lane], limit[b + lane], changes)) margin = Pack(0.0);
+        }
       }
-      alignas(64) double stretch[padding] = {e / length}, start[padding] = {limit}, failure[padding] = {0.5 * (last[p] + last[j])}, now[padding] = {};
-      damage_.law->integrity({1, stretch, start, failure, now});
-      if (now[0] < b) changes.push_back({p, j, k, now[0]});
-      if (std::min(now[0], b) > 0) margin = 0;   // between whole and broken: looked at every time
     }
   }
-  return margin;
+  alignas(64) double least[pack_width];
+  margin.store(least);
+  return *std::min_element(least, least + pack_width);
+}
+
+/// A bond beyond its onset: appended where its integrity falls. Whether it stays between whole and broken, to be looked at every time.
+bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, double onset, std::vector<BondChange>& changes) const {
+  const auto k = static_cast<std::size_t>(bond);
+  const std::int32_t j = lists_.neighbour[k];
+  const double* last = damage_.last().data();
+  alignas(64) double s[padding] = {stretch}, start[padding] = {onset}, failure[padding] = {0.5 * (last[p] + last[j])}, now[padding] = {};
+  damage_.law->integrity({1, s, start, failure, now});
+  if (now[0] < bonds_[k]) changes.push_back({p, j, bond, now[0]});
+  return std::min(now[0], bonds_[k]) > 0;
 }
 
 }  // namespace

@@ -138,6 +138,8 @@ template <int D>
 void CloudFamilies::measure_whole() {
   const Row* position = reinterpret_cast<const Row*>(body.rows().data());
   total_.resize(body.points());
+  intact_.resize(body.points());
+  left_.assign(body.points(), 1.0);
   whole_shape_.assign(6 * body.points(), 0.0);
   for (std::size_t p = 0; p < body.points(); ++p) {
     double intact = 0;
@@ -147,6 +149,7 @@ void CloudFamilies::measure_whole() {
       intact += w;
       add_shape<D>(w, position[j] - position[p], &whole_shape_[6 * p]);
     }
+    intact_[p] = intact;
     total_[p] = intact > 0 ? intact / (1 - damage.data()[p]) : 0.0;
   }
   for (const auto& [p, K] : cracked_shape_) std::copy(K.begin(), K.end(), &whole_shape_[6 * static_cast<std::size_t>(p)]);
@@ -165,6 +168,7 @@ double CloudFamilies::changed_point(std::size_t p) {
     add_shape<D>(w, position[j] - position[p], K);
   }
   invert_shape<D>(K, &inverse[6 * p], condition.data() + p);
+  left_[p] = intact_[p] > 0 ? intact / intact_[p] : 1.0;
   const double share = total_[p] > 0 ? intact / total_[p] : 0.0;
   weight[p] = position[p][3] * share;
   damage.data()[p] = total_[p] > 0 ? 1 - share : 1.0;
@@ -209,7 +213,7 @@ void CloudFamilies::load(std::size_t p, FamilyArrays& out) const {
 std::size_t CloudFamilies::bytes() const noexcept {
   return lists.neighbour.size() * sizeof(std::int32_t) + lists.first.size() * sizeof(std::int64_t) +
          (omega.size() + inverse.size() + weight.size() + normaliser.size()) * sizeof(double) + condition.bytes() + damage.bytes() +
-         (whole_.size() + total_.size() + whole_shape_.size()) * sizeof(double) + cracked_shape_.size() * sizeof(cracked_shape_[0]) + (bonds_ ? bonds_->bytes() : 0);
+         (whole_.size() + intact_.size() + left_.size() + total_.size() + whole_shape_.size()) * sizeof(double) + cracked_shape_.size() * sizeof(cracked_shape_[0]) + (bonds_ ? bonds_->bytes() : 0);
 }
 
 }  // namespace perikit

@@ -40,6 +40,8 @@ struct CloudFamilies {
   bool fails() const noexcept { return bonds_.has_value(); }
   /// Whether bonds of the point have failed or weakened since the set-up.
   bool lost_bonds(std::size_t p) const noexcept;
+  /// The share of its influence at the set-up that a point has left.
+  double left(std::size_t p) const noexcept { return left_.empty() ? 1.0 : left_[p]; }
   /// Shape tensors, weights and damage of points whose bonds have changed. Returns the bonds left to those of them that are
   /// fragments, bonds between two of them twice.
   std::vector<BondChange> changed(std::span<const std::int32_t> points);
@@ -60,7 +62,9 @@ struct CloudFamilies {
 
   std::optional<CloudBonds> bonds_;
   AlignedVector<double> whole_;       ///< with damage: omega by bond at the set-up,
-  AlignedVector<double> total_;       ///< sum omega V_j of the whole family by point,
+  AlignedVector<double> intact_;      ///< sum omega V_j at the set-up by point,
+  AlignedVector<double> left_;        ///< the share of it that is left,
+  AlignedVector<double> total_;       ///< the same sum over the whole family,
   AlignedVector<double> whole_shape_; ///< and its K, rows of 6
   std::vector<std::pair<std::int32_t, std::array<double, 6>>> cracked_shape_;   ///< K of the whole family of points with cut bonds, in any order
 };

@@ -40,7 +40,7 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
     if (traits_.selective) {
       volume_.resize(n);
       pressure_.resize(n);
-      for (std::size_t p = 0; p < n; ++p) volume_[p][volume_regular] = std::isfinite(families_.condition.data()[p]) ? 1.0 : 0.0;
+      for (std::size_t p = 0; p < n; ++p) volume_[p][volume_share] = share_of_volume(p);
     }
   }
 }
@@ -206,7 +206,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     if (traits_.selective) {
       // One group for the owner, then those of the far ends.
       constexpr int group = static_cast<int>(padding);
-      s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular == 0};
+      s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular == 0 && !families_.fails()};
       for (int l = 0; l < lanes; l += group) {
         s.volume_group[l / group] = 0;
         if (half) s.volume_group[(lanes + l) / group] = l + group;
@@ -410,6 +410,14 @@ EvaluationStatus CloudModel<D>::tangent(ConstFieldView u, ConstFieldView w, Fiel
 template <int D>
 EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) {
   return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+std::vector<BondChange> CloudModel<D>::bonds_changed(std::span<const std::int32_t> points) {
+  std::vector<BondChange> fragments = families_.changed(points);
+  if (traits_.selective)
+    for (const std::int32_t p : points) volume_[static_cast<std::size_t>(p)][volume_share] = share_of_volume(static_cast<std::size_t>(p));
+  return fragments;
 }
 
 template <int D>

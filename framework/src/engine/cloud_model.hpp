@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -35,7 +36,7 @@ class CloudModel final : public AssemblingModel {
   static constexpr std::size_t block_points = cloud_block_points;
 
   double energy_of(ConstFieldView u, const GroupMarks& marks) override;
-  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override { return families_.changed(points); }
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override;
   EvaluationStatus run(Pass& pass);
   /// sum_j omega V_j u_ij xi_e as rows over components: S[e].
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept;
@@ -47,6 +48,10 @@ class CloudModel final : public AssemblingModel {
   /// selective: volume changes of the points of the block; its stress on their gradients, from the pressures.
   void volumes_block(std::size_t b, bool tangent) noexcept;
   void pressures_block(std::size_t b, bool tangent) noexcept;
+  /// selective: c of a point (selective_map.hpp).
+  double share_of_volume(std::size_t p) const noexcept {
+    return std::isfinite(families_.condition.data()[p]) ? families_.left(p) : 0.0;
+  }
   /// force_ += G^T S for the block, S the stress on Hbar (stored stencils).
   void scatter_block(std::size_t b) noexcept;
   /// Rows of Q = S K^-1 from rows of S.

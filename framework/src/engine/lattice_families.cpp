@@ -133,7 +133,7 @@ bool LatticeFamilies::moves(std::size_t b, ConstFieldView u) const noexcept {
                      });
 }
 
-void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, unsigned lanes) const {
+void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, bool set_up, unsigned lanes) const {
   const int d = lattice.dimension;
   for (int l = 0; l < chunk_points; ++l) {
     if (!(lanes >> l & 1)) continue;
@@ -163,6 +163,8 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
     p.weight[l] = live ? volume * share : 0.0;
     p.scale[l] = live && normaliser > 0 ? volume / normaliser : 0.0;
     p.condition[l] = live ? condition : 0.0;
+    if (set_up) p.intact[l] = intact_omega;
+    p.left[l] = p.intact[l] > 0 ? intact_omega / p.intact[l] : 1.0;
     p.support[l] = !(p.irregular >> l & 1) ? 1.0
                  : d == 3 ? shape_support<3>(K, whole_shape) : d == 2 ? shape_support<2>(K, whole_shape) : shape_support<1>(K, whole_shape);
   }
@@ -186,7 +188,7 @@ std::uint8_t LatticeFamilies::live_masks(std::int64_t first, std::vector<std::ui
 void LatticeFamilies::make_patterns() {
   const std::size_t slots = offsets.size();
   whole.mask.assign(slots, 0xff);
-  finish_pattern(whole, whole.mask);
+  finish_pattern(whole, whole.mask, true);
   for (int l = 0; l < chunk_points; ++l) {
     for (auto& moment : whole.moment) moment[l] = 0.0;   // exactly, not to rounding
   }
@@ -220,7 +222,7 @@ void LatticeFamilies::make_patterns() {
       pattern.mask = mask;
       pattern.live = live;
       pattern.irregular = irregular;
-      finish_pattern(pattern, live_mask);
+      finish_pattern(pattern, live_mask, true);
     }
     chunk.pattern = entry->second;
     singular += static_cast<std::size_t>(__builtin_popcount(patterns[static_cast<std::size_t>(entry->second)].singular));
@@ -280,7 +282,7 @@ std::vector<std::int32_t> LatticeFamilies::break_bonds(std::span<const BondChang
     live_masks(first, live_mask);
     LatticePattern& p = own_pattern(chunks[static_cast<std::size_t>(chunk_of(first))]);
     singular -= static_cast<std::size_t>(__builtin_popcount(p.singular));
-    finish_pattern(p, live_mask, lanes);
+    finish_pattern(p, live_mask, false, lanes);
     singular += static_cast<std::size_t>(__builtin_popcount(p.singular));
   }
   return ends;

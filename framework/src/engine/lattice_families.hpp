@@ -27,6 +27,8 @@ struct LatticePattern {
   alignas(64) double scale[chunk_points];      ///< V_i / N_i of the bond weights, N_i over the intact family
   alignas(64) double damage[chunk_points];     ///< D_i
   alignas(64) double condition[chunk_points];  ///< of K
+  alignas(64) double intact[chunk_points];     ///< sum omega over the bonds of the set-up
+  alignas(64) double left[chunk_points];       ///< the share of it that is left
   alignas(64) double support[chunk_points];    ///< of K relative to that of the whole family; 1 where nothing is broken
   std::uint8_t live = 0xff;
   std::uint8_t irregular = 0;                  ///< lanes with broken bonds
@@ -131,8 +133,8 @@ class LatticeFamilies {
   void make_blocks(bool whole_rows);
   void make_patterns();
   void index_chunks();
-  /// All that follows from the masks, for some of the lanes.
-  void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, unsigned lanes = 0xff) const;
+  /// All that follows from the masks, for some of the lanes. set_up: nothing has failed yet.
+  void finish_pattern(LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask, bool set_up, unsigned lanes = 0xff) const;
   /// Live cells of a chunk, and for each slot those whose far ends are live too.
   std::uint8_t live_masks(std::int64_t first, std::vector<std::uint8_t>& live_mask) const;
   LatticePattern& own_pattern(LatticeChunk& chunk);

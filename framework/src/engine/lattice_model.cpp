@@ -62,7 +62,7 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
     volume_ = body_.make_field(volume_components);
     pressure_ = body_.make_field(2);
     for (const LatticeChunk& chunk : families_.chunks)
-      for (int l = 0; l < chunk_points; ++l) volume_.component(volume_regular)[chunk.first + l] = families_.pattern(chunk).singular >> l & 1 ? 0.0 : 1.0;
+      for (int l = 0; l < chunk_points; ++l) volume_.component(volume_share)[chunk.first + l] = share_of_volume(chunk, l);
   }
   scale_ = body_.make_field(1);
   for (const LatticeChunk& chunk : families_.chunks) {
@@ -308,7 +308,7 @@ OwnerGradients LatticeModel<D>::owner_gradients(const LatticeChunk& chunk, bool 
 /// Volume changes of the owners, and those of the far ends after them.
 template <int D>
 void LatticeModel<D>::point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept {
-  s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, families_.singular == 0};
+  s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, families_.singular == 0 && families_.failed == 0};
   std::fill_n(s.volume_group, slots, chunk.first);
   for (int k = 0; k < slots && pairs_; ++k) s.volume_group[slots + k] = chunk.first + families_.shifts[slot + static_cast<std::size_t>(k)];
 }
@@ -556,6 +556,14 @@ EvaluationStatus LatticeModel<D>::tangent(ConstFieldView u, ConstFieldView w, Fi
 template <int D>
 EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples) {
   return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
+}
+
+template <int D>
+std::vector<BondChange> LatticeModel<D>::bonds_changed(std::span<const std::int32_t> points) {
+  for (const std::int32_t p : points)
+    if (traits_.selective)
+      volume_.component(volume_share)[p] = share_of_volume(families_.chunks[static_cast<std::size_t>(families_.chunk_of(p))], p % chunk_points);
+  return families_.fragment_bonds(points);
 }
 
 template <int D>

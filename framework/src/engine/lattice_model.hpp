@@ -36,8 +36,11 @@ class LatticeModel final : public AssemblingModel {
 
  private:
   double energy_of(ConstFieldView u, const GroupMarks& marks) override;
-  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override {
-    return families_.fragment_bonds(points);
+  std::vector<BondChange> bonds_changed(std::span<const std::int32_t> points) override;
+  /// selective: c of a lane (selective_map.hpp).
+  double share_of_volume(const LatticeChunk& chunk, int lane) const noexcept {
+    const LatticePattern& pattern = families_.pattern(chunk);
+    return pattern.singular >> lane & 1 ? 0.0 : pattern.left[lane];
   }
   EvaluationStatus run(Pass& pass);
   void zero_rows(const LatticeBlock& block, FieldView out) const noexcept;

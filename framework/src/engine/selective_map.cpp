@@ -64,23 +64,22 @@ Pack load_volume(const OwnerVolumes& owners, int component, int at) noexcept {
   return Pack::load(owners.data + static_cast<std::size_t>(component) * owners.stride + owners.group[at / group] + at % group);
 }
 
-/// x, or 0 for owners without a gradient.
-Pack regular(const OwnerVolumes& owners, int at, Pack x) noexcept {
-  return owners.all_regular ? x : load_volume(owners, volume_regular, at) * x;
-}
+/// c
+Pack share_of(const OwnerVolumes& owners, int at) noexcept { return owners.whole ? Pack(1.0) : load_volume(owners, volume_share, at); }
 
-/// a - 1 = cbrt(1 + r) - 1 = r / (a^2 + a + 1) with r = Jbar/Jt - 1: exactly 0 at rest, no digits lost near it.
+/// a - 1 = c (cbrt(1 + r) - 1) = c r / (q^2 + q + 1) with r = Jbar/Jt - 1, q = cbrt(1 + r): exactly 0 at rest, no digits lost near it.
 struct Growth {
   Pack jt, inverse, root;  ///< Jt - 1, 1/Jt, Jt^(-1/3)
   Pack operator()(const OwnerVolumes& owners, int at) const noexcept {
-    const Pack r = (load_volume(owners, volume_jacobian, at) - jt) * inverse, a = load_volume(owners, volume_root, at) * root;
-    return regular(owners, at, r * reciprocal(a * a + a + Pack(1.0)));
+    const Pack r = (load_volume(owners, volume_jacobian, at) - jt) * inverse, q = load_volume(owners, volume_root, at) * root;
+    const Pack growth = r * reciprocal(q * q + q + Pack(1.0));
+    return owners.whole ? growth : load_volume(owners, volume_share, at) * growth;
   }
 };
 
-/// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = a phi.
+/// phi = (tr Fbar^-1 dFbar - tr Ft^-1 dFt) / 3, so that da = m phi with m = c q = a - 1 + c.
 Pack growth_rate(const OwnerVolumes& owners, int at, Pack rate) noexcept {
-  return regular(owners, at, Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate));
+  return Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate);
 }
 
 template <class S, bool tangent>
@@ -99,20 +98,23 @@ template <class S, bool tangent>
       const auto dFt = load_in_space<S>(in.dHt + l, batch_points);
       const Pack rate = inverse * inner(cofactor(Ft), dFt);
       for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
-        const auto dFh = (Pack::load(in.growth + at) + Pack(1.0)) * (dFt + growth_rate(in.volume, at, rate) * Ft);
+        const Pack grow = Pack::load(in.growth + at), m = grow + share_of(in.volume, at);
+        const auto dFh = (grow + Pack(1.0)) * dFt + (m * growth_rate(in.volume, at, rate)) * Ft;
         PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + at);
       }
     }
   }
 }
 
-/// What the pull-backs of forces and tangents share: W a and W p/3 of one end, the latter stored.
+/// What the pull-backs of forces and tangents share: a, m, W and W m/3 of one end.
 struct EndOfBond {
-  Pack a, weight, share;
+  Pack growth, a, m, weight, share;
   EndOfBond(const SelectiveBatch& in, const SelectiveStress& stress, int end, int l) noexcept
-      : a(Pack::load(in.growth + end * in.lanes + l) + Pack(1.0)),
+      : growth(Pack::load(in.growth + end * in.lanes + l)),
+        a(growth + Pack(1.0)),
+        m(in.volume.whole ? a : growth + share_of(in.volume, end * in.lanes + l)),
         weight(Pack(stress.sign) * Pack::load(stress.weight[end] + l)),
-        share(regular(in.volume, end * in.lanes + l, Pack(1.0 / 3.0) * weight * a)) {}
+        share(Pack(1.0 / 3.0) * weight * m) {}
 };
 
 template <class S>
@@ -138,7 +140,7 @@ template <class S>
   }
 }
 
-/// d(a P - p/3 F^-T) = a (dP + phi P) - dp/3 F^-T + p/3 F^-T dF^T F^-T
+/// d(a P - p/3 F^-T) = a dP + m phi P - dp/3 F^-T + p/3 F^-T dF^T F^-T
 template <class S>
 [[gnu::flatten]] void pull_back_tangent(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
   for (int l = 0; l < in.lanes; l += pack_width) {
@@ -157,7 +159,7 @@ template <class S>
       dp.store(stress.pressure_rate + at);
       sum_p += p;
       sum_dp += dp;
-      sum = sum + (bond.weight * bond.a) * (dP + phi * P);
+      sum = sum + bond.weight * (bond.a * dP + (bond.m * phi) * P);
     }
     store_in_space(sum - sum_dp * Ftm + sum_p * (Ftm * transpose_times(dFt, Ftm)), stress.S + l);
   }

@@ -3,7 +3,10 @@
 /// its owner, Fh = a Ft with a = (Jbar / Jt)^(1/3), Ft the point's own gradient, Fbar the owner's. With p = P(Fh) : Fh,
 ///   dpsi/dFt = a P - (p/3) Ft^-T,   dpsi/dFbar = (p/3) Fbar^-T:
 /// of an owner, bonds need scalars only, and give it the scalar sum of W p/3. A pair-symmetric Ft is mapped for both of its
-/// owners. An owner without a gradient of its own leaves Ft as it is (a = 1).
+/// owners.
+///
+/// The volume of an owner whose bonds fail counts for less and less: a = 1 + c ((Jbar / Jt)^(1/3) - 1), c the share of its influence at
+/// the set-up that is left (and p/3 is (a - 1 + c) P : Ft / 3). c = 0 for an owner without a gradient of its own. Why: decision 0010.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,9 +15,8 @@
 
 namespace perikit {
 
-/// Components of an owner's volume change: Jbar - 1, Jbar^(1/3), 1 or 0 for an owner without a gradient, and (tangents)
-/// tr(Fbar^-1 dFbar).
-inline constexpr int volume_jacobian = 0, volume_root = 1, volume_regular = 2, volume_rate = 3, volume_components = 4;
+/// Components of an owner's volume change: Jbar - 1, Jbar^(1/3), c, and (tangents) tr(Fbar^-1 dFbar).
+inline constexpr int volume_jacobian = 0, volume_root = 1, volume_share = 2, volume_rate = 3, volume_components = 4;
 
 /// Gradients of n points (a multiple of `padding`), in-space components: H[c * stride + point].
 struct OwnerGradients {
@@ -24,7 +26,7 @@ struct OwnerGradients {
   const double* dH;  ///< direction; null: no tangent
 };
 
-/// volume[c * stride + point], but for volume_regular, which is the caller's. NaN where Jbar <= 0.
+/// volume[c * stride + point], but for volume_share, which is the caller's. NaN where Jbar <= 0.
 void owner_volume(Space space, const OwnerGradients& in, double* volume, std::size_t stride) noexcept;
 
 /// S += dE/dFbar (or, with directions, its derivative) from pressure = sum of W p/3 and pressure_rate = sum of W dp/3, in-space
@@ -37,7 +39,7 @@ struct OwnerVolumes {
   const double* data;
   std::size_t stride;
   const std::int64_t* group;
-  bool all_regular;  ///< volume_regular is 1 everywhere and not read
+  bool whole;  ///< volume_share is 1 everywhere and not read
 };
 
 /// A batch of bonds seen from one or both ends. Arrays [component][lane] have stride batch_points; what belongs to end e of

@@ -95,9 +95,11 @@ class WeightedModel final : public AssemblingModel {
   std::int32_t side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   /// W of evaluation point q of point p.
   double weight(std::int32_t p, double share) const noexcept;
-  /// Keeps Hbar of the points, evaluation point 0, and gives their volume changes to every lane of the batch.
-  void keep_owner_gradients(int points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
+  /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch.
+  void keep_owner_gradients(std::span<const std::int32_t> points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
 
+  /// The share of its influence at the set-up that a point has left.
+  double left(std::int32_t p) const noexcept;
   /// No gradient at evaluation points slot ... slot + slots - 1, of eight owners side by side, of the owners that are not kept.
   static void clear_lanes(std::uint8_t kept, int slot, int slots, double* H, double* dH) noexcept;
   /// Of eight owners side by side (selective map): pressure on their gradients and its rate += those of the lanes, owner l at lanes

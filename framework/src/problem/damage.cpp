@@ -139,8 +139,8 @@ std::string BodyProblem::fracture_summary() const {
         100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
   }
   if (gains_ > 0) {
-    text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all ({:.3g} of what was dissipated)\n", gains_, gained_,
-                        gained_ / std::max(energies_.dissipated, 1e-300));
+    const double lost = energies_.dissipated + gained_;
+    text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n", gains_, gained_, lost);
   }
   return text;
 }

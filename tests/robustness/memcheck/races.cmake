@@ -4,7 +4,8 @@
 file(REMOVE_RECURSE ${work})
 file(MAKE_DIRECTORY ${work})
 set(ENV{OMP_WAIT_POLICY} passive)
-set(ENV{OPENBLAS_NUM_THREADS} 1)   # its own threads are not built with the sanitizer
+set(ENV{OPENBLAS_NUM_THREADS} 1)   # its own threads are not built with the sanitizer,
+set(ENV{OMP_THREAD_LIMIT} 1)       # nor are those of CHOLMOD; perikit's are no OpenMP threads here
 set(ENV{TSAN_OPTIONS} "halt_on_error=1 exitcode=66")
 set(scenes ${CMAKE_CURRENT_LIST_DIR})
 function(clean name)

@@ -35,7 +35,7 @@ void BondAssembly<D>::read_bonds() {
   const std::size_t rows = families().rows();
   bond_.resize(families().bonds());
   own_gradient_.assign(D * rows, 0.0);
-  regular_.assign(rows, 0);
+  volume_share_.assign(rows, 0.0);
   struct Scratch {
     FamilyArrays family;
     AlignedVector<double> share, correction;
@@ -50,7 +50,8 @@ void BondAssembly<D>::read_bonds() {
     s.correction.assign(D * s.family.size, 0.0);
     kinematics_->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
     point_gradient(s.family, families().body().horizon(), traits_.order, s.gradient);
-    regular_[i] = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
+    const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
+    volume_share_[i] = regular ? families().left(i) : 0.0;
     const auto neighbours = families().neighbours(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Bond& bond = bond_[families().first(i) + k];
@@ -98,7 +99,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
   const std::size_t p = families().point(i), q = families().point(j);
   const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
-  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, regular_[i] != 0);
+  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i]);
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
   const double* own = Hbar_.data() + entries * i;

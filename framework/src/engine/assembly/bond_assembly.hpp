@@ -55,7 +55,7 @@ class BondAssembly final : public Assembly {
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
   AlignedVector<double> Hbar_;                     ///< by row
-  std::vector<std::uint8_t> regular_;              ///< rows with a gradient
+  AlignedVector<double> volume_share_;             ///< selective: c by row
   AlignedVector<double> diagonal_, off_diagonal_;  ///< Q by row, by bond
   Colouring colouring_;
   PerThread<Memory> memory_;

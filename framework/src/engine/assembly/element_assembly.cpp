@@ -48,7 +48,7 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   for (int c = 0; c < D && owners > 0; ++c)
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
   for (int q = 0; q < element.points; ++q) {
-    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)]);
+    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], families().left(row));
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) {
         m.batch.H(lane, c * D + e) = gradient(owners + q, c, e);

@@ -30,7 +30,7 @@ void LocalForceAssembly<D>::add_lanes(std::size_t row, ConstFieldView u) {
   };
   batch_.clear();
   for (std::size_t q = 0; q < family.size(); ++q) {
-    const int lane = batch_.add(static_cast<std::int32_t>(p), families().volume(row) * point_.share[q]);
+    const int lane = batch_.add(static_cast<std::int32_t>(p), families().volume(row) * point_.share[q], 1.0);
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) {
         batch_.H(lane, c * D + e) = gradient(point_.at(q, 0), c, e);

@@ -32,6 +32,8 @@ class PointFamilies {
   /// Rows with the whole family of a lattice: all of them have the same stencils.
   bool whole(std::size_t row) const noexcept { return !whole_.empty() && whole_[row]; }
   double damage(std::size_t row) const noexcept { return damage_[row]; }   ///< D_i
+  /// The share of its influence at the set-up that is left.
+  double left(std::size_t row) const noexcept { return first_.damage.empty() ? 1.0 : (1 - damage_[row]) / (1 - first_.damage[row]); }
   double normaliser(std::size_t row) const noexcept { return normaliser_[row]; }   ///< N_i of bond weights over the whole family
   /// Every change of bonds since the set-up. Those that fail stay in the lists, with less or no influence.
   void set_bonds(std::span<const BondChange> changes);

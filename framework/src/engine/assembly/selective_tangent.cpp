@@ -19,29 +19,29 @@ Tensor<double, S> inverse_transpose(const double* H) noexcept {
 
 }  // namespace
 
-// With B = A : Fh, p = P : Fh, s = Fh : B, t = Ft^-T, b = Fbar^-T, C = B + P and (t * t)_(ij)(kl) = t_il t_kj, the derivative of
-// t:
-//   dFt  dFt     a^2 A - a/3 (C (x) t + t (x) C) + (s + p)/9 t (x) t + p/3 t * t
-//   dFt  dFbar   a/3 C (x) b - (s + p)/9 t (x) b
+// With m = c (Jbar/Jt)^(1/3) = a - 1 + c, B = A : Ft, p = m P : Ft, s = m^2 Ft : B, t = Ft^-T, b = Fbar^-T, C = m (a B + P) and
+// (t * t)_(ij)(kl) = t_il t_kj, the derivative of t:
+//   dFt  dFt     a^2 A - 1/3 (C (x) t + t (x) C) + (s + p)/9 t (x) t + p/3 t * t
+//   dFt  dFbar   1/3 C (x) b - (s + p)/9 t (x) b
 //   dFbar dFbar  (s + p)/9 b (x) b - p/3 b * b
 template <int D>
 void selective_tangent(const SelectiveLane& x, double* own, double* mixed, double* bar) noexcept {
   using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
   using T = Tensor<double, S>;
   constexpr int n = D * D;
-  const T none = T::map([](int) { return 0.0; });   // a does not change for an owner without a gradient
-  const T t = x.regular ? inverse_transpose<S>(x.Ht) : none, b = x.regular ? inverse_transpose<S>(x.Hbar) : none;
+  const double a = x.growth + 1, m = x.growth + x.share;
+  const T t = inverse_transpose<S>(x.Ht), b = inverse_transpose<S>(x.Hbar);
   const T P = T::map([&](int c) { return x.P[c * batch_points]; });
-  const T F = x.a * add_diagonal(T::map([&](int c) { return c < n ? x.Ht[c * batch_points] : 0.0; }), 1.0);
+  const T F = add_diagonal(T::map([&](int c) { return c < n ? x.Ht[c * batch_points] : 0.0; }), 1.0);
   T B{};
   for (int r = 0; r < S::components; ++r)
     for (int c = 0; c < S::components; ++c) B[r] += x.A[(r * S::components + c) * batch_points] * F[c];
-  const double p = inner(P, F), trace = (inner(F, B) + p) / 9;
-  const T C = x.a / 3 * (B + P);
+  const double p = m * inner(P, F), trace = (m * m * inner(F, B) + p) / 9;
+  const T C = m / 3 * (a * B + P);
   for (int r = 0; r < n; ++r) {
     for (int c = 0; c < n; ++c) {
       const int i = r / D, j = r % D, k = c / D, l = c % D, at = r * n + c;
-      own[at] = x.weight * (x.a * x.a * x.A[(r * S::components + c) * batch_points] - (C[r] * t[c] + t[r] * C[c]) +
+      own[at] = x.weight * (a * a * x.A[(r * S::components + c) * batch_points] - (C[r] * t[c] + t[r] * C[c]) +
                             trace * t[r] * t[c] + p / 3 * t(i, l) * t(k, j));
       mixed[at] = x.weight * (C[r] * b[c] - trace * t[r] * b[c]);
       bar[at] = x.weight * (trace * b[r] * b[c] - p / 3 * b(i, l) * b(k, j));

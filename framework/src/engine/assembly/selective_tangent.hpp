@@ -1,5 +1,5 @@
 #pragma once
-/// Second derivatives of psi(a Ft), a = (Jbar/Jt)^(1/3), with respect to Ft and Fbar, in closed form.
+/// Second derivatives of psi(a Ft), a = 1 + c ((Jbar/Jt)^(1/3) - 1), with respect to Ft and Fbar, in closed form.
 
 namespace perikit {
 
@@ -9,9 +9,9 @@ struct SelectiveLane {
   const double* Hbar;  ///< in-space
   const double* P;     ///< at Fh = a Ft, all components of the space
   const double* A;     ///< likewise
-  double a;
+  double growth;  ///< a - 1
+  double share;   ///< c
   double weight;  ///< W: factor of the results
-  bool regular;   ///< whether the owner has a gradient; a = 1 without
 };
 
 /// own, mixed, bar <- W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar over in-space components, D^2 x D^2 row-major.

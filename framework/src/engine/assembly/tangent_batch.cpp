@@ -24,13 +24,13 @@ TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), s
 }
 
 template <int D>
-int TangentBatch<D>::add(std::int32_t owner, double weight, bool owner_has_gradient) {
+int TangentBatch<D>::add(std::int32_t owner, double weight, double share) {
   const int lane = lanes_++;
   if (static_cast<std::size_t>(lane) == owner_.size()) {
     const std::size_t size = owner_.size() + batch_points;
     owner_.resize(size);
     weight_.resize(size);
-    regular_.resize(size);
+    share_.resize(size);
     H_.resize(size * stored, 0.0);
     own_.resize(size * entries);
     if (selective_) {
@@ -41,7 +41,7 @@ int TangentBatch<D>::add(std::int32_t owner, double weight, bool owner_has_gradi
   }
   owner_[static_cast<std::size_t>(lane)] = owner;
   weight_[static_cast<std::size_t>(lane)] = weight;
-  regular_[static_cast<std::size_t>(lane)] = owner_has_gradient ? 1.0 : 0.0;
+  share_[static_cast<std::size_t>(lane)] = share;
   return lane;
 }
 
@@ -112,7 +112,7 @@ template <int D>
 int TangentBatch<D>::evaluate_selective(int first, int n) {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   owner_volume(laws_.space(), {lanes, batch_points, &owner_H(first, 0), nullptr}, volume_.data(), batch_points);
-  std::copy_n(regular_.data() + first, lanes, volume_.data() + volume_regular * batch_points);
+  std::copy_n(share_.data() + first, lanes, volume_.data() + volume_share * batch_points);
   const OwnerVolumes owners{volume_.data(), batch_points, volume_group_.data(), false};
   selective_map(laws_.space(), {lanes, 1, &H(first, 0), nullptr, owners, inverse_.data(), growth_.data()}, mapped_.data(), nullptr);
   LawBatch batch;
@@ -125,8 +125,8 @@ int TangentBatch<D>::evaluate_selective(int first, int n) {
   if (!status.ok()) return status.inadmissible;
   for (int l = 0; l < n; ++l) {
     const auto at = static_cast<std::size_t>(first + l), lane = at * entries;
-    const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)] + 1,
-                           weight_[at], regular_[at] != 0};
+    const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)],
+                           share_[at], weight_[at]};
     selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
   }
   return -1;

@@ -18,9 +18,8 @@ class TangentBatch {
   TangentBatch(const Laws& laws, bool selective);
   void clear() noexcept { lanes_ = 0; }
   int lanes() const noexcept { return lanes_; }
-  /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. Without a gradient of the owner the
-  /// selective map leaves Ft alone.
-  int add(std::int32_t owner, double weight, bool owner_has_gradient = true);
+  /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. share: c of the selective map.
+  int add(std::int32_t owner, double weight, double share);
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
@@ -47,7 +46,7 @@ class TangentBatch {
   int lanes_ = 0;
   AlignedVector<double> H_, Hbar_;   ///< batches of [component][batch_points]
   std::vector<std::int32_t> owner_;  ///< padded to batches
-  std::vector<double> weight_, regular_;   ///< regular: 1, or 0 where the owner has no gradient
+  std::vector<double> weight_, share_;   ///< by lane
   AlignedVector<double> own_, mixed_, bar_;
   AlignedVector<double> A_, P_, mapped_, growth_, inverse_, volume_;
   std::vector<std::int64_t> volume_group_;
