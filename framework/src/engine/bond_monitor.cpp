@@ -15,9 +15,9 @@ void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> 
 }
 
 std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
-  const bool all_groups = renew_ || !skip_;
-  begin(u);
-  if (all_groups) {
+  const bool known = begin(u) && skip_, all_groups = (renew_ && !known) || !skip_;
+  if (known) {
+  } else if (all_groups) {
     std::copy_n(u.data, u.size(), reference_.data());
     std::fill(moved_.begin(), moved_.end(), 0.0);
   } else {
@@ -27,10 +27,12 @@ std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
     checks_[c] = 0;
     for (std::size_t g = cell_first_[c]; g < cell_first_[c + 1]; ++g) {
       // Margins are used up a little early: rounding must never hide a bond. What is not a number is checked.
-      if (!all_groups && (moved_[c] + offset_[g]) * (1 + 1e-9) < margin_[g]) continue;
-      margin_[g] = check(groups_[g], u, found_[c]);
-      offset_[g] = moved_[c];
+      if (known ? !near_failure(groups_[g]) : !all_groups && (moved_[c] + offset_[g]) * (1 + 1e-9) < margin_[g]) continue;
+      const double margin = check(groups_[g], u, found_[c]);
       ++checks_[c];
+      if (known) continue;   // margins of earlier checks hold on
+      margin_[g] = margin;
+      offset_[g] = moved_[c];
     }
   });
   std::size_t checks = 0;
@@ -41,6 +43,7 @@ std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
     found_[c].clear();
   }
   checked_ += checks;
+  if (known) return all;
   since_ = all_groups ? 0 : since_ + checks;
   renew_ = since_ >= groups_.size();
   return all;

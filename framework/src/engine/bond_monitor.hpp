@@ -4,7 +4,8 @@
 /// A group of eight points knows its margin: how much more the nearest of its bonds could take when it was last checked. A bound of what the
 /// bonds around it have changed since a reference displacement, now and at that check, tells when it must be looked at again:
 ///   change since the check <= change since the reference + change from the reference to the check.
-/// The reference is renewed, with a check of everything, once the single checks since the last one add up to as much work.
+/// The reference is renewed, with a check of everything, once the single checks since the last one add up to as much work. Where the loop over
+/// forces knows how far bonds are from failing, none of this is needed.
 
 #include <algorithm>
 #include <cstdint>
@@ -39,8 +40,10 @@ class BondMonitor {
   BondMonitor(const Body& body, bool skip) : body_(body), skip_(skip), reference_(body.make_field(body.dimension())) {}
   /// Groups cell by cell; cell_first has one more entry than there are cells.
   void set_cells(std::vector<Group> groups, std::vector<std::size_t> cell_first);
-  /// Before everything else in each call of `find`.
-  virtual void begin(ConstFieldView) {}
+  /// Before everything else in each call of `find`: whether `near_failure` knows of every group at u.
+  virtual bool begin(ConstFieldView) { return false; }
+  /// False where no bond of the group can be beyond its onset.
+  virtual bool near_failure(const Group&) const noexcept { return true; }
   /// moved[c]: a bound of the change of the bonds of cell c from reference_ to u, in the units of the margins.
   virtual void bound_motion(ConstFieldView u, std::span<double> moved) = 0;
   /// Appends the bonds of the group that fail; returns the least margin of its other ones.

@@ -1,6 +1,7 @@
 #include "cloud_bonds.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -22,7 +23,8 @@ class CloudMonitor final : public BondMonitor {
 
  private:
   void make_cells();
-  void begin(ConstFieldView u) override { mirror_rows(u, body_.points(), u_); }
+  bool begin(ConstFieldView u) override;
+  bool near_failure(const Group& group) const noexcept override;
   void bound_motion(ConstFieldView u, std::span<double> moved) override;
   double check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) override;
   bool between(std::int64_t bond, std::int32_t p, double stretch, double onset, std::vector<BondChange>& changes) const;
@@ -96,6 +98,28 @@ void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
   });
 }
 
+bool CloudMonitor::begin(ConstFieldView u) {
+  mirror_rows(u, body_.points(), u_);
+  const AlignedVector<Row>* known = bonds_.nearest().u;
+  if (!known) return false;
+  std::atomic<bool> same{true};
+  parallel_for(cloud_blocks(body_.points()), [&](std::size_t b) {
+    bool here = true;
+    for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p)
+      for (int c = 0; c < u.components; ++c) here &= u_[p][c] == (*known)[p][c];
+    if (!here) same = false;
+  });
+  return same;
+}
+
+bool CloudMonitor::near_failure(const Group& group) const noexcept {
+  const double* excess = bonds_.nearest().excess.data() + group.first;
+  bool near = false;
+  for (int l = 0; l < static_cast<int>(padding); ++l)
+    if (group.live >> l & 1) near |= !(excess[l] < -1e-12 * body_.horizon());
+  return near;
+}
+
 double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondChange>& changes) {
   constexpr std::int64_t at_once = 64;
   alignas(64) double square[at_once], difference[at_once], limit[at_once];
@@ -156,6 +180,8 @@ bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, do
 }  // namespace
 
 std::unique_ptr<BondMonitor> CloudBonds::make_monitor(const BodyDamage& damage, bool skip) const {
+  nearest_.least_onset = std::numeric_limits<double>::max();
+  for (std::size_t p = 0; p < body_.points(); ++p) nearest_.least_onset = std::min(nearest_.least_onset, damage.onset.data()[p]);
   return std::make_unique<CloudMonitor>(body_, lists_, *this, damage, skip);
 }
 

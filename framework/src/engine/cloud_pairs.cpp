@@ -227,6 +227,8 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   Row own{};
   double own_sum = 0, stored = 0;
   bool finite = true;
+  const Pack onset(bonds_ ? bonds_->nearest().least_onset : 0.0);
+  Pack excess(-std::numeric_limits<double>::max());
   for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < lists_.first[p + 1]; begin += batch_points) {
     const int n = static_cast<int>(std::min<std::int64_t>(batch_points, lists_.first[p + 1] - begin));
     gather<work>(p, begin, n, g, s);
@@ -241,6 +243,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       const Pack length = Pack::load(g.length + l);
       const Stretch<D> bond(xi, length, du);
       finite = finite && all(bond.e == bond.e);
+      if (work == PairWork::force && bonds_) excess = max(excess, bond.e - onset * length);
       bond.e.store(s.e + l);
       for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
@@ -283,6 +286,11 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (half) force_[far_point(l)] -= t;
     }
   }
+  if (work == PairWork::force && bonds_) {
+    alignas(64) double lanes[pack_width];
+    excess.store(lanes);
+    bonds_->nearest().excess[p] = *std::max_element(lanes, lanes + pack_width);
+  }
   if constexpr (sums) pass.out.data[p] += own_sum;
   else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored;
   else force_[p] += own;
@@ -309,6 +317,10 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, body_.points()); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
   mirror_rows(pass.u, body_.points(), u_);
+  if (bonds_) {
+    bonds_->nearest().u = nullptr;
+    bonds_->nearest().excess.resize(body_.points());
+  }
   if (pass.w.data) mirror_rows(pass.w, body_.points(), w_);
   if (fields_.modulus.size() > 0) moduli_.resize(body_.points());
   const auto over_points = [&](auto&& body) {
@@ -325,6 +337,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
       row[3] = fields_.modulus.data()[p];
       moduli_[p] = row;
     }
+    if (pass.work == PairWork::force && bonds_) bonds_->nearest().excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
     if (vectors) force_[p] = Row{};
     else pass.out.data[p] = 0;
   });
@@ -340,6 +353,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   };
   if (at_once(pass)) colouring_.for_each(block);
   else parallel_for(blocks(), block);
+  if (pass.work == PairWork::force && bonds_ && bad() < 0) bonds_->nearest().u = &u_;
   if (vectors && bad() < 0) {
     over_points([&](std::size_t p) {
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
