@@ -50,6 +50,13 @@ void BodyProblem::read_constraints(bool quasi_static) {
   }
 }
 
+std::size_t BodyProblem::points_held_at_rest() const {
+  std::vector<int> held(stride(), 0);
+  for (const Constraint& constraint : constraints_)
+    for (std::size_t k = 0; k < constraint.fixed.size(); ++k) held[static_cast<std::size_t>(constraint.points[k])] += constraint.fixed[k] == 0;
+  return static_cast<std::size_t>(std::count(held.begin(), held.end(), dimension()));
+}
+
 ConstFieldView BodyProblem::free_mask() const noexcept {
   if (free_mask_.size() == 0) {
     free_mask_ = body_.make_field(dimension());

@@ -70,8 +70,13 @@ std::string Simulation::explanation(const Registry& registry) const {
   notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
   if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
   if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
-  if (scene_.skip && traits_.dynamic && problem_->model().conservative() && !problem_->laws().history())
+  if (scene_.skip && traits_.dynamic && problem_->model().conservative() && !problem_->laws().history()) {
     notes.push_back({"parts of the body that no wave has reached", "blocks of points at rest whose families' families are at rest have no forces", "counted in run.log at the end"});
+    if (const std::size_t held = problem_->points_held_at_rest(); held > 0) {
+      notes.push_back({"points held at rest", "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
+                       fmt::format("the blocks of {} points, less those in reach of others", held)});
+    }
+  }
   if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});

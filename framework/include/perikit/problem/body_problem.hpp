@@ -57,6 +57,8 @@ class BodyProblem final : public Problem {
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
+  /// Points all of whose components are prescribed as 0 at all times.
+  std::size_t points_held_at_rest() const;
   bool any_constraint() const noexcept override { return !constraints_.empty(); }
   std::span<const std::int64_t> constrained() const noexcept override { return constrained_; }
   ConstFieldView free_mask() const noexcept override;
