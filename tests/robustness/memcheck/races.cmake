@@ -1,6 +1,6 @@
 # The scenes beside this file with three threads, under the thread sanitizer: explicit steps of every kinematics on lattices and clouds, with bonds
-# that fail, and every quasi-static integrator. A race ends the run.
-# Needs: program, work (scratch folder).
+# that fail, and every quasi-static integrator; then what the contract suites say of several threads. A race ends the run.
+# Needs: program, contract (the suites), work (scratch folder).
 file(REMOVE_RECURSE ${work})
 file(MAKE_DIRECTORY ${work})
 set(ENV{OMP_WAIT_POLICY} passive)
@@ -35,3 +35,5 @@ endforeach()
 foreach(solver newton jfnk kinsol dynamic_relaxation)
   clean(${solver} ${scenes}/quasi_static.toml --set integrator.type=${solver} --set "body.lattice.upper=[14, 6, 6]")
 endforeach()
+message(STATUS "races: contract suites")
+execute_process(COMMAND ${contract} "--test-case=*threads*" --no-skipped-summary COMMAND_ERROR_IS_FATAL ANY)
