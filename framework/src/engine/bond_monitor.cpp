@@ -15,12 +15,11 @@ void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> 
 }
 
 std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
-  const bool known = begin(u) && skip_, all_groups = (renew_ && !known) || !skip_;
-  if (known) {
-  } else if (all_groups) {
+  const bool known = begin(u) && skip_, all_groups = !skip_ || (renew_ && !known);
+  if (all_groups) {
     std::copy_n(u.data, u.size(), reference_.data());
     std::fill(moved_.begin(), moved_.end(), 0.0);
-  } else {
+  } else if (!known) {
     bound_motion(u, moved_);
   }
   over_cells([&](std::size_t c) {

@@ -17,6 +17,7 @@ struct alignas(32) CountedRow {
   }
   friend CountedRow operator+(const CountedRow& a, const CountedRow& b) noexcept { return each([&](int c) { return a.x[c] + b.x[c]; }); }
   friend CountedRow operator-(const CountedRow& a, const CountedRow& b) noexcept { return each([&](int c) { return a.x[c] - b.x[c]; }); }
+  friend CountedRow operator*(const CountedRow& a, const CountedRow& b) noexcept { return each([&](int c) { return a.x[c] * b.x[c]; }); }
   friend CountedRow operator*(const CountedRow& a, double b) noexcept { return each([&](int c) { return a.x[c] * b; }); }
   friend CountedRow operator*(double a, const CountedRow& b) noexcept { return b * a; }
   friend CountedRow operator-(const CountedRow& a) noexcept { return {-a.x[0], -a.x[1], -a.x[2], -a.x[3]}; }
