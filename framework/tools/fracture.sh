@@ -20,7 +20,7 @@ mkdir -p "$out" "$images"
 run() {
   local name=$1 scene=$2
   shift 2
-  grep -qsE '^(speed  |failed: )' "$out/$name/run.log" && return
+  grep -qsE '^(speed  |failed: )' "$out/$name/run.log" && ! grep -q '^stopped by a signal' "$out/$name/run.log" && return
   rm -rf "${out:?}/$name"
   local settings=()
   for setting in "$@"; do settings+=(--set "$setting"); done
