@@ -59,4 +59,4 @@ tension baqp_cubic $cubic
 
 run sheet fracture/rubber_sheet 'kinematics={type="selective",base="baqp"}' body.lattice.spacing=$fine_sheet
 "$perikit" plot "$out/sheet" --field damage --deformed 1 -o "$images/rubber_sheet.png"
-grep -E '^(failed bonds|warning|energy)' "$out/sheet/run.log"
+grep -E '^(failed bonds|warning |energy)' "$out/sheet/run.log"
