@@ -36,7 +36,8 @@ class CloudMonitor final : public BondMonitor {
   const Row* position_;
   std::vector<std::vector<std::int32_t>> near_;   ///< by cell: those with partners of its points, itself too
   std::vector<Row> low_, high_;                   ///< motion by cell
-  AlignedVector<Row> u_;                          ///< mirror
+  AlignedVector<Row> u_;                          ///< mirror, where the loop over forces has none of this displacement
+  const Row* rows_ = nullptr;                     ///< the one that is looked at
 };
 
 void CloudMonitor::make_cells() {
@@ -99,16 +100,17 @@ void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
 }
 
 bool CloudMonitor::begin(ConstFieldView u) {
-  mirror_rows(u, body_.points(), u_);
   const AlignedVector<Row>* known = bonds_.nearest().u;
-  if (!known) return false;
-  std::atomic<bool> same{true};
-  parallel_for(cloud_blocks(body_.points()), [&](std::size_t b) {
-    bool here = true;
-    for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p)
-      for (int c = 0; c < u.components; ++c) here &= u_[p][c] == (*known)[p][c];
-    if (!here) same = false;
-  });
+  std::atomic<bool> same{known != nullptr};
+  if (known)
+    parallel_for(cloud_blocks(body_.points()), [&](std::size_t b) {
+      bool here = true;
+      for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p)
+        for (int c = 0; c < u.components; ++c) here &= u.component(c)[p] == (*known)[p][c];
+      if (!here) same = false;
+    });
+  if (!same) mirror_rows(u, body_.points(), u_);
+  rows_ = same ? known->data() : u_.data();
   return same;
 }
 
@@ -129,13 +131,13 @@ double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondC
   for (int l = 0; l < static_cast<int>(padding); ++l) {
     if (!(group.live >> l & 1)) continue;
     const std::int32_t p = group.first + l;
-    const Row own_position = position_[p], own_u = u_[static_cast<std::size_t>(p)];
+    const Row own_position = position_[p], own_u = rows_[p];
     const std::int64_t end = lists_.first[static_cast<std::size_t>(p) + 1];
     for (std::int64_t k = bonds_.index(p, p); k < end; k += at_once) {
       const auto n = static_cast<int>(std::min(at_once, end - k)), lanes = (n + pack_width - 1) / pack_width * pack_width;
       for (int b = 0; b < n; ++b) {
         const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k + b)];
-        const Row xi = position_[j] - own_position, du = u_[j] - own_u, squares = xi * xi, changes = du * (xi + xi + du);
+        const Row xi = position_[j] - own_position, du = rows_[j] - own_u, squares = xi * xi, changes = du * (xi + xi + du);
         square[b] = squares[0] + squares[1] + squares[2];
         difference[b] = changes[0] + changes[1] + changes[2];
         limit[b] = 0.5 * (onset[p] + onset[j]);

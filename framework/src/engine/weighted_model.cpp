@@ -301,16 +301,16 @@ double WeightedModel<D>::left(std::int32_t p) const noexcept {
 }
 
 template <int D>
-void WeightedModel<D>::keep_owner_gradients(std::span<const std::int32_t> points, Memory& m, BatchScratch& s, bool tangent) const noexcept {
+void WeightedModel<D>::keep_owner_gradients(int points, double share, Memory& m, BatchScratch& s, bool tangent) const noexcept {
   for (std::size_t c = 0; c < D * D; ++c) {
     std::copy_n(s.Ht + c * batch_points, 8, m.owner_H + c * 8);
     if (tangent) std::copy_n(s.dHt + c * batch_points, 8, m.owner_dH + c * 8);
   }
   owner_volume(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, s.volume, batch_points);
-  for (std::size_t l = 0; l < points.size(); ++l) s.volume[volume_share * batch_points + l] = left(points[l]);
-  for (int c = 0; c < volume_components && points.size() == 1; ++c) std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
+  s.volume[volume_share * batch_points] = share;
+  for (int c = 0; c < volume_components && points == 1; ++c) std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
   std::fill(std::begin(s.volume_group), std::end(s.volume_group), 0);
-  s.owner_volumes = {s.volume, batch_points, s.volume_group, !this->fracture()};   // an owner without a gradient has none at its evaluation points either
+  s.owner_volumes = {s.volume, batch_points, s.volume_group, share == 1};   // an owner without a gradient has none at its evaluation points either
 }
 
 template <int D>
@@ -378,7 +378,7 @@ std::int32_t WeightedModel<D>::evaluate_family(std::int32_t p, Memory& m, BatchS
     const int n = std::min(batch_points, stencil.points() - first);
     stencil.gradient(0, first, n, H, batch_points);
     if (tangent) stencil.gradient(1, first, n, dH, batch_points);
-    if (traits_.selective && first == 0) keep_owner_gradients({&p, 1}, m, s, tangent);
+    if (traits_.selective && first == 0) keep_owner_gradients(1, left(p), m, s, tangent);
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
       s.weight[l] = weight(p, stencil.share(first + l));
@@ -450,7 +450,7 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
           s.weight[(slots + i) * 8 + l] = lane_weight[l] * stencil.share(end->element[i]);
         }
     }
-    if (traits_.selective && begin == orbits.begin()) keep_owner_gradients({members, 8}, m, s, tangent);
+    if (traits_.selective && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
     if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
@@ -496,7 +496,7 @@ std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memor
     gradients(u_rows_, first, n, H);
     if (tangent) gradients(w_rows_, first, n, dH);
     if (!all) clear_lanes(here, 0, n, H, tangent ? dH : nullptr);
-    if (traits_.selective && first == 0) keep_owner_gradients(members, m, s, tangent);
+    if (traits_.selective && first == 0) keep_owner_gradients(8, 1.0, m, s, tangent);
     for (int l = 0; l < 8 * n; ++l) {
       const auto lane = static_cast<std::size_t>(l % 8);
       s.owner[l] = members[lane < members.size() ? lane : 0];

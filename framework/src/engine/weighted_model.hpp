@@ -95,8 +95,9 @@ class WeightedModel final : public AssemblingModel {
   std::int32_t side_by_side(const Group& g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   /// W of evaluation point q of point p.
   double weight(std::int32_t p, double share) const noexcept;
-  /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch.
-  void keep_owner_gradients(std::span<const std::int32_t> points, Memory& m, BatchScratch& s, bool tangent) const noexcept;
+  /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch. share: c of the
+  /// selective map; 1 in groups, which points leave with the first bond that fails.
+  void keep_owner_gradients(int points, double share, Memory& m, BatchScratch& s, bool tangent) const noexcept;
 
   /// The share of its influence at the set-up that a point has left.
   double left(std::int32_t p) const noexcept;
