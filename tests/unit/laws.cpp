@@ -1,6 +1,6 @@
 /// Batches with points of several materials: each law answers for its own points only.
 
-#include "perikit/engine/laws.hpp"
+#include "perikit/operators/laws.hpp"
 
 #include <doctest/doctest.h>
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "engine/gradual_failure.hpp"
+#include "families/gradual_failure.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/output/recorder.hpp"

@@ -6,8 +6,8 @@
 
 #include "perikit/body/body.hpp"
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/engine/fracture.hpp"
-#include "perikit/engine/laws.hpp"
+#include "perikit/families/fracture.hpp"
+#include "perikit/operators/laws.hpp"
 
 namespace perikit {
 

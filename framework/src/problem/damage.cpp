@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "engine/gradual_failure.hpp"
+#include "families/gradual_failure.hpp"
 #include "perikit/problem/body_problem.hpp"
 
 namespace perikit {

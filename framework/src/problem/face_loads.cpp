@@ -1,6 +1,6 @@
 #include "face_loads.hpp"
 
-#include "perikit/engine/model.hpp"
+#include "perikit/terms/model.hpp"
 
 namespace perikit {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "perikit/body/partition.hpp"
-#include "perikit/engine/model.hpp"
+#include "perikit/terms/model.hpp"
 #include "perikit/problem/ghosts.hpp"
 #include "perikit/problem/integrator.hpp"
 

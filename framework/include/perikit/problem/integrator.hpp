@@ -10,6 +10,7 @@
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/errors.hpp"
+#include "perikit/core/evaluation_status.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/model/material.hpp"
 
@@ -43,13 +44,6 @@ class Observer {
   virtual void log(std::string_view message) = 0;
   /// True when the run should end after this step.
   virtual bool cancelled() const noexcept { return false; }
-};
-
-/// Where an evaluation met an inadmissible deformation.
-struct EvaluationStatus {
-  std::int64_t point = -1;         ///< input index of the point, -1: all well
-  std::string description;         ///< position, kinematics, material
-  bool ok() const noexcept { return point < 0; }
 };
 
 /// A body with its model, loads, constraints and state, as an integrator sees it. All point fields have `dimension` components,

@@ -1,0 +1,94 @@
+#pragma once
+/// The materials of a body: which law and which constants belong to which point, and batched evaluation across laws.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "perikit/core/field.hpp"
+#include "perikit/core/space.hpp"
+#include "perikit/operators/law_history.hpp"
+#include "perikit/model/material.hpp"
+
+namespace perikit {
+
+/// Evaluation points are handed to materials in batches of at most this many (a multiple of `padding`), so that a batch stays in
+/// the first-level cache while the virtual call is amortised.
+inline constexpr int batch_points = 128;
+
+struct MaterialRecord {
+  std::shared_ptr<const Material> material;
+  MaterialTraits traits;
+  AlignedVector<double> constants;       ///< traits.constants values; or, where they vary in space, that many times stride
+  bool uniform = true;
+  double density = 0;                    ///< [kg/m^3]; 0: not given. Where it varies, see `densities`
+  AlignedVector<double> densities;       ///< by point; empty where uniform
+};
+
+/// Memory for the pieces of mixed batches; one per thread.
+struct LawScratch {
+  alignas(64) double H[9 * batch_points];
+  alignas(64) double psi[batch_points];
+  alignas(64) double lateral[batch_points];
+  alignas(64) double P[9 * batch_points];
+  alignas(64) double dP[9 * batch_points];
+  AlignedVector<double> constants;
+  AlignedVector<double> A;               ///< only where tangents are asked for
+  AlignedVector<double> history;         ///< of laws that have one
+};
+
+struct LawBatch {
+  int n = 0;                             ///< <= batch_points; arrays have stride batch_points
+  const double* H = nullptr;
+  const double* dH = nullptr;
+  bool confined = false;                 ///< see MaterialBatch
+  const std::int32_t* points = nullptr;  ///< owner of each lane (any live index in the padding); null where single()
+  double* psi = nullptr;
+  double* P = nullptr;
+  double* dP = nullptr;
+  double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
+  LawHistory::Place history;             ///< nothing: fresh, and not kept
+  double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
+};
+
+class Laws {
+ public:
+  Laws(Space space, std::vector<MaterialRecord> records, std::span<const std::uint16_t> ids, std::size_t stride);
+
+  Space space() const noexcept { return space_; }
+  int components() const noexcept { return tensor_components(space_); }
+  /// One law with the same constants everywhere.
+  bool single() const noexcept { return single_; }
+  bool constant_tangent() const noexcept;
+  bool objective() const noexcept;
+  /// Null where every law depends on F alone.
+  LawHistory* history() const noexcept { return history_.get(); }
+  /// Doubles of history per evaluation point, the most of any law.
+  int state_components() const noexcept { return state_; }
+  /// Both points have the same law and the same constants, so that a symmetric bond needs one evaluation.
+  bool same(std::size_t p, std::size_t q) const noexcept {
+    return ids_.empty() ? records_[0].uniform : ids_[p] == ids_[q] && records_[ids_[p]].uniform;
+  }
+  const MaterialRecord& record_of(std::size_t p) const noexcept { return records_[ids_.empty() ? 0 : ids_[p]]; }
+  const std::vector<MaterialRecord>& records() const noexcept { return records_; }
+  Moduli moduli(std::size_t p) const;
+  double density(std::size_t p) const noexcept;
+
+  /// Memory for evaluations; `tangents`: with LawBatch::A.
+  void prepare(LawScratch& scratch, bool tangents) const;
+  Status evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept;
+
+ private:
+  Status evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
+
+  Space space_;
+  std::vector<MaterialRecord> records_;
+  std::span<const std::uint16_t> ids_;
+  std::size_t stride_;
+  bool single_;
+  int state_ = 0;                        ///< components of history, the most of any law
+  std::unique_ptr<LawHistory> history_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,137 @@
+#include "assembly/point_element.hpp"
+
+#include <algorithm>
+
+#include "perikit/core/simd.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr std::size_t tile = padding;
+
+/// Row q of the element from the gradient over bonds, g(k, e); the owner's entry makes the sum zero.
+template <int D, class Gradient>
+void write_point(PointElement<D>& out, int q, Gradient&& gradient) {
+  for (int e = 0; e < D; ++e) {
+    double* to = out.g.data() + static_cast<std::size_t>(q * D + e) * out.width;
+    double sum = 0;
+    for (int k = 0; k < out.nodes - 1; ++k) sum += to[k < out.own ? k : k + 1] = gradient(k, e);
+    to[out.own] = -sum;
+  }
+}
+
+}  // namespace
+
+template <int D>
+void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out,
+                   ElementScratch<D>& s) {
+  const auto neighbours = families.neighbours(row);
+  out.nodes = static_cast<int>(neighbours.size()) + 1;
+  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) -
+                             neighbours.begin());
+  out.width = padded(static_cast<std::size_t>(out.nodes));
+  out.weight.clear();
+  out.points = 0;
+  if (neighbours.empty()) {  // nothing to stretch
+    out.g.assign(D * out.width, 0.0);
+    return;
+  }
+  families.load(row, s.family);
+  const double intact = families.volume(row) * (1 - families.damage(row)), horizon = families.body().horizon();
+  if (shape.traits.at == EvaluationPoints::points) {
+    point_gradient(s.family, horizon, shape.traits.order, s.gradient);
+    out.g.assign(D * out.width, 0.0);
+    write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
+    out.points = 1;
+    out.weight.push_back(intact);
+    return;
+  }
+  families.bond_shares(row, s.family, s.share);
+  s.stencil.build({shape.kinematics.get(), shape.traits, horizon}, s.family, s.share.data(), 0, nullptr);
+  s.stencil.expand(s.gradient);
+  const int owners = shape.traits.selective ? 1 : 0;
+  out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
+  for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
+    const double share = s.stencil.share(q);
+    if (q >= owners && share == 0) continue;  // a dropped part
+    write_point<D>(out, to++, [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; });
+    if (q < owners) continue;
+    out.weight.push_back(share * (shape.parts > 0 ? intact : families.volume(row)));
+    ++out.points;
+  }
+}
+
+// K_kl = sum over rows r, s of g_rk M_rs g_sl. Eight columns l at a time: T_r = sum_s M_rs g_sl, then products with g_rk, all for
+// each pair (a, b) of displacement components.
+template <int D>
+void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective,
+               ElementScratch<D>& s) {
+  constexpr int n = D * D, packs = static_cast<int>(tile) / pack_width;
+  const std::size_t width = element.width, owners = selective ? 1 : 0,
+                    rows = (owners + static_cast<std::size_t>(element.points)) * D;
+  s.T.resize(n * rows * tile);
+  s.K.resize(n * width * width);
+  for (std::size_t column = 0; column < width; column += tile) {
+    const auto T = [&](int a, int b, std::size_t r) {
+      return s.T.data() + (static_cast<std::size_t>(a * D + b) * rows + r) * tile;
+    };
+    for (int v = 0; v < packs; ++v) {
+      const std::size_t at = column + static_cast<std::size_t>(v * pack_width);
+      const int lane_in_tile = v * pack_width;
+      Pack g_bar[D], bar[D][D][D];
+      for (int f = 0; f < D && selective; ++f) g_bar[f] = Pack::load(element.row(0, f) + at);
+      for (int q = 0; q < element.points; ++q) {
+        const double* own = batch.own(first_lane + q);
+        const int point = static_cast<int>(owners) + q;
+        Pack g[D];
+        for (int f = 0; f < D; ++f) g[f] = Pack::load(element.row(point, f) + at);
+        for (int a = 0; a < D; ++a)
+          for (int e = 0; e < D; ++e)
+            for (int b = 0; b < D; ++b) {
+              Pack sum(0.0);
+              for (int f = 0; f < D; ++f) sum += Pack(own[(a * D + e) * n + b * D + f]) * g[f];
+              if (selective) {
+                const double* mixed = batch.mixed(first_lane + q);
+                const double* owner = batch.bar(first_lane + q);
+                for (int f = 0; f < D; ++f) {
+                  sum += Pack(mixed[(a * D + e) * n + b * D + f]) * g_bar[f];
+                  bar[a][e][b] +=
+                      Pack(mixed[(b * D + f) * n + a * D + e]) * g[f] + Pack(owner[(a * D + e) * n + b * D + f]) * g_bar[f];
+                }
+              }
+              sum.store(T(a, b, static_cast<std::size_t>(point * D + e)) + lane_in_tile);
+            }
+      }
+      for (int a = 0; a < D && selective; ++a)
+        for (int e = 0; e < D; ++e)
+          for (int b = 0; b < D; ++b) bar[a][e][b].store(T(a, b, static_cast<std::size_t>(e)) + lane_in_tile);
+    }
+    for (int ab = 0; ab < n; ++ab) {
+      const double* right = s.T.data() + static_cast<std::size_t>(ab) * rows * tile;
+      for (std::size_t k = 0; k < column + tile; k += 4) {
+        Pack sums[4][packs];
+        for (std::size_t r = 0; r < rows; ++r) {
+          const double* left = element.g.data() + r * width + k;
+          for (int v = 0; v < packs; ++v) {
+            const Pack t = Pack::load(right + r * tile + static_cast<std::size_t>(v * pack_width));
+            for (int i = 0; i < 4; ++i) sums[i][v] += Pack(left[i]) * t;
+          }
+        }
+        for (std::size_t i = 0; i < 4; ++i)
+          for (int v = 0; v < packs; ++v)
+            sums[i][v].store(s.K.data() + (static_cast<std::size_t>(ab) * width + k + i) * width + column +
+                             static_cast<std::size_t>(v * pack_width));
+      }
+    }
+  }
+}
+
+template void build_element<1>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<1>&, ElementScratch<1>&);
+template void build_element<2>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<2>&, ElementScratch<2>&);
+template void build_element<3>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<3>&, ElementScratch<3>&);
+template void stiffness<1>(const PointElement<1>&, const TangentBatch<1>&, int, bool, ElementScratch<1>&);
+template void stiffness<2>(const PointElement<2>&, const TangentBatch<2>&, int, bool, ElementScratch<2>&);
+template void stiffness<3>(const PointElement<3>&, const TangentBatch<3>&, int, bool, ElementScratch<3>&);
+
+}  // namespace perikit

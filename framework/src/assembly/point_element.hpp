@@ -1,0 +1,50 @@
+#pragma once
+/// All that one point owns: its evaluation points as gradients over the nodes of its family, and the dense matrix that they give.
+
+#include <memory>
+#include <vector>
+
+#include "assembly/point_families.hpp"
+#include "assembly/tangent_batch.hpp"
+#include "spaces/local_stencil.hpp"
+
+namespace perikit {
+
+struct ElementShape {
+  std::shared_ptr<const Kinematics> kinematics;
+  KinematicsTraits traits;
+  int parts = 1;  ///< evaluation points per point; 0: one per bond
+};
+
+/// Nodes: the owner and its family, ascending.
+template <int D>
+struct PointElement {
+  int nodes = 0, own = 0;      ///< own: place of the owner among the nodes
+  int points = 0;              ///< evaluation points with a weight
+  std::size_t width = 0;       ///< padded(nodes)
+  AlignedVector<double> g;     ///< [q][e][node], the owner's own gradient first (with the selective map), then points
+  std::vector<double> weight;  ///< W_q [m^3]
+  const double* row(int q, int e) const noexcept { return g.data() + static_cast<std::size_t>(q * D + e) * width; }
+};
+
+/// Reused memory, and the result of `stiffness`.
+template <int D>
+struct ElementScratch {
+  FamilyArrays family;
+  LocalStencil<D> stencil;
+  AlignedVector<double> share;
+  std::vector<double> gradient;
+  AlignedVector<double> T;  ///< A g of eight nodes
+  AlignedVector<double> K;  ///< [a][b][k][l], width x width each; tiles of 8 x 8 on and above the diagonal
+};
+
+template <int D>
+void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out,
+                   ElementScratch<D>& s);
+
+/// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch.
+template <int D>
+void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective,
+               ElementScratch<D>& s);
+
+}  // namespace perikit

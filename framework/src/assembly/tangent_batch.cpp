@@ -1,0 +1,133 @@
+#include "assembly/tangent_batch.hpp"
+
+#include <algorithm>
+
+#include "core/semidefinite.hpp"
+#include "maps/selective_tangent.hpp"
+#include "maps/selective_map.hpp"
+
+namespace perikit {
+
+template <int D>
+TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), selective_(selective) {
+  laws.prepare(scratch_, true);
+  A_.assign(static_cast<std::size_t>(laws.components() * laws.components()) * batch_points, 0.0);
+  if (!selective) return;
+  P_.assign(9 * batch_points, 0.0);
+  mapped_.assign(9 * batch_points, 0.0);
+  growth_.assign(batch_points, 0.0);
+  inverse_.assign(batch_points, 0.0);
+  volume_.assign(volume_components * batch_points, 0.0);
+  for (std::size_t first = 0; first < batch_points; first += padding) volume_group_.push_back(static_cast<std::int64_t>(first));
+}
+
+template <int D>
+int TangentBatch<D>::add(std::int32_t owner, double weight, double share) {
+  const int lane = lanes_++;
+  if (static_cast<std::size_t>(lane) == owner_.size()) {
+    const std::size_t size = owner_.size() + batch_points;
+    owner_.resize(size);
+    weight_.resize(size);
+    share_.resize(size);
+    H_.resize(size * stored, 0.0);
+    own_.resize(size * entries);
+    if (selective_) {
+      Hbar_.resize(size * stored, 0.0);
+      mixed_.resize(size * entries);
+      bar_.resize(size * entries);
+    }
+  }
+  owner_[static_cast<std::size_t>(lane)] = owner;
+  weight_[static_cast<std::size_t>(lane)] = weight;
+  share_[static_cast<std::size_t>(lane)] = share;
+  return lane;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate(bool convex) {
+  for (int first = 0; first < lanes_; first += batch_points) {
+    const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
+    for (int lane = first + n; lane < last; ++lane) {  // padding at rest
+      owner_[static_cast<std::size_t>(lane)] = owner_[static_cast<std::size_t>(first)];
+      for (int c = 0; c < components; ++c) {
+        H(lane, c) = 0;
+        if (selective_) owner_H(lane, c) = 0;
+      }
+    }
+    const int bad = selective_ ? evaluate_selective(first, n) : evaluate_plain(first, n);
+    if (bad >= 0) return first + bad;
+  }
+  for (int lane = 0; convex && lane < lanes_; ++lane) remove_negative_curvature(lane);
+  return -1;
+}
+
+template <int D>
+void TangentBatch<D>::remove_negative_curvature(int lane) {
+  const auto at = static_cast<std::size_t>(lane) * entries;
+  if (!selective_) return make_semidefinite(own_.data() + at, components);
+  // Of [own mixed; mixed^T bar] as a whole.
+  constexpr int n = 2 * components;
+  double A[n * n];
+  const auto place = [&](int r, int c) -> double& {
+    const bool right = c >= components, below = r >= components;
+    const int row = r % components, column = c % components;
+    return right && below ? bar_[at + row * components + column]
+           : right        ? mixed_[at + row * components + column]
+           : below        ? mixed_[at + column * components + row]
+                          : own_[at + row * components + column];
+  };
+  for (int k = 0; k < n * n; ++k) A[k] = place(k / n, k % n);
+  make_semidefinite(A, n);
+  for (int k = 0; k < n * n; ++k)
+    if (k / n < components || k % n >= components) place(k / n, k % n) = A[k];
+}
+
+template <int D>
+int TangentBatch<D>::evaluate_plain(int first, int n) {
+  LawBatch batch;
+  batch.n = n;
+  batch.H = &H(first, 0);
+  batch.points = owner_.data() + first;
+  batch.A = A_.data();
+  const Status status = laws_.evaluate(batch, scratch_);
+  if (!status.ok()) return status.inadmissible;
+  const int all = laws_.components();
+  for (int l = 0; l < n; ++l) {
+    double* out = own_.data() + static_cast<std::size_t>(first + l) * entries;
+    const double weight = weight_[static_cast<std::size_t>(first + l)];
+    for (int r = 0; r < components; ++r)
+      for (int c = 0; c < components; ++c)
+        out[r * components + c] = weight * A_[static_cast<std::size_t>((r * all + c) * batch_points + l)];
+  }
+  return -1;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate_selective(int first, int n) {
+  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  owner_volume(laws_.space(), {lanes, batch_points, &owner_H(first, 0), nullptr}, volume_.data(), batch_points);
+  std::copy_n(share_.data() + first, lanes, volume_.data() + volume_share * batch_points);
+  const OwnerVolumes owners{volume_.data(), batch_points, volume_group_.data(), false};
+  selective_map(laws_.space(), {lanes, 1, &H(first, 0), nullptr, owners, inverse_.data(), growth_.data()}, mapped_.data(), nullptr);
+  LawBatch batch;
+  batch.n = n;
+  batch.H = mapped_.data();
+  batch.points = owner_.data() + first;
+  batch.P = P_.data();
+  batch.A = A_.data();
+  const Status status = laws_.evaluate(batch, scratch_);
+  if (!status.ok()) return status.inadmissible;
+  for (int l = 0; l < n; ++l) {
+    const auto at = static_cast<std::size_t>(first + l), lane = at * entries;
+    const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)],
+                           share_[at], weight_[at]};
+    selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
+  }
+  return -1;
+}
+
+template class TangentBatch<1>;
+template class TangentBatch<2>;
+template class TangentBatch<3>;
+
+}  // namespace perikit

@@ -1,0 +1,56 @@
+#pragma once
+/// Exact tangents of evaluation points: gradients are collected lane by lane and go to the materials in full batches.
+
+#include <memory>
+#include <vector>
+
+#include "perikit/operators/laws.hpp"
+
+namespace perikit {
+
+/// Matrices over in-space components, row-major: entry (aD + e, bD + f) couples P_ae with F_bf. With the selective map the energy
+/// depends on Ft, the point's own gradient, and on Fbar, the owner's.
+template <int D>
+class TangentBatch {
+ public:
+  static constexpr int components = D * D, entries = components * components;
+
+  TangentBatch(const Laws& laws, bool selective);
+  void clear() noexcept { lanes_ = 0; }
+  int lanes() const noexcept { return lanes_; }
+  /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. share: c of the selective map.
+  int add(std::int32_t owner, double weight, double share);
+  /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
+  double& H(int lane, int component) noexcept { return at(H_, lane, component); }
+  double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
+  /// Returns the first inadmissible lane or -1. convex: the matrices of each lane together lose their negative eigenvalues.
+  int evaluate(bool convex = false);
+  int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
+  /// W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar.
+  double* own(int lane) noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
+  const double* own(int lane) const noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
+  const double* mixed(int lane) const noexcept { return mixed_.data() + static_cast<std::size_t>(lane) * entries; }
+  const double* bar(int lane) const noexcept { return bar_.data() + static_cast<std::size_t>(lane) * entries; }
+
+ private:
+  static constexpr int stored = 9;  ///< components of a gradient with the lateral ones
+  double& at(AlignedVector<double>& x, int lane, int component) noexcept {
+    return x[static_cast<std::size_t>((lane / batch_points * stored + component) * batch_points + lane % batch_points)];
+  }
+  int evaluate_plain(int first, int n);
+  int evaluate_selective(int first, int n);
+  void remove_negative_curvature(int lane);
+
+  const Laws& laws_;
+  bool selective_;
+  int lanes_ = 0;
+  AlignedVector<double> H_, Hbar_;   ///< batches of [component][batch_points]
+  std::vector<std::int32_t> owner_;  ///< padded to batches
+  std::vector<double> weight_, share_;   ///< by lane
+  AlignedVector<double> own_, mixed_, bar_;
+  AlignedVector<double> A_, P_, mapped_, growth_, inverse_, volume_;
+  std::vector<std::int64_t> volume_group_;
+  LawScratch scratch_;
+};
+
+}  // namespace perikit

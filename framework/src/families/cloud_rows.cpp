@@ -1,0 +1,44 @@
+#include "families/cloud_rows.hpp"
+
+#include <algorithm>
+
+#include "families/quiet_blocks.hpp"
+
+namespace perikit {
+
+void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows) {
+  rows.resize(points);
+  parallel_for(cloud_blocks(points), [&](std::size_t b) {
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+      Row row{};
+      for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
+      rows[p] = row;
+    }
+  });
+}
+
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points) {
+  BlockReach reach;
+  reach.units = (points + block_points - 1) / block_points;
+  reach.touches.resize(reach.units);
+  for (std::size_t b = 0; b < reach.units; ++b) {
+    reach.own.push_back(static_cast<std::int32_t>(b));
+    std::vector<std::int32_t>& units = reach.touches[b];
+    units.push_back(static_cast<std::int32_t>(b));
+    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
+      for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
+        if (unit != units.back()) units.push_back(unit);
+      }
+    }
+    std::sort(units.begin(), units.end());
+    units.erase(std::unique(units.begin(), units.end()), units.end());
+  }
+  return reach;
+}
+
+bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
+  return QuietBlocks::moves(u, b * block_points, std::min(points, (b + 1) * block_points));
+}
+
+}  // namespace perikit

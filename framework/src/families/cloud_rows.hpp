@@ -1,0 +1,31 @@
+#pragma once
+/// What the loops over clouds share: point-major mirrors of fields, and blocks of points.
+
+#include "families/blocks.hpp"
+#include "families/counted_row.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+/// Four doubles: a point-major row, so that one neighbour costs one cache line.
+#if defined(PERIKIT_COUNT_OPERATIONS)
+using Row = CountedRow;
+#else
+typedef double Row __attribute__((vector_size(32)));
+#endif
+
+inline constexpr std::size_t cloud_block_points = 256;
+
+constexpr std::size_t cloud_blocks(std::size_t points) noexcept { return (points + cloud_block_points - 1) / cloud_block_points; }
+
+/// rows[p] <- components of u at p, zero in the rest.
+void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows);
+
+/// Blocks of so many points, and those that hold neighbours of them.
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points = cloud_block_points);
+
+/// Whether a point of block b moves.
+bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points = cloud_block_points) noexcept;
+
+}  // namespace perikit

@@ -1,0 +1,66 @@
+#include "families/reproducing_kernel.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <array>
+
+#include "families/shape_tensor.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Exponents of the monomials of degree 1 ... order, the linear ones first, in the order of the axes.
+std::vector<std::array<int, 3>> exponents(int dimension, int order) {
+  std::vector<std::array<int, 3>> all;
+  for (int degree = 1; degree <= order; ++degree)
+    for (int a = degree; a >= 0; --a)
+      for (int b = degree - a; b >= 0; --b) {
+        const int c = degree - a - b;
+        if ((dimension > 1 || b == 0) && (dimension > 2 || c == 0)) all.push_back({a, b, c});
+      }
+  return all;
+}
+
+double power(double x, int n) {
+  double value = 1;
+  for (; n > 0; --n) value *= x;
+  return value;
+}
+
+bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
+  const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
+  const auto terms = exponents(family.dimension, order);
+  const auto size = static_cast<Eigen::Index>(terms.size());
+  Eigen::MatrixXd q(size, static_cast<Eigen::Index>(bonds));
+  Eigen::VectorXd weight(static_cast<Eigen::Index>(bonds));
+  for (std::size_t k = 0; k < bonds; ++k) {
+    weight(static_cast<Eigen::Index>(k)) = family.omega[k] * family.volume[k];
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      double value = 1;
+      for (std::size_t c = 0; c < d; ++c) value *= power(family.xi[c][k] / horizon, terms[t][c]);
+      q(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(k)) = value;
+    }
+  }
+  const Eigen::MatrixXd M = q * weight.asDiagonal() * q.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(M);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  if (!(values(size - 1) > 0) || !(values(0) >= singular_ratio * values(size - 1))) return false;
+  const auto rows = static_cast<Eigen::Index>(d);
+  const Eigen::MatrixXd linear = eigen.eigenvectors().topRows(rows) * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  const Eigen::MatrixXd stencil = linear * q * weight.asDiagonal() / horizon;
+  for (std::size_t k = 0; k < bonds; ++k)
+    for (std::size_t e = 0; e < d; ++e) g[k * d + e] = stencil(static_cast<Eigen::Index>(e), static_cast<Eigen::Index>(k));
+  return true;
+}
+
+}  // namespace
+
+int reproducing_kernel(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
+  g.assign(static_cast<std::size_t>(family.bonds) * static_cast<std::size_t>(family.dimension), 0.0);
+  if (family.bonds == 0) return 0;
+  for (; order > 0; --order)
+    if (exactly(family, horizon, order, g)) return order;
+  return 0;
+}
+
+}  // namespace perikit

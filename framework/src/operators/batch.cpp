@@ -1,0 +1,150 @@
+#include "operators/batch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/simd.hpp"
+
+namespace perikit {
+
+void ScratchPool::prepare(const Laws& laws) {
+  while (scratch_.size() < static_cast<std::size_t>(thread_count())) {
+    // Value-initialised: components that no kernel writes (lateral H) stay zero.
+    scratch_.push_back(std::make_unique<BatchScratch>());
+    laws.prepare(scratch_.back()->law, false);
+  }
+}
+
+int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept {
+  LawBatch batch;
+  batch.n = n;
+  batch.H = s.H;
+  batch.confined = !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain);
+  batch.points = points;
+  if (energy_ || work_ == Work::sample) batch.psi = s.psi;
+  batch.P = P;
+  if (dP) batch.dH = s.dH;
+  batch.dP = dP;
+  if (work_ == Work::sample) batch.lateral = s.lateral;
+  if (LawHistory* history = laws_.history()) {
+    batch.history = history->next(s.block, s.cursor, n);
+    if (work_ != Work::force) batch.history.end = nullptr;
+  }
+  return laws_.evaluate(batch, s.law).inadmissible;
+}
+
+namespace {
+
+/// sum of W psi.
+double weighted_energy(int n, const double* weight, const double* psi) noexcept {
+  Pack sum_psi(0.0);
+  int l = 0;
+  for (; l + pack_width <= n; l += pack_width) sum_psi += Pack::load(weight + l) * Pack::load(psi + l);
+  double total = sum(sum_psi);
+  for (; l < n; ++l) total += weight[l] * psi[l];
+  return total;
+}
+
+}  // namespace
+
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
+  const int d = dimension(laws_.space());
+  const bool tangent = work_ == Work::tangent;
+  const int bad = evaluate_laws(n, s, points, tangent ? nullptr : P, tangent ? P : nullptr);
+  if (bad >= 0) return bad;
+  if (energy_) *energy += weighted_energy(n, weight, s.psi);
+  if (work_ == Work::sample) return -1;
+  const double sign = tangent ? -1.0 : 1.0;
+  for (int l = 0; l < n; l += pack_width) {
+    const Pack w = Pack::load(weight + l) * Pack(sign);
+    for (int c = 0; c < d * d; ++c) (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
+  }
+  return -1;
+}
+
+int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept {
+  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  const bool tangent = work_ == Work::tangent;
+  const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
+  selective_map(laws_.space(), batch, s.H, s.dH);
+  if (ends == 2 && !laws_.single()) std::copy_n(s.far, lanes, s.owner + lanes);
+  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, s.P, tangent ? s.other : nullptr);
+  if (bad >= 0) return bad % lanes;
+  if (energy_) {
+    *energy += weighted_energy(n, s.weight, s.psi);
+    if (ends == 2) *energy += weighted_energy(n, s.far_weight, s.psi + lanes);
+  }
+  if (work_ == Work::sample) return -1;
+  selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
+  return -1;
+}
+
+int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
+  if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
+  const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
+  if (!both_ends) return pass(n, s, owners, s.weight, s.P, energy);
+  // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
+  bool differ = false;
+  if (laws_.single()) {
+    for (int l = 0; l < n; ++l) s.weight[l] += s.far_weight[l];
+  } else {
+    for (int l = 0; l < n; ++l) {
+      if (laws_.same(static_cast<std::size_t>(s.owner[l]), static_cast<std::size_t>(s.far[l]))) {
+        s.weight[l] += s.far_weight[l];
+        s.far_weight[l] = 0;
+      } else {
+        differ = true;
+      }
+    }
+  }
+  int bad = pass(n, s, owners, s.weight, s.P, energy);
+  if (bad >= 0 || !differ) return bad;
+  bad = pass(n, s, s.far, s.far_weight, s.other, energy);
+  const int d = dimension(laws_.space());
+  for (int c = 0; c < d * d; ++c)
+    for (int l = 0; l < n; ++l) s.P[c * batch_points + l] += s.other[c * batch_points + l];
+  return bad;
+}
+
+void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept {
+  const Space space = laws_.space();
+  const int d = dimension(space), components = tensor_components(space);
+  const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
+  for (int l = 0; l < n; ++l) {
+    const double w = s.weight[l];
+    const auto p = static_cast<std::size_t>(s.owner[l]);
+    if (w == 0) continue;
+    double F[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, P[3][3] = {};
+    for (int a = 0; a < d; ++a)
+      for (int b = 0; b < d; ++b) {
+        F[a][b] += s.H[(a * d + b) * batch_points + l];
+        P[a][b] = s.P[(a * d + b) * batch_points + l];
+      }
+    for (int c = d * d; c < components; ++c) {
+      const int axis = d + c - d * d;
+      F[axis][axis] += stress_space ? s.lateral[l] : s.H[c * batch_points + l];
+      P[axis][axis] = s.P[c * batch_points + l];
+    }
+    const double J = F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) - F[0][1] * (F[1][0] * F[2][2] - F[1][2] * F[2][0]) +
+                     F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
+    double sigma[3][3] = {};
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) {
+        for (int k = 0; k < 3; ++k) sigma[a][b] += P[a][k] * F[b][k] / J;
+        sums.cauchy[static_cast<std::size_t>(3 * a + b) * sums.stride + p] += w * sigma[a][b];
+      }
+    const double xy = sigma[0][1] * sigma[0][1] + sigma[1][2] * sigma[1][2] + sigma[0][2] * sigma[0][2];
+    const double dx = sigma[0][0] - sigma[1][1], dy = sigma[1][1] - sigma[2][2], dz = sigma[2][2] - sigma[0][0];
+    sums.von_mises[p] += w * std::sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + 3 * xy);
+    for (int c = 0; c < components; ++c) {
+      const int axis = c < d * d ? -1 : d + c - d * d;
+      const double h = axis >= 0 ? F[axis][axis] - 1 : s.H[c * batch_points + l];
+      sums.H[static_cast<std::size_t>(c) * sums.stride + p] += w * h;
+      sums.P[static_cast<std::size_t>(c) * sums.stride + p] += w * s.P[c * batch_points + l];
+    }
+    sums.psi[p] += w * s.psi[l];
+    sums.weight[p] += w;
+  }
+}
+
+}  // namespace perikit

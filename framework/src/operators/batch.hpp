@@ -1,0 +1,130 @@
+#pragma once
+/// One batch of evaluation points on its way through the law: H -> W P (forces), H, dH -> -W A : dH (tangent), or sums of point
+/// averages (sample). Shared by every engine.
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "perikit/core/parallel.hpp"
+#include "perikit/operators/laws.hpp"
+#include "maps/selective_map.hpp"
+
+namespace perikit {
+
+enum class Work { force, tangent, sample };
+
+/// Scratch of one thread. Arrays are [component][lane] with stride batch_points.
+struct BatchScratch {
+  alignas(64) double H[9 * batch_points];
+  alignas(64) double dH[9 * batch_points];
+  alignas(64) double P[9 * batch_points];        ///< result: weighted stress
+  alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
+  alignas(64) double psi[batch_points];
+  alignas(64) double lateral[batch_points];
+  alignas(64) double A[9 * batch_points];
+  alignas(64) double dA[9 * batch_points];
+  alignas(64) double du[3 * batch_points];
+  alignas(64) double dw[3 * batch_points];
+  alignas(64) double t[3 * batch_points];
+  // Selective map: gradients before it, and where the volume changes of the owners are, by end (to be filled in by the engine),
+  // `volume` a place to gather them; weighted pressures on the owners by end (result).
+  alignas(64) double Ht[9 * batch_points];
+  alignas(64) double dHt[9 * batch_points];
+  alignas(64) double volume[volume_components * batch_points];
+  OwnerVolumes owner_volumes;
+  std::int64_t volume_group[batch_points / padding];
+  alignas(64) double pressure[batch_points];
+  alignas(64) double pressure_rate[batch_points];
+  alignas(64) double inverse[batch_points];
+  alignas(64) double growth[batch_points];
+  alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
+  alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
+  alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
+  std::int32_t owner[batch_points];
+  std::int32_t far[batch_points];
+  LawScratch law;
+  std::size_t block = 0, cursor = 0;             ///< where history is kept: the block, and its lanes so far
+};
+
+/// Sums over lanes of sampled quantities go here, one row per owner.
+struct SampleSums {
+  double* weight;      ///< sum W
+  double* psi;         ///< sum W psi
+  double* H;           ///< tensor components x stride
+  double* P;
+  double* cauchy;      ///< 9 x stride
+  double* von_mises;
+  std::size_t stride;
+};
+
+/// One BatchScratch per thread.
+class ScratchPool {
+ public:
+  /// Before a parallel loop: memory for every thread, with room for the constants of the laws.
+  void prepare(const Laws& laws);
+  /// The memory of this thread, at the beginning of a block of batches.
+  BatchScratch& begin_block(std::size_t block) noexcept {
+    BatchScratch& s = *scratch_[static_cast<std::size_t>(thread_index())];
+    s.block = block;
+    s.cursor = 0;
+    return s;
+  }
+  std::size_t bytes() const noexcept { return scratch_.size() * sizeof(BatchScratch); }
+
+ private:
+  std::vector<std::unique_ptr<BatchScratch>> scratch_;
+};
+
+class BatchWork {
+ public:
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective) : laws_(laws), work_(work), energy_(energy), selective_(selective) {}
+
+  Work work() const noexcept { return work_; }
+  bool tangent() const noexcept { return work_ == Work::tangent; }
+
+  /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
+  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
+  /// ends of at most batch_points / 2 lanes.
+  int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
+  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
+  void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
+
+ private:
+  int pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept;
+  int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
+  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept;
+
+  const Laws& laws_;
+  Work work_;
+  bool energy_;
+  bool selective_;
+};
+
+/// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.
+struct Pass {
+  const BatchWork& work;
+  ConstFieldView u, w;
+  FieldView out;
+  const SampleSums* sums = nullptr;
+  double* energies = nullptr;     ///< by block
+  std::int64_t bad = -1;          ///< internal index
+  std::mutex guard;
+  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
+  const std::uint8_t* only = nullptr;
+  const std::uint8_t* near = nullptr;
+
+  /// Evaluation points are taken one by one and nothing is scattered.
+  bool alone() const noexcept { return only || work.work() == Work::sample; }
+  bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
+  bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
+
+  void report(std::int64_t point) {
+    const std::lock_guard lock(guard);
+    if (bad < 0 || point < bad) bad = point;
+  }
+};
+
+}  // namespace perikit

@@ -1,0 +1,119 @@
+#include "perikit/operators/laws.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std::uint16_t> ids, std::size_t stride)
+    : space_(space), records_(std::move(records)), ids_(ids), stride_(stride),
+      single_(ids.empty() && records_.front().uniform) {
+  for (const MaterialRecord& record : records_) state_ = std::max(state_, record.material->state_components(space));
+  if (state_ > 0) history_ = std::make_unique<LawHistory>(state_);
+}
+
+bool Laws::constant_tangent() const noexcept {
+  return std::all_of(records_.begin(), records_.end(), [](const auto& r) { return r.traits.constant_tangent; });
+}
+
+bool Laws::objective() const noexcept {
+  return std::all_of(records_.begin(), records_.end(), [](const auto& r) { return r.traits.objective; });
+}
+
+Moduli Laws::moduli(std::size_t p) const {
+  const MaterialRecord& record = record_of(p);
+  if (record.uniform) return record.material->small_strain(record.constants.data());
+  std::vector<double> constants(static_cast<std::size_t>(record.traits.constants));
+  for (std::size_t k = 0; k < constants.size(); ++k) constants[k] = record.constants[k * stride_ + p];
+  return record.material->small_strain(constants.data());
+}
+
+double Laws::density(std::size_t p) const noexcept {
+  const MaterialRecord& record = record_of(p);
+  return record.densities.empty() ? record.density : record.densities[p];
+}
+
+void Laws::prepare(LawScratch& scratch, bool tangents) const {
+  std::size_t constants = 1;
+  for (const MaterialRecord& record : records_) constants = std::max(constants, static_cast<std::size_t>(record.traits.constants));
+  scratch.constants.assign(constants * batch_points, 0.0);
+  scratch.history.assign(static_cast<std::size_t>(state_) * batch_points, 0.0);
+  if (tangents) scratch.A.assign(static_cast<std::size_t>(components() * components()) * batch_points, 0.0);
+}
+
+Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept {
+  MaterialBatch call;
+  call.n = batch.n;
+  call.stride = batch_points;
+  call.H = batch.H;
+  call.dH = batch.dH;
+  call.confined = batch.confined;
+  call.psi = batch.psi;
+  call.P = batch.P;
+  call.dP = batch.dP;
+  call.A = batch.A;
+  call.lateral = batch.lateral;
+  if (history_) {
+    call.time_step = history_->time_step();
+    call.state_old = batch.history.begin;
+    call.state_new = batch.history.end;
+    call.state_stride = batch.history.stride;
+  }
+  call.constants = record.constants.data();
+  if (!record.uniform) {
+    const auto count = static_cast<std::size_t>(record.traits.constants);
+    for (std::size_t k = 0; k < count; ++k) {
+      double* row = scratch.constants.data() + k * batch_points;
+      const std::size_t lanes = padded(static_cast<std::size_t>(batch.n));
+      for (std::size_t l = 0; l < lanes; ++l) {
+        row[l] = record.constants[k * stride_ + static_cast<std::size_t>(batch.points[l < static_cast<std::size_t>(batch.n) ? l : 0])];
+      }
+    }
+    call.constants = scratch.constants.data();
+    call.constant_stride = batch_points;
+  }
+  return record.material->evaluate(space_, call);
+}
+
+Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept {
+  if (ids_.empty()) return evaluate_one(records_[0], batch, scratch);
+  const std::uint16_t first = ids_[static_cast<std::size_t>(batch.points[0])];
+  const auto mixed = std::any_of(batch.points, batch.points + batch.n,
+                                 [&](std::int32_t p) { return ids_[static_cast<std::size_t>(p)] != first; });
+  if (!mixed) return evaluate_one(records_[first], batch, scratch);
+  // Several laws in one batch: each sees its own lanes and the others at rest, for what one law accepts another may not.
+  Status status;
+  for (std::size_t m = 0; m < records_.size(); ++m) {
+    const auto mine = [&](int l) { return ids_[static_cast<std::size_t>(batch.points[l])] == m; };
+    bool present = false;
+    for (int l = 0; l < batch.n && !present; ++l) present = mine(l);
+    if (!present) continue;
+    for (int c = 0; c < components(); ++c)
+      for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(batch.n))); ++l)
+        scratch.H[c * batch_points + l] = l < batch.n && mine(l) ? batch.H[c * batch_points + l] : 0.0;
+    LawBatch part = batch;
+    part.H = scratch.H;
+    part.psi = batch.psi ? scratch.psi : nullptr;
+    part.P = batch.P ? scratch.P : nullptr;
+    part.dP = batch.dP ? scratch.dP : nullptr;
+    part.lateral = batch.lateral ? scratch.lateral : nullptr;
+    part.A = batch.A ? scratch.A.data() : nullptr;
+    part.history.end = batch.history.end ? scratch.history.data() : nullptr;
+    const Status one = evaluate_one(records_[m], part, scratch);
+    if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
+    const auto keep = [&](double* to, const double* from, int components, std::size_t stride) {
+      if (!to) return;
+      for (int c = 0; c < components; ++c)
+        for (std::size_t l = 0; l < static_cast<std::size_t>(batch.n); ++l)
+          if (mine(static_cast<int>(l))) to[static_cast<std::size_t>(c) * stride + l] = from[static_cast<std::size_t>(c) * stride + l];
+    };
+    keep(batch.psi, scratch.psi, 1, batch_points);
+    keep(batch.lateral, scratch.lateral, 1, batch_points);
+    keep(batch.P, scratch.P, components(), batch_points);
+    keep(batch.dP, scratch.dP, components(), batch_points);
+    keep(batch.A, scratch.A.data(), components() * components(), batch_points);
+    keep(batch.history.end, scratch.history.data(), records_[m].material->state_components(space_), batch.history.stride);
+  }
+  return status;
+}
+
+}  // namespace perikit

@@ -1,0 +1,375 @@
+/// Pair laws on a cloud: one point at a time over its sorted neighbours, those with a larger index only (the force at the far
+/// end is the opposite one). Bond vectors and lengths are recomputed from positions.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "families/cloud_bonds.hpp"
+#include "families/cloud_rows.hpp"
+#include "terms/pair_loop.hpp"
+
+namespace perikit {
+
+namespace {
+
+template <int D>
+class CloudPairs final : public PairLoop {
+ public:
+  explicit CloudPairs(const PairLoopParts& parts);
+
+  void families(const Visit& visit) const override;
+  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
+  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(body_, lists_); }
+  std::size_t blocks() const noexcept override { return cloud_blocks(body_.points()); }
+  PairCounts counts() const noexcept override {
+    return {lists_.neighbour.size(), broken_.size(),
+            lists_.neighbour.size() * 4 + lists_.first.size() * 16 + omega_.size() * 8 + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row) + (bonds_ ? bonds_->bytes() : 0),
+            lists_.neighbour.size() * 8 * (D + 1)};
+  }
+  std::int64_t run(const PairPass& pass) override;
+
+ private:
+  struct BrokenBond {
+    std::size_t point;
+    std::int32_t far;
+    double omega;
+  };
+  struct Gathered {
+    alignas(64) double xi[3][batch_points];
+    alignas(64) double du[3][batch_points];
+    alignas(64) double dw[3][batch_points];
+    alignas(64) double length[batch_points];
+    alignas(64) double omega[batch_points];
+    alignas(64) double q[batch_points];        ///< q_i + q_j
+    alignas(64) double dq[batch_points];
+    alignas(64) double far_volume[batch_points];   ///< b V_j
+    alignas(64) double integrity[batch_points];    ///< b, where damage is on
+    alignas(64) double t[3][batch_points];
+  };
+
+  void family_of(std::size_t p, std::vector<FamilyBond>& bonds) const;
+  /// Each bond once, for both ends.
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
+  template <PairWork work>
+  void run_block(std::size_t b, const PairPass& pass);
+  /// Whether all bonds of the point had a finite positive length.
+  template <PairWork work>
+  bool run_point(std::size_t p, const PairPass& pass, double& energy);
+  template <PairWork work>
+  void gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept;
+
+  const Body& body_;
+  const Kinematics& law_;
+  const PairFields& fields_;
+  bool dilatation_, half_;
+  const Row* position_;                        ///< {x, y, z, V}
+  FamilyLists lists_;                          ///< intact bonds
+  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
+  AlignedVector<double> omega_;                ///< by bond; empty where the law does not ask
+  std::vector<BrokenBond> broken_;             ///< ascending by point
+  std::optional<CloudBonds> bonds_;            ///< only where damage is on
+  Colouring colouring_;
+  AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
+  AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
+  AlignedVector<Row> force_;
+};
+
+template <int D>
+CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
+    : body_(parts.body), law_(parts.law), fields_(parts.fields), dilatation_(parts.law.traits().dilatation), half_(parts.half),
+      position_(reinterpret_cast<const Row*>(body_.rows().data())),
+      lists_(find_families(body_.rows(), body_.points(), D, body_.horizon())) {
+  const std::size_t n = body_.points();
+  const bool keep_omega = law_.traits().influence;
+  omega_.resize(keep_omega ? lists_.neighbour.size() : 0);
+  upper_.resize(n);
+  force_.resize(n);
+  std::vector<double> r, omega;
+  std::vector<std::int64_t> first(n + 1, 0);
+  std::int64_t kept = 0;
+  for (std::size_t p = 0; p < n; ++p) {
+    const std::int64_t begin = lists_.first[p], end = lists_.first[p + 1];
+    const Point x = body_.position(p);
+    r.clear();
+    for (std::int64_t k = begin; k < end; ++k) {
+      const Row xi = position_[lists_.neighbour[static_cast<std::size_t>(k)]] - position_[p];
+      r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body_.horizon()));
+    }
+    omega.resize(r.size());
+    parts.influence.evaluate(r, omega);
+    const bool near_crack = std::any_of(body_.cracks().begin(), body_.cracks().end(), [&](const Crack& c) { return c.near(x, body_.horizon()); });
+    first[p] = kept;
+    upper_[p] = -1;
+    for (std::int64_t k = begin; k < end; ++k) {
+      const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k)];
+      const double w = omega[static_cast<std::size_t>(k - begin)];
+      if (near_crack && body_.cut(x, body_.position(static_cast<std::size_t>(j)))) {
+        broken_.push_back({p, j, w});
+        continue;
+      }
+      if (upper_[p] < 0 && static_cast<std::size_t>(j) > p) upper_[p] = kept;
+      // Lists shrink in place where bonds are cut.
+      lists_.neighbour[static_cast<std::size_t>(kept)] = j;
+      if (keep_omega) omega_[static_cast<std::size_t>(kept)] = w;
+      ++kept;
+    }
+    if (upper_[p] < 0) upper_[p] = kept;
+  }
+  first[n] = kept;
+  lists_.first = std::move(first);
+  lists_.neighbour.resize(static_cast<std::size_t>(kept));
+  if (keep_omega) omega_.resize(static_cast<std::size_t>(kept));
+  const BlockReach reach = cloud_reach(lists_, n);
+  colouring_ = Colouring(reach);
+  if (parts.quiet) watch(reach);
+}
+
+template <int D>
+void CloudPairs<D>::family_of(std::size_t p, std::vector<FamilyBond>& bonds) const {
+  bonds.clear();
+  const auto add = [&](std::int32_t j, double omega, double integrity) {
+    const Row xi = position_[j] - position_[p];
+    bonds.push_back({{xi[0], xi[1], xi[2]}, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]), omega, position_[j][3], integrity});
+  };
+  for (std::int64_t at = lists_.first[p]; at < lists_.first[p + 1]; ++at) {
+    const auto k = static_cast<std::size_t>(at);
+    add(lists_.neighbour[k], omega_.empty() ? 1.0 : omega_[k], bonds_ ? (*bonds_)[k] : 1.0);
+  }
+  for (auto cut = std::lower_bound(broken_.begin(), broken_.end(), p, [](const BrokenBond& b, std::size_t q) { return b.point < q; });
+       cut != broken_.end() && cut->point == p; ++cut) {
+    add(cut->far, omega_.empty() ? 1.0 : cut->omega, 0.0);
+  }
+}
+
+template <int D>
+void CloudPairs<D>::families(const Visit& visit) const {
+  std::vector<FamilyBond> bonds;
+  for (std::size_t p = 0; p < body_.points(); ++p) {
+    family_of(p, bonds);
+    visit(bonds, {static_cast<std::int32_t>(p)});
+  }
+}
+
+template <int D>
+void CloudPairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
+  std::vector<FamilyBond> bonds;
+  for (const std::int32_t p : points) {
+    family_of(static_cast<std::size_t>(p), bonds);
+    visit(bonds, {p});
+  }
+}
+
+template <int D>
+template <PairWork work>
+void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept {
+  constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
+  constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
+  const Row x = position_[p], own = u_[p], own_w = rate ? w_[p] : Row{}, own_moduli = moduli_.empty() ? Row{} : moduli_[p];
+  for (int l = 0; l < n; ++l) {
+    const auto k = static_cast<std::size_t>(begin + l);
+    const auto j = static_cast<std::size_t>(lists_.neighbour[k]);
+    // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
+    const double b = bonds_ ? (*bonds_)[k] : 1.0;
+    const Row far = position_[j], xi = far - x, du = b > 0 ? u_[j] - own : Row{};
+    double square = 0;
+    for (int c = 0; c < D; ++c) {
+      g.xi[c][l] = xi[c];
+      g.du[c][l] = du[c];
+      square += xi[c] * xi[c];
+    }
+    g.length[l] = square;
+    g.far_volume[l] = b * far[3];
+    if (bonds_) g.integrity[l] = b;
+    g.omega[l] = omega_.empty() ? 1.0 : omega_[k];
+    if constexpr (rate) {
+      const Row dw = w_[j] - own_w;
+      for (int c = 0; c < D; ++c) g.dw[c][l] = dw[c];
+      if (dilatation_) g.dq[l] = own_w[3] + w_[j][3];
+    }
+    if constexpr (!sums) {
+      if (dilatation_) g.q[l] = own[3] + u_[j][3];
+      if (!moduli_.empty()) {
+        const Row mean = 0.5 * (own_moduli + moduli_[j]);
+        double factor = 0;
+        for (int c = 0; c < D; ++c) factor += mean[c] * xi[c] * xi[c];
+        s.modulus[l] = fields_.correction.size() > 0 ? mean[3] * factor / square : mean[3];
+      }
+    }
+  }
+  for (int l = n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
+    for (int c = 0; c < D; ++c) {
+      g.xi[c][l] = c == 0;
+      g.du[c][l] = g.dw[c][l] = 0;
+    }
+    g.length[l] = 1;
+    g.far_volume[l] = g.omega[l] = g.q[l] = g.dq[l] = 0;
+    if (!moduli_.empty()) s.modulus[l] = 0;
+  }
+  for (int l = 0; l < n; l += pack_width) sqrt(Pack::load(g.length + l)).store(g.length + l);
+}
+
+template <int D>
+template <PairWork work>
+bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total) {
+  constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
+  constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
+  const bool half = at_once(pass);
+  const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
+  alignas(64) PairScratch s;
+  alignas(64) Gathered g;
+  const double volume = position_[p][3];
+  if constexpr (!sums) {
+    if (moduli_.empty())
+      for (double& c : s.modulus) c = fields_.uniform;
+  }
+  Row own{};
+  double own_sum = 0, stored = 0;
+  bool finite = true;
+  const Pack onset(bonds_ ? bonds_->nearest().least_onset : 0.0);
+  Pack excess(-std::numeric_limits<double>::max());
+  for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < lists_.first[p + 1]; begin += batch_points) {
+    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, lists_.first[p + 1] - begin));
+    gather<work>(p, begin, n, g, s);
+    const auto far_point = [&](int l) { return static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(begin + l)]); };
+    for (int l = 0; l < n; l += pack_width) {
+      Pack xi[D], du[D], dw[D];
+      for (int c = 0; c < D; ++c) {
+        xi[c] = Pack::load(g.xi[c] + l);
+        du[c] = Pack::load(g.du[c] + l);
+        if constexpr (rate) dw[c] = Pack::load(g.dw[c] + l);
+      }
+      const Pack length = Pack::load(g.length + l);
+      const Stretch<D> bond(xi, length, du);
+      finite = finite && all(bond.e == bond.e);
+      if (work == PairWork::force && bonds_) excess = max(excess, bond.e - onset * length);
+      bond.e.store(s.e + l);
+      for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
+      bond.inverse_length.store(s.inverse_length + l);
+      if constexpr (rate) bond.along(dw).store(s.de + l);
+      if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t[0] + l);
+    }
+    if constexpr (sums) {
+      for (int l = 0; l < n; ++l) {
+        own_sum += g.t[0][l] * g.far_volume[l];
+        if (half) pass.out.data[far_point(l)] += g.t[0][l] * (bonds_ ? g.integrity[l] * volume : volume);
+      }
+      continue;
+    }
+    law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force,
+                   work == PairWork::tangent ? s.stiffness : nullptr});
+    for (int l = 0; l < n && energies; ++l) stored += s.energy[l] * g.far_volume[l];
+    if constexpr (work == PairWork::energy) continue;
+    for (int l = 0; l < n; l += pack_width) {
+      const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
+      Pack T = Pack::load(s.force + l);
+      if (dilatation_) T += weight * Pack::load(g.q + l);
+      if constexpr (work == PairWork::force) {
+        T *= volumes;
+        for (int c = 0; c < D; ++c) (T * Pack::load(s.n[c] + l)).store(g.t[c] + l);
+      } else {
+        // d(T n) = dT n + T (dw - n de)/|y|
+        const Pack de = Pack::load(s.de + l), turn = T * Pack::load(s.inverse_length + l);
+        Pack dT = Pack::load(s.stiffness + l) * de;
+        if (dilatation_) dT += weight * Pack::load(g.dq + l);
+        for (int c = 0; c < D; ++c) {
+          const Pack n_c = Pack::load(s.n[c] + l);
+          (-volumes * (dT * n_c + turn * (Pack::load(g.dw[c] + l) - n_c * de))).store(g.t[c] + l);
+        }
+      }
+    }
+    for (int l = 0; l < n; ++l) {
+      Row t{};
+      for (int c = 0; c < D; ++c) t[c] = g.t[c][l];
+      own += t;
+      if (half) force_[far_point(l)] -= t;
+    }
+  }
+  if (work == PairWork::force && bonds_) {
+    alignas(64) double lanes[pack_width];
+    excess.store(lanes);
+    bonds_->nearest().excess[p] = *std::max_element(lanes, lanes + pack_width);
+  }
+  if constexpr (sums) pass.out.data[p] += own_sum;
+  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored;
+  else force_[p] += own;
+  total += (half ? 1.0 : 0.5) * volume * stored;
+  return finite;
+}
+
+template <int D>
+template <PairWork work>
+void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
+  double energy = 0;
+  for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p) {
+    if (pass.only && !pass.only[p / padding]) continue;
+    if (run_point<work>(p, pass, energy)) continue;
+    report_bad(static_cast<std::int64_t>(p));
+    return;
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+std::int64_t CloudPairs<D>::run(const PairPass& pass) {
+  reset_bad();
+  look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, body_.points()); });
+  const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
+  mirror_rows(pass.u, body_.points(), u_);
+  if (bonds_) {
+    bonds_->nearest().u = nullptr;
+    bonds_->nearest().excess.resize(body_.points());
+  }
+  if (pass.w.data) mirror_rows(pass.w, body_.points(), w_);
+  if (fields_.modulus.size() > 0) moduli_.resize(body_.points());
+  const auto over_points = [&](auto&& body) {
+    parallel_for(blocks(), [&](std::size_t b) {
+      for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p) body(p);
+    });
+  };
+  over_points([&](std::size_t p) {
+    if (pass.q.data) u_[p][3] = pass.q.data[p];
+    if (pass.dq.data) w_[p][3] = pass.dq.data[p];
+    if (!moduli_.empty()) {
+      Row row{};
+      for (int c = 0; c < D && fields_.correction.size() > 0; ++c) row[c] = fields_.correction.component(c)[p];
+      row[3] = fields_.modulus.data()[p];
+      moduli_[p] = row;
+    }
+    if (pass.work == PairWork::force && bonds_) bonds_->nearest().excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
+    if (vectors) force_[p] = Row{};
+    else pass.out.data[p] = 0;
+  });
+  auto block = [&](std::size_t b) {
+    if (!awake(b)) return;
+    switch (pass.work) {
+      case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
+      case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);
+      case PairWork::force: return run_block<PairWork::force>(b, pass);
+      case PairWork::tangent: return run_block<PairWork::tangent>(b, pass);
+      case PairWork::energy: return run_block<PairWork::energy>(b, pass);
+    }
+  };
+  if (at_once(pass)) colouring_.for_each(block);
+  else parallel_for(blocks(), block);
+  if (pass.work == PairWork::force && bonds_ && bad() < 0) bonds_->nearest().u = &u_;
+  if (vectors && bad() < 0) {
+    over_points([&](std::size_t p) {
+      for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
+    });
+  }
+  return bad();
+}
+
+}  // namespace
+
+template <int D>
+std::unique_ptr<PairLoop> make_cloud_pairs(const PairLoopParts& parts) {
+  return std::make_unique<CloudPairs<D>>(parts);
+}
+template std::unique_ptr<PairLoop> make_cloud_pairs<1>(const PairLoopParts&);
+template std::unique_ptr<PairLoop> make_cloud_pairs<2>(const PairLoopParts&);
+template std::unique_ptr<PairLoop> make_cloud_pairs<3>(const PairLoopParts&);
+
+}  // namespace perikit

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "spaces/cloud_model.hpp"
+#include "families/family_point.hpp"
+#include "terms/penalty_matrix.hpp"
+#include "families/quiet_blocks.hpp"
+#include "terms/zero_energy_penalty.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Two passes over the points: H_i, from it Q_i = M_i H_i (and the energy); then forces, gathered from both ends of each bond.
+template <int D, bool isotropic>
+class CloudPenalty final : public ZeroEnergyPenalty {
+  /// M_i as m_i or as D rows, its columns.
+  static constexpr std::size_t columns = isotropic ? 1 : D;
+  using Column = std::conditional_t<isotropic, double, Row>;
+
+ public:
+  CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
+      : model_(model),
+        families_(model.families()),
+        position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
+        points_(parts.body->points()),
+        parts_(parts),
+        M_(columns * points_, Column{}),
+        flux_(D * points_) {
+    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists, points_));
+    over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
+  }
+
+  void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
+    mirror_rows(u, points_, u_);
+    std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
+    quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
+    over_points([&](std::size_t b) { return quiet_.begins(b); }, [&](std::size_t p) {
+      model_.gradient_rows(p, u_, flux_);
+      if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
+      for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
+    });
+    over_points([&](std::size_t b) { return quiet_.awake(b, 2); }, [&](std::size_t p) {
+      const Row f = factor * position_[p][3] * force_of_point(p);
+      for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
+    });
+    if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+  }
+
+  void add_density(ConstFieldView u, double* density) override {
+    mirror_rows(u, points_, u_);
+    quiet_.wake();
+    over_points(everywhere, [&](std::size_t p) {
+      model_.gradient_rows(p, u_, flux_);
+      density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
+    });
+  }
+
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+    mirror_rows(u, points_, u_);
+    quiet_.wake();
+    double energy = 0;
+    for (std::size_t p = 0; p < points_; ++p) {
+      if (!marks[p / padding]) continue;
+      model_.gradient_rows(p, u_, flux_);
+      energy += energy_of_point(p, &flux_[D * p]);
+    }
+    return energy;
+  }
+
+  void bonds_changed(std::span<const std::int32_t> points) override {
+    for (const std::int32_t p : points) set_matrix(static_cast<std::size_t>(p));
+  }
+
+  std::size_t bytes() const noexcept override { return M_.size() * sizeof(Column) + (flux_.size() + u_.size()) * sizeof(Row); }
+
+ private:
+  static constexpr auto everywhere = [](std::size_t) { return true; };
+
+  /// body(p) for the points of the blocks with wanted(b).
+  template <class Wanted, class Body>
+  void over_points(Wanted&& wanted, Body&& body) const {
+    parallel_for(cloud_blocks(points_), [&](std::size_t b) {
+      if (!wanted(b)) return;
+      for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) body(p);
+    });
+  }
+
+  void set_matrix(std::size_t p) {
+    const double* inverse = &families_.inverse[6 * p];
+    std::fill_n(&M_[columns * p], columns, Column{});
+    if (!penalised(families_.condition.data()[p])) return;  // M = 0
+    double intact = 0, M[6];
+    for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
+    const double damage = families_.damage.data()[p];
+    parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, intact, damage, families_.normaliser[p], inverse),
+                                  M);
+    if constexpr (isotropic) {
+      M_[p] = M[0];
+    } else {
+      for (int a = 0; a < D; ++a)
+        for (int b = 0; b < D; ++b) M_[columns * p + static_cast<std::size_t>(b)][a] = M[symmetric_index(D, a, b)];
+    }
+  }
+
+  /// use(j, omega_pj) for the intact bonds of p.
+  template <class Use>
+  void for_bonds(std::size_t p, Use&& use) const noexcept {
+    for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k)
+      use(static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)]), families_.omega[static_cast<std::size_t>(k)]);
+  }
+
+  Row times(std::size_t p, Row x) const noexcept {
+    if constexpr (isotropic) {
+      return M_[p] * x;
+    } else {
+      Row y{};
+      for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * M_[columns * p + e];
+      return y;
+    }
+  }
+  /// (M_p + M_j) x
+  Row times_both(std::size_t p, std::size_t j, Row x) const noexcept {
+    if constexpr (isotropic) {
+      return (M_[p] + M_[j]) * x;
+    } else {
+      Row y{};
+      for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * (M_[columns * p + e] + M_[columns * j + e]);
+      return y;
+    }
+  }
+
+  /// 1/2 V_p sum_j V_j omega z . M_p z, of the columns of H_p.
+  double energy_of_point(std::size_t p, const Row* H) const noexcept {
+    double sum = 0;
+    for_bonds(p, [&](std::size_t j, double omega) {
+      const Row xi = position_[j] - position_[p];
+      Row z = u_[j] - u_[p];
+      for (int e = 0; e < D; ++e) z -= xi[e] * H[e];
+      const Row t = times(p, z);
+      double product = 0;
+      for (int c = 0; c < D; ++c) product += z[c] * t[c];
+      sum += omega * position_[j][3] * product;
+    });
+    return 0.5 * position_[p][3] * sum;
+  }
+
+  /// sum_j V_j omega [(M_p + M_j) u_pj - (Q_p + Q_j) xi_pj]
+  Row force_of_point(std::size_t p) const noexcept {
+    Row f{};
+    const Row* own = &flux_[D * p];
+    for_bonds(p, [&](std::size_t j, double omega) {
+      const Row xi = position_[j] - position_[p];
+      const Row* far = &flux_[D * j];
+      Row t = times_both(p, j, u_[j] - u_[p]);
+      for (int e = 0; e < D; ++e) t -= xi[e] * (own[e] + far[e]);
+      f += omega * position_[j][3] * t;
+    });
+    return f;
+  }
+
+  const CloudModel<D>& model_;
+  const CloudFamilies& families_;
+  const Row* position_;          ///< {x, y, z, V}
+  std::size_t points_;
+  ModelParts parts_;
+  AlignedVector<Column> M_;
+  AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns
+  QuietBlocks quiet_;
+};
+
+}  // namespace
+
+template <int D>
+std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model) {
+  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<CloudPenalty<D, true>>(parts, model);
+  return std::make_unique<CloudPenalty<D, false>>(parts, model);
+}
+
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<1>(const ModelParts&, const CloudModel<1>&);
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<2>(const ModelParts&, const CloudModel<2>&);
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<3>(const ModelParts&, const CloudModel<3>&);
+
+}  // namespace perikit

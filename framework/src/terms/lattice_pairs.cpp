@@ -1,0 +1,305 @@
+/// Pair laws on a lattice: packs of contiguous points against their neighbours at one offset, offsets +d only (the force at
+/// the far end is the opposite one), slot by slot, with nothing stored by bond.
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "families/lattice_bonds.hpp"
+#include "terms/pair_loop.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr int slots_at_once = batch_points / chunk_points;
+
+template <int D>
+class LatticePairs final : public PairLoop {
+ public:
+  explicit LatticePairs(const PairLoopParts& parts)
+      : law_(parts.law), fields_(parts.fields), dilatation_(parts.law.traits().dilatation), half_(parts.half),
+        families_(parts.body, parts.influence, BondWeight::volume), squared_volume_(families_.volume * families_.volume) {
+    if (parts.quiet) watch(families_.reach);
+    for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+      const auto xi = families_.bond(s);
+      const double length = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+      std::array<double, D> bond;
+      for (std::size_t c = 0; c < D; ++c) bond[c] = xi[c];
+      xi_.push_back(bond);
+      length_.insert(length_.end(), chunk_points, length);
+      omega_.insert(omega_.end(), chunk_points, law_.traits().influence ? families_.omega[s] : 1.0);
+    }
+    length_.resize(length_.size() + batch_points, 1.0);
+    omega_.resize(length_.size(), 0.0);
+  }
+
+  void families(const Visit& visit) const override;
+  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
+  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(families_); }
+  std::size_t blocks() const noexcept override { return families_.blocks.size(); }
+  PairCounts counts() const noexcept override {
+    return {families_.bonds, families_.broken - families_.failed, families_.bytes(), families_.bonds * (4 + 8 * (D + 2))};
+  }
+
+  std::int64_t run(const PairPass& pass) override {
+    reset_bad();
+    look(pass, [&](std::size_t b) { return families_.moves(b, pass.u); });
+    if (!pass.only) parallel_for(blocks(), [&](std::size_t b) {
+      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) {
+        const LatticeRow& row = families_.rows[r];
+        for (int c = 0; c < pass.out.components; ++c) {
+          std::memset(pass.out.component(c) + row.first, 0, sizeof(double) * static_cast<std::size_t>(row.chunks) * chunk_points);
+        }
+      }
+    });
+    auto block = [&](std::size_t b) {
+      if (!awake(b)) return;
+      switch (pass.work) {
+        case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
+        case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);
+        case PairWork::force: return run_block<PairWork::force>(b, pass);
+        case PairWork::tangent: return run_block<PairWork::tangent>(b, pass);
+        case PairWork::energy: return run_block<PairWork::energy>(b, pass);
+      }
+    };
+    if (at_once(pass)) families_.colouring.for_each(block);
+    else parallel_for(blocks(), block);
+    return bad();
+  }
+
+ private:
+  /// Each bond once, for both ends.
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
+
+  template <PairWork work>
+  void run_block(std::size_t b, const PairPass& pass) {
+    const LatticeBlock& block = families_.blocks[b];
+    double energy = 0;
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+      const LatticeChunk& chunk = families_.chunks[c];
+      if (pass.only) {
+        if (!pass.only[chunk.first / chunk_points]) continue;
+        for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
+      }
+      const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
+      if (lane < 0) continue;
+      report_bad(chunk.first + lane);
+      return;
+    }
+    if (pass.energies) pass.energies[b] = energy;
+  }
+
+  /// Returns the first lane with a bond of zero or non-finite length, or -1.
+  template <PairWork work, bool half>
+  int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
+
+  void family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const;
+
+  const Kinematics& law_;
+  const PairFields& fields_;
+  bool dilatation_, half_;
+  LatticeFamilies families_;
+  std::optional<LatticeBonds> bonds_;
+  double squared_volume_;
+  std::vector<std::array<double, D>> xi_;      ///< by slot, input axes
+  AlignedVector<double> length_, omega_;       ///< by slot, one value a lane
+};
+
+template <int D>
+template <PairWork work, bool half>
+int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& total) const noexcept {
+  constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
+  constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
+  constexpr int packs = chunk_points / pack_width, results = sums || work == PairWork::energy ? 1 : D;
+  const LatticePattern& pattern = families_.pattern(chunk);
+  const std::int64_t p = chunk.first;
+  const std::size_t slots = half ? families_.half : families_.offsets.size();
+  const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
+  const bool uniform = fields_.modulus.size() == 0;
+  alignas(64) PairScratch s;
+  if constexpr (!sums) {
+    if (uniform)
+      for (double& c : s.modulus) c = fields_.uniform;
+  }
+  Pack own_u[D][packs], own_w[D][packs], own[results][packs], stored[packs];
+  for (int c = 0; c < D; ++c)
+    for (int v = 0; v < packs; ++v) {
+      own_u[c][v] = Pack::load(pass.u.component(c) + p + v * pack_width);
+      if constexpr (rate) own_w[c][v] = Pack::load(pass.w.component(c) + p + v * pack_width);
+    }
+  PackMask finite[packs];
+  for (PackMask& f : finite) f = Pack(0.0) == Pack(0.0);
+  for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
+    const int count = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
+    // Bonds: extension and direction, kept for the second half of the work.
+    for (int k = 0; k < count; ++k) {
+      const std::size_t at = slot + static_cast<std::size_t>(k);
+      const std::int64_t far = p + families_.shifts[at];
+      const std::uint8_t mask = pattern.mask[at];
+      if (mask == 0) {
+        for (int lane = k * chunk_points; lane < (k + 1) * chunk_points; lane += pack_width) {
+          Pack(0.0).store(s.e + lane);
+          if (!uniform) Pack(0.0).store(s.modulus + lane);
+        }
+        continue;
+      }
+      Pack xi[D];
+      for (int c = 0; c < D; ++c) xi[c] = Pack(xi_[at][static_cast<std::size_t>(c)]);
+      for (int v = 0; v < packs; ++v) {
+        const int l = v * pack_width, lane = k * chunk_points + l;
+        const auto bits = static_cast<std::uint8_t>(mask >> l);
+        const auto difference = [&](ConstFieldView u, int c, Pack mine) {
+          const Pack d = Pack::load(u.component(c) + far + l) - mine;
+          return mask == 0xff ? d : keep(bits, d);
+        };
+        Pack du[D], dw[D];
+        for (int c = 0; c < D; ++c) {
+          du[c] = difference(pass.u, c, own_u[c][v]);
+          if constexpr (rate) dw[c] = difference(pass.w, c, own_w[c][v]);
+        }
+        const Pack length(length_[at * chunk_points]);
+        const Stretch<D> bond(xi, length, du);
+        finite[v] &= bond.e == bond.e;
+        if constexpr (sums) {
+          const Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          own[0][v] += term;
+          if constexpr (half) {
+            double* target = pass.out.data + far + l;
+            if (mask == 0xff) (Pack::load(target) + term).store(target);
+            else subtract_at(target, bits, -term);
+          }
+        } else {
+          bond.e.store(s.e + lane);
+          for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + lane);
+          if constexpr (rate) {
+            bond.along(dw).store(s.de + lane);
+            bond.inverse_length.store(s.inverse_length + lane);
+          }
+          if (!uniform) {
+            Pack c = Pack(0.5) * (Pack::load(fields_.modulus.data() + p + l) + Pack::load(fields_.modulus.data() + far + l));
+            if (fields_.correction.size() > 0) {
+              Pack g(0.0);
+              for (int a = 0; a < D; ++a) {
+                const double cosine = xi_[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
+                const double* G = fields_.correction.component(a);
+                g += Pack(0.5 * cosine * cosine) * (Pack::load(G + p + l) + Pack::load(G + far + l));
+              }
+              c *= g;
+            }
+            c.store(s.modulus + lane);
+          }
+        }
+      }
+    }
+    if constexpr (!sums) {
+      const int lanes = count * chunk_points;
+      law_.bond_law({lanes, length_.data() + slot * chunk_points, omega_.data() + slot * chunk_points, s.e, s.modulus,
+                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+      for (int k = 0; k < count; ++k) {
+        const std::size_t at = slot + static_cast<std::size_t>(k);
+        const std::int64_t far = p + families_.shifts[at];
+        const std::uint8_t mask = pattern.mask[at];
+        if (mask == 0) continue;
+        for (int v = 0; v < packs; ++v) {
+          const int l = v * pack_width, lane = k * chunk_points + l;
+          const auto bits = static_cast<std::uint8_t>(mask >> l);
+          if (energies) stored[v] += keep(bits, Pack::load(s.energy + lane));
+          if constexpr (work == PairWork::energy) continue;
+          Pack t[D], T = Pack::load(s.force + lane);
+          const double weight = omega_[at * chunk_points] * length_[at * chunk_points];
+          if (dilatation_) T += Pack(weight) * (Pack::load(pass.q.data + p + l) + Pack::load(pass.q.data + far + l));
+          if constexpr (work == PairWork::force) {
+            T = T * Pack(squared_volume_);
+            for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
+          } else {
+            // d(T n) = dT n + T (dw - n de)/|y|
+            const Pack de = Pack::load(s.de + lane);
+            Pack dT = Pack::load(s.stiffness + lane) * de;
+            if (dilatation_) dT += Pack(weight) * (Pack::load(pass.dq.data + p + l) + Pack::load(pass.dq.data + far + l));
+            const Pack turn = T * Pack::load(s.inverse_length + lane);
+            for (int c = 0; c < D; ++c) {
+              const Pack dw = keep(bits, Pack::load(pass.w.component(c) + far + l) - own_w[c][v]), n = Pack::load(s.n[c] + lane);
+              t[c] = Pack(-squared_volume_) * (dT * n + turn * (dw - n * de));
+            }
+          }
+          for (int c = 0; c < D; ++c) {
+            if (mask != 0xff) t[c] = keep(bits, t[c]);
+            own[c][v] += t[c];
+            if constexpr (half) {
+              double* target = pass.out.component(c) + far + l;
+              if (mask == 0xff) (Pack::load(target) - t[c]).store(target);
+              else subtract_at(target, bits, t[c]);
+            }
+          }
+        }
+      }
+    }
+  }
+  int bad = -1;
+  for (int l = chunk_points - 1; l >= 0; --l)
+    if (!finite[l / pack_width][l % pack_width]) bad = l;
+  for (int v = 0; v < packs; ++v) {
+    const int l = v * pack_width;
+    if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * families_.volume) * stored[v];
+    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
+    for (int c = 0; c < results; ++c) {
+      double* target = pass.out.component(c) + p + l;
+      (Pack::load(target) + own[c][v]).store(target);
+    }
+  }
+  return bad;
+}
+
+template <int D>
+void LatticePairs<D>::family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const {
+  bonds.clear();
+  for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+    if (!families_.body.alive(static_cast<std::size_t>(point + families_.shifts[s]))) continue;
+    const auto xi = families_.bond(s);
+    const bool intact = LatticeFamilies::intact(pattern, s, static_cast<int>(point % chunk_points));
+    bonds.push_back({{xi[0], xi[1], xi[2]}, length_[s * chunk_points], omega_[s * chunk_points], families_.volume, intact ? 1.0 : 0.0});
+  }
+}
+
+template <int D>
+void LatticePairs<D>::families(const Visit& visit) const {
+  std::vector<std::vector<std::int32_t>> chunks(families_.patterns.size() + 1);
+  for (const LatticeChunk& chunk : families_.chunks) chunks[static_cast<std::size_t>(chunk.pattern + 1)].push_back(chunk.first);
+  std::vector<FamilyBond> bonds;
+  std::vector<std::int32_t> points;
+  for (std::size_t k = 0; k < chunks.size(); ++k) {
+    if (chunks[k].empty()) continue;
+    const LatticePattern& pattern = k == 0 ? families_.whole : families_.patterns[k - 1];
+    for (int lane = 0; lane < chunk_points; ++lane) {
+      if (!(pattern.live >> lane & 1)) continue;
+      // All chunks of a pattern have the same live neighbours.
+      if (k > 0 || lane == 0) family_of(chunks[k].front() + lane, pattern, bonds);
+      points.clear();
+      for (const std::int32_t first : chunks[k]) points.push_back(first + lane);
+      visit(bonds, points);
+    }
+  }
+}
+
+template <int D>
+void LatticePairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
+  std::vector<FamilyBond> bonds;
+  for (const std::int32_t p : points) {
+    family_of(p, families_.pattern(families_.chunks[static_cast<std::size_t>(families_.chunk_of(p))]), bonds);
+    visit(bonds, {p});
+  }
+}
+
+}  // namespace
+
+template <int D>
+std::unique_ptr<PairLoop> make_lattice_pairs(const PairLoopParts& parts) {
+  return std::make_unique<LatticePairs<D>>(parts);
+}
+template std::unique_ptr<PairLoop> make_lattice_pairs<1>(const PairLoopParts&);
+template std::unique_ptr<PairLoop> make_lattice_pairs<2>(const PairLoopParts&);
+template std::unique_ptr<PairLoop> make_lattice_pairs<3>(const PairLoopParts&);
+
+}  // namespace perikit

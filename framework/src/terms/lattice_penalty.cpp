@@ -1,0 +1,239 @@
+#include <numeric>
+
+#include "families/family_point.hpp"
+#include "spaces/lattice_model.hpp"
+#include "terms/penalty_matrix.hpp"
+#include "terms/zero_energy_penalty.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// On a lattice V_j M_i = V M_i, called M here, and the sums over bonds are those of the point gradient and its divergence:
+///
+///   f_k = M_k sum_s omega_s u_{k+s} - B_k u_k  +  sum_s omega_s v_{k+s}  +  (divergence of Q)_k
+///   v = M u,   Q = -spacing M H,   B_k = sum_s omega_s (M_k + M_{k+s})
+///
+/// The energy is summed bond by bond: this sum of large terms that cancel would leave none of its digits near affine motions.
+template <int D, bool isotropic>
+class LatticePenalty final : public ZeroEnergyPenalty {
+  using Matrix = PenaltyMatrix<D, isotropic>;
+
+ public:
+  LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
+      : model_(model),
+        families_(model.families()),
+        operator_(families_),
+        parts_(parts),
+        M_(parts.body->make_field(Matrix::components)),
+        B_(parts.body->make_field(Matrix::components)),
+        flux_(parts.body->make_field(D * D)),
+        source_(parts.body->make_field(D)) {
+    if (parts.skip) quiet_ = QuietBlocks(families_.reach);
+    const std::size_t blocks = families_.blocks.size();
+    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(chunk); }); });
+    parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
+  }
+
+  void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
+    std::vector<double> energies(energy ? families_.blocks.size() : 0, 0.0);
+    quiet_.look(2, [&](std::size_t b) { return families_.moves(b, u); });
+    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+      if (!quiet_.begins(b)) return;
+      for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
+        own_forces(chunk, u, factor, H, sums, force);
+        if (!energy) return;
+        double of_points[chunk_points];
+        energies_of_points(chunk, u, H, of_points);
+        for (const double e : of_points) energies[b] += e;
+      });
+    });
+    families_.colouring.for_each([&](std::size_t b) {
+      if (!quiet_.awake(b, 2)) return;
+      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
+        operator_.divergence(families_.rows[r], flux_, source_, force);
+      if (families_.broken == 0) return;
+      for_chunks(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, source_, force); });
+    });
+    model_.clean(force);
+    if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+  }
+
+  void add_density(ConstFieldView u, double* density) override {
+    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+      for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double*) {
+        double of_points[chunk_points];
+        energies_of_points(chunk, u, H, of_points);
+        for (int l = 0; l < chunk_points; ++l) density[chunk.first + l] += of_points[l] / families_.volume;
+      });
+    });
+  }
+
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+    std::vector<double> energies(families_.blocks.size(), 0.0);
+    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+      alignas(64) double H[D * D * batch_points], sums[D * batch_points];
+      for_chunks(b, [&](const LatticeChunk& chunk) {
+        if (!marks[static_cast<std::size_t>(chunk.first) / padding]) return;
+        operator_.gradient_and_sums(&chunk, 1, u, H, sums, batch_points);
+        double of_points[chunk_points];
+        energies_of_points(chunk, u, H, of_points);
+        for (const double e : of_points) energies[b] += e;
+      });
+    });
+    return std::accumulate(energies.begin(), energies.end(), 0.0);
+  }
+
+  void bonds_changed(std::span<const std::int32_t> points) override {
+    // B of a point depends on M of its family.
+    GroupMarks changed(families_.body.stride() / padding, 0), near = changed;
+    for (const std::int32_t p : points) {
+      changed[static_cast<std::size_t>(p) / padding] = near[static_cast<std::size_t>(p) / padding] = 1;
+      for (const std::int64_t shift : families_.shifts) near[static_cast<std::size_t>(p + shift) / padding] = 1;
+    }
+    const auto over = [&](const GroupMarks& marks, auto&& set) {
+      for (const LatticeChunk& chunk : families_.chunks)
+        if (marks[static_cast<std::size_t>(chunk.first) / padding]) set(chunk);
+    };
+    over(changed, [&](const LatticeChunk& chunk) { set_matrices(chunk); });
+    over(near, [&](const LatticeChunk& chunk) { set_sums(chunk); });
+  }
+
+  std::size_t bytes() const noexcept override { return M_.bytes() + B_.bytes() + flux_.bytes() + source_.bytes(); }
+
+ private:
+  template <class Body>
+  void for_chunks(std::size_t b, Body&& body) const {
+    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) body(families_.chunks[c]);
+  }
+
+  void set_matrices(const LatticeChunk& chunk) {
+    const LatticePattern& pattern = families_.pattern(chunk);
+    for (int l = 0; l < chunk_points; ++l) {
+      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[chunk.first + l] = 0;
+      if (!(pattern.live >> l & 1) || !penalised(pattern.condition[l])) continue;  // M = 0
+      const auto p = static_cast<std::size_t>(chunk.first + l);
+      double intact = 0, inverse[6], M[6];
+      for (std::size_t s = 0; s < families_.offsets.size(); ++s)
+        if (LatticeFamilies::intact(pattern, s, l)) intact += families_.omega[s];
+      families_.inverse_shape(pattern, l, inverse);
+      const double V = families_.volume;
+      parts_.stabilization->penalty(
+          penalty_point(*parts_.body, *parts_.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
+      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
+    }
+  }
+
+  void set_sums(const LatticeChunk& chunk) {
+    const LatticePattern& pattern = families_.pattern(chunk);
+    for (int l = 0; l < chunk_points; l += pack_width)
+      for (int c = 0; c < Matrix::components; ++c) {
+        const double* M = M_.component(c) + chunk.first + l;
+        Pack sum(0.0);
+        for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+          sum += keep(lanes(pattern, s, l), Pack(families_.omega[s]) * (Pack::load(M) + Pack::load(M + families_.shifts[s])));
+        }
+        sum.store(B_.component(c) + chunk.first + l);
+      }
+  }
+
+  static std::uint8_t lanes(const LatticePattern& pattern, std::size_t slot, int l) noexcept {
+    return static_cast<std::uint8_t>(pattern.mask[slot] >> l);
+  }
+  /// Component of H beside internal axis e.
+  std::size_t component(int c, int e) const noexcept { return static_cast<std::size_t>(c * D + families_.lattice.axis[static_cast<std::size_t>(e)]); }
+
+  /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b.
+  template <class Use>
+  void for_gradients(std::size_t b, ConstFieldView u, Use&& use) const {
+    alignas(64) double H[D * D * batch_points], sums[D * batch_points];
+    constexpr std::size_t at_once = batch_points / chunk_points;
+    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; c += at_once) {
+      const std::size_t n = std::min(at_once, families_.blocks[b].chunk_end - c);
+      operator_.gradient_and_sums(&families_.chunks[c], static_cast<int>(n), u, H, sums, batch_points);
+      for (std::size_t k = 0; k < n; ++k) use(families_.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
+    }
+  }
+
+  /// Flux, source, and what they and the point's own displacement give its own force.
+  void own_forces(const LatticeChunk& chunk, ConstFieldView u, double factor, const double* H, const double* sums,
+                  FieldView force) noexcept {
+    const LatticePattern& pattern = families_.pattern(chunk);
+    const Pack scale(factor), flux_scale(-factor * families_.spacing);
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      const std::int64_t p = chunk.first + l;
+      Pack M[Matrix::components], B[Matrix::components], x[D], near[D], f[D], y[D];
+      for (int c = 0; c < Matrix::components; ++c) {
+        M[c] = Pack::load(M_.component(c) + p);
+        B[c] = Pack::load(B_.component(c) + p);
+      }
+      for (int c = 0; c < D; ++c) {
+        x[c] = Pack::load(u.component(c) + p);
+        near[c] = Pack::load(sums + c * batch_points + l);
+      }
+      Matrix::apply(M, near, f);
+      Matrix::apply(B, x, y);
+      for (int c = 0; c < D; ++c) f[c] = scale * (f[c] - y[c]);
+      Matrix::apply(M, x, y);
+      for (int c = 0; c < D; ++c) (scale * y[c]).store(source_.component(c) + p);
+      for (int e = 0; e < D; ++e) {
+        const Pack moment = Pack::load(pattern.moment[e] + l);
+        for (int c = 0; c < D; ++c) x[c] = Pack::load(H + component(c, e) * batch_points + l);
+        Matrix::apply(M, x, y);
+        for (int c = 0; c < D; ++c) {
+          const Pack q = flux_scale * y[c];
+          q.store(flux_.component(c * D + e) + p);
+          f[c] += q * moment;
+        }
+      }
+      for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p) + f[c]).store(force.component(c) + p);
+    }
+  }
+
+  /// 1/2 sum_s omega_s z . M z of the lanes of one chunk.
+  void energies_of_points(const LatticeChunk& chunk, ConstFieldView u, const double* H, double* energy) const noexcept {
+    const LatticePattern& pattern = families_.pattern(chunk);
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      const std::int64_t p = chunk.first + l;
+      Pack M[Matrix::components], G[D][D], own[D], sum(0.0);
+      for (int c = 0; c < Matrix::components; ++c) M[c] = Pack::load(M_.component(c) + p);
+      for (int c = 0; c < D; ++c) {
+        own[c] = Pack::load(u.component(c) + p);
+        for (int e = 0; e < D; ++e) G[c][e] = Pack(families_.spacing) * Pack::load(H + component(c, e) * batch_points + l);
+      }
+      for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+        Pack z[D], t[D], product(0.0);
+        for (int c = 0; c < D; ++c) {
+          z[c] = Pack::load(u.component(c) + p + families_.shifts[s]) - own[c];
+          for (int e = 0; e < D; ++e) z[c] -= G[c][e] * Pack(families_.offsets[s][static_cast<std::size_t>(e)]);
+        }
+        Matrix::apply(M, z, t);
+        for (int c = 0; c < D; ++c) product += z[c] * t[c];
+        sum += keep(lanes(pattern, s, l), Pack(0.5 * families_.omega[s]) * product);
+      }
+      sum.store(energy + l);
+    }
+  }
+
+  const LatticeModel<D>& model_;
+  const LatticeFamilies& families_;
+  LatticeOperator<D> operator_;
+  ModelParts parts_;
+  Field M_, B_;
+  Field flux_, source_;   ///< Q, v
+  QuietBlocks quiet_;
+};
+
+}  // namespace
+
+template <int D>
+std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model) {
+  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<LatticePenalty<D, true>>(parts, model);
+  return std::make_unique<LatticePenalty<D, false>>(parts, model);
+}
+
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<1>(const ModelParts&, const LatticeModel<1>&);
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<2>(const ModelParts&, const LatticeModel<2>&);
+template std::unique_ptr<ZeroEnergyPenalty> make_penalty<3>(const ModelParts&, const LatticeModel<3>&);
+
+}  // namespace perikit
