@@ -35,4 +35,5 @@
 #include "perikit/core/simd.hpp"
 #include "perikit/core/tensor.hpp"
 #include "perikit/plugin/registry.hpp"
-#include "perikit/problem/body_problem.hpp"
+#include "perikit/problem/integrator.hpp"
+#include "perikit/terms/model.hpp"
