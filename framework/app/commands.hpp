@@ -1,7 +1,6 @@
 #pragma once
-#include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,7 +9,11 @@
 
 namespace perikit::app {
 
+enum Exit { done = 0, run_failed = 1, input_refused = 2 };
+
+/// What the words of the command line say.
 struct Options {
+  void (*command)(const Options&) = nullptr;   ///< one of those below
   std::filesystem::path scene, output, library;
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
@@ -22,10 +25,19 @@ struct Options {
   std::string unit;
   std::vector<double> view, range;
   BenchOptions bench;
-  std::function<void(const Options&)> command;
 };
 
 std::string version();
-void add_commands(CLI::App& app, Options& options);
+
+// What the program does, each under the name of its command. They throw InputError and RunError.
+void run(const Options& options);
+void check(const Options& options);
+void study(const Options& options);
+void plot(const Options& options);
+void bench(const Options& options);
+void start_project(const Options& options);   ///< perikit new
+void contract(const Options& options);
+void list(const Options& options);
+void describe(const Options& options);
 
 }  // namespace perikit::app

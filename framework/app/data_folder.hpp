@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <string>
 
 namespace perikit::app {
 
@@ -8,5 +9,15 @@ inline std::filesystem::path prefix() { return std::filesystem::read_symlink("/p
 
 /// Files that come with the program.
 inline std::filesystem::path data_folder() { return prefix() / PERIKIT_DATA; }
+
+/// The contract suites, a program of their own beside this one; a build without tests leaves it out until it is asked for.
+inline std::filesystem::path contract_program() { return std::filesystem::read_symlink("/proc/self/exe").replace_filename("perikit-contract"); }
+
+/// The command that brings the contract suites where they are missing.
+inline std::string how_to_build_contract() {
+  const std::string target = "--target perikit_contract";
+  if (std::filesystem::exists(prefix() / "CMakeCache.txt")) return "cmake --build " + prefix().string() + " " + target;
+  return "in the folder that perikit was built in, cmake --build . " + target + ", and install it again";
+}
 
 }  // namespace perikit::app

@@ -85,9 +85,10 @@ std::string new_project(const Registry& registry, const std::string& kind, const
   for (const fs::path& source : {templates / "common", templates / kind}) {
     for (const auto& entry : fs::directory_iterator(source)) write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
   }
-  return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n"
+  const std::string first = fs::exists(contract_program()) ? "" : fmt::format("  {}\n", how_to_build_contract());   // its ctest runs them
+  return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n{1}"
                      "  cmake -S {0} -B {0}/build && cmake --build {0}/build && ctest --test-dir {0}/build --output-on-failure\n"
-                     "  perikit run {0}/scene.toml --plugin-path {0}/build -o {0}/out\n", part);
+                     "  perikit run {0}/scene.toml --plugin-path {0}/build -o {0}/out\n", part, first);
 }
 
 }  // namespace perikit::app

@@ -29,6 +29,9 @@ function(perikit_add_plugin name)
   # Every plugin asks the loader for its libperikit.so.<ABI>, even one that uses no symbol of it.
   target_link_options(${name} PRIVATE -Wl,-z,defs -Wl,--no-as-needed)
   perikit_compile_options(${name})
+  if(TARGET perikit_part_headers)   # perikit's own parts
+    target_precompile_headers(${name} REUSE_FROM perikit_part_headers)
+  endif()
   # Built with the rpath it is installed with: an installed plugin is byte for byte the one that its manifest was written for.
   set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ".so" CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
                         BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH "$ORIGIN/.." INSTALL_RPATH_USE_LINK_PATH ON)

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "perikit/run/point_fields.hpp"
 
@@ -25,23 +27,57 @@ std::vector<double> values_of(const HistoryDescription& record, const Body& body
   return values;
 }
 
+double product(const std::vector<double>& u, const std::vector<double>& v) {
+  return std::inner_product(u.begin(), u.end(), v.begin(), 0.0);
+}
+
+/// Turns three columns until they are orthogonal (one-sided Jacobi). Returns the rotation, by columns: turned column k is the sum over c of
+/// rotation[k][c] times column c.
+std::array<Point, 3> orthogonalized(std::array<std::vector<double>, 3>& x) {
+  std::array<Point, 3> rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (int sweep = 0; sweep < 8; ++sweep) {   // each squares what is left of the cosines
+    for (const auto& [i, j] : {std::pair{0u, 1u}, std::pair{0u, 2u}, std::pair{1u, 2u}}) {
+      const double a = product(x[i], x[i]), b = product(x[j], x[j]), c = product(x[i], x[j]);
+      if (c == 0) continue;
+      const double ratio = (b - a) / (2 * c);
+      const double tangent = std::copysign(1 / (std::abs(ratio) + std::hypot(1, ratio)), ratio);
+      const double cosine = 1 / std::hypot(1, tangent), sine = cosine * tangent;
+      const auto turn = [&](auto& u, auto& v) {
+        for (std::size_t k = 0; k < u.size(); ++k)
+          std::tie(u[k], v[k]) = std::pair(cosine * u[k] - sine * v[k], sine * u[k] + cosine * v[k]);
+      };
+      turn(x[i], x[j]);
+      turn(rotation[i], rotation[j]);
+    }
+  }
+  return rotation;
+}
+
 double fitted(const HistoryDescription& record, const Body& body, const std::vector<double>& values) {
   const auto& members = body.set(record.set);
-  const auto n = static_cast<Eigen::Index>(members.size());
-  Eigen::MatrixX3d x(n, 3);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const Point place = body.position(static_cast<std::size_t>(members[static_cast<std::size_t>(k)]));
-    x.row(k) << place[0], place[1], place[2];
+  const double n = static_cast<double>(members.size());
+  const auto mean_of = [n](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0) / n; };
+  std::array<std::vector<double>, 3> x;   // places, from their centre
+  Point centre{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const std::int32_t p : members) x[c].push_back(body.position(static_cast<std::size_t>(p))[c]);
+    centre[c] = mean_of(x[c]);
+    for (double& coordinate : x[c]) coordinate -= centre[c];
   }
-  const Eigen::RowVector3d centre = x.colwise().mean();
-  x.rowwise() -= centre;
-  const Eigen::Map<const Eigen::VectorXd> v(values.data(), n);
-  const double mean = v.mean();
-  // The least-norm solution has no slope where the points have no extent; the threshold is relative to the largest extent.
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixX3d> extent(x);
-  extent.setThreshold(1e-9);
-  const Eigen::Vector3d slope = extent.solve((v.array() - mean).matrix());
-  return mean + (Eigen::RowVector3d(record.at[0], record.at[1], record.at[2]) - centre).dot(slope.transpose());
+  const std::array<Point, 3> axes = orthogonalized(x);
+  const double mean = mean_of(values);
+  std::vector<double> off = values;
+  for (double& value : off) value -= mean;
+  const double largest = std::max({product(x[0], x[0]), product(x[1], x[1]), product(x[2], x[2])});
+  double fit = mean;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double extent = product(x[k], x[k]);
+    if (extent <= 1e-18 * largest) continue;   // the points have no extent along this axis, and no slope
+    double along = 0;
+    for (std::size_t c = 0; c < 3; ++c) along += axes[k][c] * (record.at[c] - centre[c]);
+    fit += along * product(x[k], off) / extent;
+  }
+  return fit;
 }
 
 double error(const HistoryDescription& record, const Body& body, const std::vector<double>& values, double t) {

@@ -1,0 +1,1 @@
+// Holds nothing: CMake precompiles library.hpp for a target that has a file.
