@@ -1,4 +1,4 @@
-#include "size_check.hpp"
+#include "build/size_check.hpp"
 
 #include <fmt/format.h>
 
