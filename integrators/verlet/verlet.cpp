@@ -202,12 +202,14 @@ void Verlet::run(Problem& problem, Observer& observer) {
     }
     if (problem.advance(dt, stepper.half())) broke = 1;
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
-    if (estimated && !last && !problem.constant_stiffness() && state.step % (broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every) == 0) {
+    const std::int64_t check_every = broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every;
+    if (estimated && !last && !problem.constant_stiffness() && state.step % check_every == 0) {
       broke = 0;
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
+                                 state.step, counter, dt));
       }
     }
     observer.step_done(report());

@@ -34,7 +34,7 @@ class Pair {
     }
     const double from = at_upper_end ? high : low;
     Noise noise(at_upper_end ? 61 : 62);
-    Field u = some().make_field(some().dimension());
+    Field u = some().make_field();
     set_field(body, u, [&](const Point& x) {
       const double size = std::abs(x[0] - from) < 4 * body.spacing() ? 0.03 * body.spacing() : 0.0;
       return Point{size * noise(), size * noise(), size * noise()};
@@ -73,7 +73,7 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     if (body.dimension == 2) body.cells = 96;
     if (body.dimension == 3) body.cells = 12;
     Pair pair(body, kinematics_table(c.example));
-    const Field rest = pair.some().make_field(body.dimension), left = pair.bump(false), right = pair.bump(true);
+    const Field rest = pair.some().make_field(), left = pair.bump(false), right = pair.bump(true);
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");

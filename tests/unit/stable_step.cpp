@@ -1,5 +1,7 @@
 /// The bond-based estimate of the stable step, in each space against the springs that the space sees.
 
+#include "perikit/sdk/stable_step.hpp"
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
@@ -7,7 +9,6 @@
 #include <numbers>
 
 #include "perikit/build/body.hpp"
-#include "perikit/sdk/stable_step.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -15,7 +16,7 @@ using namespace perikit::test;
 
 namespace {
 
-constexpr double lambda = 3.0, mu = 1.0, density = 2.0, spacing = 0.1, ratio = 1.2;   // of the horizon: nearest neighbours alone
+constexpr double lambda = 3.0, mu = 1.0, density = 2.0, spacing = 0.1, ratio = 1.2;  // of the horizon: nearest neighbours alone
 
 /// A law with these moduli whatever it is given.
 class Isotropic final : public Material {
@@ -59,12 +60,15 @@ type = "newton"
 }
 
 /// dt for springs of this micromodulus to the 2 d nearest neighbours; sections are 1.
-double expected(int d, double micromodulus) { return std::sqrt(2 * density / (micromodulus * 2 * d * std::pow(spacing, d - 1))); }
+double expected(int d, double micromodulus) {
+  return std::sqrt(2 * density / (micromodulus * 2 * d * std::pow(spacing, d - 1)));
+}
 
 }  // namespace
 
 TEST_CASE("stable step: the bond-based estimate takes the modulus that the space sees") {
-  const double delta = ratio * spacing, pi = std::numbers::pi, E = mu * (3 * lambda + 2 * mu) / (lambda + mu), nu = lambda / (2 * (lambda + mu));
+  const double delta = ratio * spacing, pi = std::numbers::pi, E = mu * (3 * lambda + 2 * mu) / (lambda + mu),
+               nu = lambda / (2 * (lambda + mu));
   const double bar = 2 / (delta * delta), plate = 12 / (pi * std::pow(delta, 3)), block = 18 / (pi * std::pow(delta, 4));
   CHECK(estimate(1, "line = \"strain\"") == doctest::Approx(expected(1, bar * (lambda + 2 * mu))).epsilon(1e-12));
   CHECK(estimate(1, "line = \"stress\"") == doctest::Approx(expected(1, bar * E)).epsilon(1e-12));

@@ -1,11 +1,12 @@
 /// The values that a problem is composed of, without a scene: state and constraints.
 
+#include "perikit/problem/state.hpp"
+
 #include <doctest/doctest.h>
 
 #include "perikit/core/errors.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/problem/loads.hpp"
-#include "perikit/problem/state.hpp"
 #include "problem/snapshot.hpp"
 
 using namespace perikit;
@@ -47,11 +48,11 @@ TEST_CASE("state: what is read is what was written, and what was not written is 
   CHECK(two.time == 0.1);
   CHECK(two.step == 7);
   CHECK(two.energies.strain == 3);
-  CHECK(u.data[1] == 0.25);   // views stay valid
+  CHECK(u.data[1] == 0.25);  // views stay valid
   CHECK(two.declare("temperature", 1).data[2] == 300);
   CHECK(two.declare_numbers("plan", 2)[1] == 5);
   CHECK(forgotten.data[0] == 0);
-  ByteReader cut(std::span(bytes).first(bytes.size() - 1));
+  ByteReader cut(std::span<const std::byte>(bytes).first(bytes.size() - 1));
   CHECK_THROWS_AS(two.read(cut), InputError);
 }
 

@@ -5,7 +5,8 @@
 
 namespace perikit {
 
-Body::Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells) : frame_(std::move(frame)), internal_(std::move(cells)) {
+Body::Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells)
+    : frame_(std::move(frame)), internal_(std::move(cells)) {
   number_lattice(lattice, std::pow(frame_.spacing, dimension()) * frame_.section);
   sets_["all"] = internal_;
   points_of_all_ranks_ = points();
@@ -47,7 +48,8 @@ Body::Body(const Body& whole, const std::vector<bool>& owned, const std::vector<
   material_ids_.assign(stride_, ghost_material);
   for (const std::int32_t p : whole.internal_) {
     if (is_owned(p))
-      material_ids_[static_cast<std::size_t>(place[static_cast<std::size_t>(p)])] = whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
+      material_ids_[static_cast<std::size_t>(place[static_cast<std::size_t>(p)])] =
+          whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
   }
 }
 

@@ -15,7 +15,9 @@ namespace perikit {
 namespace {
 
 /// Uniform in [-1, 1), the same on every platform.
-double centred(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0; }
+double centred(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0;
+}
 
 void check_cloud(const Scene& scene, std::size_t points, double ratio) {
   check_index(scene, static_cast<double>(points));
@@ -23,7 +25,9 @@ void check_cloud(const Scene& scene, std::size_t points, double ratio) {
   check_memory(scene, static_cast<double>(points), ratio, true);
 }
 
-double horizon(const Scene& scene, double spacing) { return scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing; }
+double horizon(const Scene& scene, double spacing) {
+  return scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing;
+}
 
 BodyFrame frame(const Scene& scene, double spacing) {
   BodyFrame frame{scene.body.space, scene.body.section, spacing, horizon(scene, spacing), {}};
@@ -86,8 +90,9 @@ Body lattice_body(const Scene& scene, bool lists) {
   const std::array<std::int64_t, 3> cells = input_cells(lattice);
   for (int a = 0; a < d; ++a) {
     if (cells[static_cast<std::size_t>(a)] >= 1) continue;
-    throw InputError(description.position, "body.lattice",
-                     fmt::format("found no room for a point along {}; allowed: upper - lower of half a spacing or more", "xyz"[a]));
+    throw InputError(
+        description.position, "body.lattice",
+        fmt::format("found no room for a point along {}; allowed: upper - lower of half a spacing or more", "xyz"[a]));
   }
   std::vector<std::int32_t> kept = kept_cells(description, lattice);
   if (kept.empty()) {
@@ -108,7 +113,8 @@ Body file_body(const Scene& scene) {
   const PointCloud cloud = read_points(*scene.body.points_file, scene.body.dimension);
   double total = 0;
   for (const double v : cloud.volume) total += v;
-  const double spacing = std::pow(total / scene.body.section / static_cast<double>(cloud.volume.size()), 1.0 / scene.body.dimension);
+  const double spacing =
+      std::pow(total / scene.body.section / static_cast<double>(cloud.volume.size()), 1.0 / scene.body.dimension);
   const double reach = horizon(scene, spacing);
   check_cloud(scene, cloud.volume.size(), reach / spacing);
   if (reach < spacing) {
@@ -126,7 +132,8 @@ Body build_body(const Scene& scene, bool lists) {
   if (scene.regions.empty()) return body;
   std::vector<std::uint16_t> ids(body.stride(), 0);
   for (std::size_t r = 0; r < scene.regions.size(); ++r)
-    for (const std::int32_t p : body.set(scene.regions[r].set)) ids[static_cast<std::size_t>(p)] = static_cast<std::uint16_t>(r + 1);
+    for (const std::int32_t p : body.set(scene.regions[r].set))
+      ids[static_cast<std::size_t>(p)] = static_cast<std::uint16_t>(r + 1);
   body.set_materials(std::move(ids));
   return body;
 }

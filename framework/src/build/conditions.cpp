@@ -15,10 +15,12 @@ Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_s
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
     const BoundaryDescription& boundary = scene.boundaries[k];
     if (boundary.velocity && quasi_static)
-      throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k), "found in a quasi-static run; allowed: displacement");
+      throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
+                       "found in a quasi-static run; allowed: displacement");
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
-      prescriptions.push_back({boundary.velocity, static_cast<int>(c), function_of(*boundary.components[c], quasi_static), body.set(boundary.set)});
+      prescriptions.push_back(
+          {boundary.velocity, static_cast<int>(c), function_of(*boundary.components[c], quasi_static), body.set(boundary.set)});
     }
   }
   return Constraints(body, std::move(prescriptions));
@@ -43,7 +45,8 @@ void start_from(const std::filesystem::path& results, const Body& body, const Pa
       for (int c = 0; c < field.components; ++c) field.component(c)[p] = from.data[3 * row + static_cast<std::size_t>(c)];
     }
   };
-  if (!frame.fields.contains("displacement")) throw InputError(fmt::format("{}: the last frame has no displacement", results.string()));
+  if (!frame.fields.contains("displacement"))
+    throw InputError(fmt::format("{}: the last frame has no displacement", results.string()));
   copy("displacement", state.displacement());
   if (frame.fields.contains("velocity")) copy("velocity", state.velocity());
 }

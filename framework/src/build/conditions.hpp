@@ -18,8 +18,9 @@ SpaceTimeFunction function_of(const Expression& expression, bool ramps);
 /// Throws InputError for prescribed velocities in quasi-static runs.
 Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_static);
 
-/// On the owned points of parts.body, which is a part of partition->whole() where there are several ranks: totals are those of all
-/// ranks. parts: of the model, whose kinematics say what area a point has of a face. Throws InputError for faces without points.
+/// On the owned points of parts.body, which is a part of partition->whole() where there are several ranks: totals are those of
+/// all ranks. parts: of the model, whose kinematics say what area a point has of a face. Throws InputError for faces without
+/// points.
 Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* partition, bool quasi_static);
 
 /// Displacements and velocities at the start. Throws InputError where an earlier run does not hold them.

@@ -35,17 +35,19 @@ double rayleigh_speed(const Moduli& moduli, double density) {
 }
 
 void refuse_unsuited(const Scene& scene, const ModelParts& parts, bool ranks) {
-  const KinematicsTraits traits = parts.kinematics->traits();
+  const Formulation& formulation = parts.formulation;
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   if (ranks) refuse("a body on several ranks", "one rank");
-  if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
+  if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (parts.laws->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene.stabilization && traits.order > 1)
+  if (scene.stabilization && formulation.order > 1)
     refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
-  if (traits.at == EvaluationPoints::bonds && traits.order > 1) {
-    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene.kinematics->type, traits.order), "order 1");
+  if (formulation.bond && formulation.order > 1) {
+    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene.kinematics->type,
+                       formulation.order),
+           "order 1");
   }
 }
 
@@ -57,7 +59,8 @@ std::shared_ptr<const Damage> build_criterion(const Scene& scene, const PartFact
   const ParameterValues& values = scene.damage->values;
   if (!values.has("gradual") || !values.boolean("gradual")) return criterion;
   const auto refuse = [&](const std::string& found, const char* allowed) {
-    throw InputError(values.position("gradual"), "damage.gradual", fmt::format("found true with {}; allowed: {}", found, allowed));
+    throw InputError(values.position("gradual"), "damage.gradual",
+                     fmt::format("found true with {}; allowed: {}", found, allowed));
   };
   if (!criterion->traits().bits)
     refuse(fmt::format("\"{}\", whose bonds weaken of themselves", scene.damage->type), "criteria that break bonds at once");
@@ -65,7 +68,8 @@ std::shared_ptr<const Damage> build_criterion(const Scene& scene, const PartFact
   return std::make_shared<GradualFailure>(criterion);
 }
 
-std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_ptr<const Damage> criterion, const ModelParts& parts, bool ranks) {
+std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_ptr<const Damage> criterion,
+                                               const ModelParts& parts, bool ranks) {
   if (!criterion) return nullptr;
   refuse_unsuited(scene, parts, ranks);
   const Body& body = *parts.body;
@@ -76,7 +80,8 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_p
   damage->failure = body.make_field(1);
   GradualFailure* const gradual = gradual_failure(damage->law);
   Field crack_speed = gradual ? body.make_field(1) : Field();
-  DamagePoint at{{body.space(), body.section(), body.horizon(), {}}, mean_bond_length(*parts.influence, body.dimension(), body.horizon())};
+  DamagePoint at{{body.space(), body.section(), body.horizon(), {}},
+                 mean_bond_length(*parts.influence, body.dimension(), body.horizon())};
   const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
   StretchLimits limits;
   bool equal = true;
@@ -96,7 +101,8 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_p
     equal = equal && limits.onset == limits.failure;
   }
   for (const std::string& set : scene.no_fail)
-    for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
+    for (const std::int32_t p : body.set(set))
+      damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
   if (equal) damage->failure = Field();
   if (gradual) gradual->prepare(body, std::move(crack_speed));
   return damage;

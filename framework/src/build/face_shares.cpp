@@ -16,7 +16,7 @@ using Shares = std::map<std::int32_t, double>;
 /// A face of a load's set.
 struct Face {
   int axis;
-  double outward;   ///< 1: upper face, -1: lower
+  double outward;  ///< 1: upper face, -1: lower
   explicit Face(const LoadDescription& load) : axis(load.face[1] - 'x'), outward(load.face[0] == '+' ? 1.0 : -1.0) {}
 };
 
@@ -54,16 +54,15 @@ class Columns {
   std::int64_t shift_ = 0;
 };
 
-/// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium point
-/// by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies half a
-/// spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
+/// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
+/// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
+/// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
 Shares on_lattice(const std::vector<std::int32_t>& points, const Face& face, const ModelParts& parts) {
   const Body& body = *parts.body;
   const Columns columns(body, face);
-  const KinematicsTraits traits = parts.kinematics->traits();
-  const bool exact = traits.at != EvaluationPoints::pairs && traits.force_state == ForceState::variational;
+  const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis) : Field();
-  const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));   // that a face is felt in
+  const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));  // that a face is felt in
   const double area = body.uniform_volume() / body.spacing();
   Shares shares;
   double total = 0, wanted = 0;
@@ -92,7 +91,9 @@ Shares on_lattice(const std::vector<std::int32_t>& points, const Face& face, con
 /// the set holds a second layer, linear weights over both put the resultant on the face.
 Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const Body& body) {
   const double dx = body.spacing();
-  const auto along = [&](std::int32_t p) { return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)]; };
+  const auto along = [&](std::int32_t p) {
+    return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)];
+  };
   double extreme = -std::numeric_limits<double>::infinity();
   for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
   double total = 0, m0 = 0, m1 = 0, m2 = 0;
@@ -100,8 +101,10 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
   for (const std::int32_t p : points) {
     const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
     if (depth > 2.2 * dx) continue;
-    if (depth <= 1.2 * dx) total += v / dx;
-    else second = true;
+    if (depth <= 1.2 * dx)
+      total += v / dx;
+    else
+      second = true;
     m0 += v;
     m1 += v * depth;
     m2 += v * depth * depth;
@@ -122,8 +125,9 @@ Shares face_shares(const LoadDescription& load, const ModelParts& parts) {
   const std::vector<std::int32_t>& points = parts.body->set(load.set);
   Shares shares = parts.body->lattice() ? on_lattice(points, face, parts) : on_cloud(points, face, *parts.body);
   if (shares.empty()) {
-    throw InputError(load.position, "load.face",
-                     fmt::format("found \"{}\", on which no point of the set \"{}\" lies; allowed: a face of the set", load.face, load.set));
+    throw InputError(
+        load.position, "load.face",
+        fmt::format("found \"{}\", on which no point of the set \"{}\" lies; allowed: a face of the set", load.face, load.set));
   }
   return shares;
 }

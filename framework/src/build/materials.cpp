@@ -44,7 +44,8 @@ Values numeric_values(const PartValues& part, const Constants& constants) {
   Values values;
   for (const std::string& key : part.values.keys()) {
     const ParameterValue* value = part.values.find(key);
-    if (const auto* number = std::get_if<double>(value)) values.emplace(key, Expression(*number));
+    if (const auto* number = std::get_if<double>(value))
+      values.emplace(key, Expression(*number));
     else if (const auto* text = std::get_if<std::string>(value); text && part.values.is_expression(key))
       values.emplace(key, Expression(*text, constants, false, part.values.position(key), part.values.path() + "." + key));
   }
@@ -91,7 +92,8 @@ void fill_varying(MaterialRecord& record, const PartValues& part, const Values& 
   }
 }
 
-MaterialRecord build_record(const PartValues& part, const Scene& scene, const PartFactory& factory, const Body& body, std::size_t id) {
+MaterialRecord build_record(const PartValues& part, const Scene& scene, const PartFactory& factory, const Body& body,
+                            std::size_t id) {
   MaterialRecord record;
   record.material = factory.material(part);
   record.traits = record.material->traits();
@@ -128,9 +130,11 @@ std::optional<InputError> missing_density(const Scene& scene, const Body& body, 
     const double density = laws.density(p);
     if (density > 0) continue;
     const ParameterValues& values = materials(scene)[body.material_ids().empty() ? 0 : body.material_ids()[p]]->values;
-    if (!values.has("density")) return values.error("density", "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs need");
+    if (!values.has("density"))
+      return values.error("density", "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs need");
     const Point x = body.position(p);
-    return values.error("density", fmt::format("found {} at ({:.6g}, {:.6g}, {:.6g}); allowed: a density > 0 [kg/m^3]", density, x[0], x[1], x[2]));
+    return values.error("density", fmt::format("found {} at ({:.6g}, {:.6g}, {:.6g}); allowed: a density > 0 [kg/m^3]", density,
+                                               x[0], x[1], x[2]));
   }
   return std::nullopt;
 }

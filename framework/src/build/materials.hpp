@@ -16,7 +16,8 @@ namespace perikit {
 /// The materials of the scene in the order of Body::material_ids: [material], then those of the regions.
 std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene);
 
-/// Their laws, with constants at the points of `body`. ghosts: one more, which stores nothing, for the ghosts of the body. Throws InputError.
+/// Their laws, with constants at the points of `body`. ghosts: one more, which stores nothing, for the ghosts of the body. Throws
+/// InputError.
 std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool ghosts);
 
 /// What to say of the first point without a density; nothing where all have one.

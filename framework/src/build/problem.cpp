@@ -25,20 +25,24 @@ void place_points(const Scene& scene, bool lists, ProblemParts& parts) {
   parts.body = std::make_unique<const Body>(parts.partition->part(static_cast<std::uint16_t>(scene.regions.size() + 1)));
 }
 
-void refuse_stress(const Scene& scene, const Body& body, const KinematicsTraits& traits) {
+void refuse_stress(const Scene& scene, const Body& body, const Formulation& formulation) {
   const bool stress = body.space() == Space::plane_stress || body.space() == Space::line_stress;
-  if (!traits.selective || !stress) return;
-  throw InputError(scene.body.position, "body",
-                   fmt::format("found a state of stress with kinematics \"{}\", which needs the strain across the body; allowed: {} = \"strain\"",
-                               scene.kinematics->type, body.dimension() == 2 ? "plane" : "line"));
+  if (!formulation.selective() || !stress) return;
+  throw InputError(
+      scene.body.position, "body",
+      fmt::format(
+          "found a state of stress with kinematics \"{}\", which needs the strain across the body; allowed: {} = \"strain\"",
+          scene.kinematics->type, body.dimension() == 2 ? "plane" : "line"));
 }
 
 /// The scene's penalty, null without one; refused over kinematics that it does not suit.
-std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, const PartFactory& factory, const KinematicsTraits& traits) {
+std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, const PartFactory& factory,
+                                                         const Formulation& formulation) {
   if (!scene.stabilization) return nullptr;
-  if (traits.at != EvaluationPoints::points) {
+  if (!formulation.point) {
     throw InputError(scene.kinematics->values.position("stabilization"), "kinematics.stabilization",
-                     fmt::format("found '{}' over {}; allowed: over kinematics with one gradient per point", scene.stabilization->type, scene.kinematics->type));
+                     fmt::format("found '{}' over {}; allowed: over kinematics with one gradient per point",
+                                 scene.stabilization->type, scene.kinematics->type));
   }
   return factory.stabilization(*scene.stabilization);
 }
@@ -60,12 +64,15 @@ void prepare_history(const Scene& scene, const ModelParts& parts, bool quasi_sta
     if (parts.laws->records()[id].material->state_components(parts.body->space()) == 0) continue;
     const PartValues& part = *sources[id];
     const auto refuse = [&](const std::string& with, const std::string& allowed) {
-      throw InputError(part.values.position("type"), part.values.path() + ".type",
-                       fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
+      throw InputError(
+          part.values.position("type"), part.values.path() + ".type",
+          fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
     if (quasi_static)
-      refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type), "an explicit integrator, or another material");
-    if (parts.kinematics->traits().force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+      refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
+             "an explicit integrator, or another material");
+    if (parts.formulation.force_state == ForceState::local)
+      refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
   // The first evaluation only counts.
   const Field rest = parts.body->make_field(parts.body->dimension());
@@ -84,20 +91,22 @@ std::unique_ptr<ModelProblem> build_problem(const Scene& scene, const PartFactor
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
 
-  ModelParts of_model{.body = &body, .kinematics = factory.kinematics(*scene.kinematics), .influence = factory.influence(*scene.influence),
-                      .skip = scene.skip, .share = scene.share};
-  const KinematicsTraits traits = of_model.kinematics->traits();
-  refuse_stress(scene, body, traits);
+  ModelParts of_model{.body = &body,
+                      .formulation = make_formulation(factory.kinematics(*scene.kinematics)),
+                      .influence = factory.influence(*scene.influence),
+                      .skip = scene.skip,
+                      .share = scene.share};
+  refuse_stress(scene, body, of_model.formulation);
   parts.laws = build_laws(scene, factory, body, partition != nullptr);
   of_model.laws = parts.laws.get();
   parts.fracture = FractureRecord(build_damage(scene, std::move(criterion), of_model, partition != nullptr));
   of_model.damage = parts.fracture.damage();
-  of_model.stabilization = build_stabilization(scene, factory, traits);
+  of_model.stabilization = build_stabilization(scene, factory, of_model.formulation);
   parts.model = build_model(scene, of_model);
   prepare_history(scene, of_model, quasi_static, *parts.model);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
-  if (partition) parts.materials.push_back(scene.material->type);   // of ghosts
+  if (partition) parts.materials.push_back(scene.material->type);  // of ghosts
 
   State state(body);
   set_initial_state(scene, body, partition, state);

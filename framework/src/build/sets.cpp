@@ -50,11 +50,15 @@ void add_sets(const std::vector<SetDescription>& sets, Body& body) {
   for (const SetDescription& description : sets) {
     const std::string key = "sets." + description.name;
     std::vector<std::int32_t> members;
-    if (description.expression) members = where_true(*description.expression, body);
-    else if (description.nearest) members = {nearest_point(*description.nearest, body)};
-    else members = listed(description, key, body);
+    if (description.expression)
+      members = where_true(*description.expression, body);
+    else if (description.nearest)
+      members = {nearest_point(*description.nearest, body)};
+    else
+      members = listed(description, key, body);
     if (members.empty())
-      throw InputError(description.position, key, "found a condition that holds at no point; allowed: one that holds at one point or more");
+      throw InputError(description.position, key,
+                       "found a condition that holds at no point; allowed: one that holds at one point or more");
     body.add_set(description.name, std::move(members));
   }
 }

@@ -17,10 +17,12 @@ Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptio
     for (const std::int32_t point : prescriptions[k].points) governor_of(prescriptions[k], point) = static_cast<std::int32_t>(k);
   for (std::size_t k = 0; k < prescriptions.size(); ++k) {
     Governed governed{std::move(prescriptions[k]), {}};
-    std::erase_if(governed.points, [&](std::int32_t point) { return governor_of(governed, point) != static_cast<std::int32_t>(k); });
+    std::erase_if(governed.points,
+                  [&](std::int32_t point) { return governor_of(governed, point) != static_cast<std::int32_t>(k); });
     std::ranges::sort(governed.points);
     if (!governed.value.depends_on_time)
-      for (const std::int32_t p : governed.points) governed.fixed.push_back(governed.value.value(body.position(static_cast<std::size_t>(p)), 0.0));
+      for (const std::int32_t p : governed.points)
+        governed.fixed.push_back(governed.value.value(body.position(static_cast<std::size_t>(p)), 0.0));
     governed_.push_back(std::move(governed));
   }
   for (std::size_t dof = 0; dof < governor.size(); ++dof)
@@ -45,13 +47,15 @@ ConstFieldView Constraints::free() const {
 std::size_t Constraints::points_held_at_rest() const {
   std::vector<int> held(body_->stride(), 0);
   for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.fixed.size(); ++k) held[static_cast<std::size_t>(governed.points[k])] += governed.fixed[k] == 0;
+    for (std::size_t k = 0; k < governed.fixed.size(); ++k)
+      held[static_cast<std::size_t>(governed.points[k])] += governed.fixed[k] == 0;
   return static_cast<std::size_t>(std::ranges::count(held, body_->dimension()));
 }
 
 void Constraints::prescribe_displacement(double t, FieldView u) const {
   for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.points.size(); ++k) u.component(governed.component)[governed.points[k]] = value(governed, k, t);
+    for (std::size_t k = 0; k < governed.points.size(); ++k)
+      u.component(governed.component)[governed.points[k]] = value(governed, k, t);
 }
 
 void Constraints::prescribe_half_step_velocity(double t_begin, double t_end, ConstFieldView u, FieldView v) {
@@ -59,8 +63,9 @@ void Constraints::prescribe_half_step_velocity(double t_begin, double t_end, Con
   for (const Governed& governed : governed_)
     for (std::size_t k = 0; k < governed.points.size(); ++k) {
       const std::int32_t p = governed.points[k];
-      v.component(governed.component)[p] = governed.velocity ? value(governed, k, 0.5 * (t_begin + t_end))
-                                                             : (value(governed, k, t_end) - u.component(governed.component)[p]) / (t_end - t_begin);
+      v.component(governed.component)[p] =
+          governed.velocity ? value(governed, k, 0.5 * (t_begin + t_end))
+                            : (value(governed, k, t_end) - u.component(governed.component)[p]) / (t_end - t_begin);
     }
 }
 
@@ -69,9 +74,12 @@ void Constraints::prescribe_velocity(double t, FieldView v) const {
   for (const Governed& governed : governed_)
     for (std::size_t k = 0; k < governed.points.size(); ++k) {
       double& velocity = v.component(governed.component)[governed.points[k]];
-      if (governed.velocity) velocity = value(governed, k, t);
-      else if (governed.value.depends_on_time && h > 0) velocity = (value(governed, k, t + h) - value(governed, k, t - h)) / (2 * h);
-      else velocity = 0.0;
+      if (governed.velocity)
+        velocity = value(governed, k, t);
+      else if (governed.value.depends_on_time && h > 0)
+        velocity = (value(governed, k, t + h) - value(governed, k, t - h)) / (2 * h);
+      else
+        velocity = 0.0;
     }
 }
 
@@ -82,14 +90,21 @@ void Constraints::prescribe_acceleration(double t, FieldView a) const {
     for (std::size_t k = 0; k < governed.points.size(); ++k) {
       const auto at = [&](double time) { return value(governed, k, time); };
       double& acceleration = a.component(governed.component)[governed.points[k]];
-      if (!governed.value.depends_on_time || h <= 0) acceleration = 0.0;
-      else if (governed.velocity) acceleration = (at(t + h / 2) - at(t - h / 2)) / h;
-      else acceleration = (at(t + h) - 2 * at(t) + at(t - h)) / (h * h);
+      if (!governed.value.depends_on_time || h <= 0)
+        acceleration = 0.0;
+      else if (governed.velocity)
+        acceleration = (at(t + h / 2) - at(t - h / 2)) / h;
+      else
+        acceleration = (at(t + h) - 2 * at(t) + at(t - h)) / (h * h);
     }
 }
 
-void Constraints::write(ByteWriter& out) const { out.value(last_step_); }
+void Constraints::write(ByteWriter& out) const {
+  out.value(last_step_);
+}
 
-void Constraints::read(ByteReader& in) { last_step_ = in.value<double>(); }
+void Constraints::read(ByteReader& in) {
+  last_step_ = in.value<double>();
+}
 
 }  // namespace perikit

@@ -22,7 +22,8 @@ bool FractureRecord::update(Model& model, State& state, double time_step, const 
 
 std::string FractureRecord::summary(const BondChecks& checks, double dissipated) const {
   if (!damage_) return {};
-  std::string text = fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, dissipated);
+  std::string text =
+      fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, dissipated);
   if (checks.groups > 0) {
     text += fmt::format(
         "bond checks   {} of {} groups of eight points in {} updates ({:.2f} %); the others were too far from failing\n",
@@ -30,8 +31,9 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
         100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
   }
   if (gains_ > 0) {
-    text += fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n", gains_,
-                        gained_, dissipated + gained_);
+    text +=
+        fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n",
+                    gains_, gained_, dissipated + gained_);
   }
   return text;
 }
@@ -41,7 +43,7 @@ void FractureRecord::write(const Model& model, ByteWriter& out) const {
   out.value(gained_);
   const std::vector<BondChange> bonds = model.changed_bonds();
   out.value(static_cast<std::uint64_t>(bonds.size()));
-  for (const BondChange& b : bonds) {   // one by one: the padding of the struct holds anything
+  for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
     out.value(b.point);
     out.value(b.far);
     out.value(b.bond);

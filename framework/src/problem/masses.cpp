@@ -4,7 +4,8 @@
 
 namespace perikit {
 
-Masses::Masses(const Body& body, const Laws& laws, std::optional<InputError> missing) : body_(&body), laws_(&laws), missing_(std::move(missing)) {}
+Masses::Masses(const Body& body, const Laws& laws, std::optional<InputError> missing)
+    : body_(&body), laws_(&laws), missing_(std::move(missing)) {}
 
 std::span<const double> Masses::by_point() const {
   if (missing_) throw *missing_;
@@ -21,7 +22,8 @@ std::span<const double> Masses::by_point() const {
 double Masses::uniform() const {
   const std::span<const double> masses = by_point();
   const double first = masses[static_cast<std::size_t>(body_->internal().front())];
-  const bool same = std::ranges::all_of(body_->internal(), [&](std::int32_t p) { return masses[static_cast<std::size_t>(p)] == first; });
+  const bool same =
+      std::ranges::all_of(body_->internal(), [&](std::int32_t p) { return masses[static_cast<std::size_t>(p)] == first; });
   return same ? first : 0.0;
 }
 

@@ -30,12 +30,15 @@ void finish(const std::optional<Ghosts>& ghosts, FieldView force, EvaluationStat
 }
 
 void refuse_ranks(const ProblemParts& parts) {
-  if (parts.partition) throw RunError("an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers without a preconditioner");
+  if (parts.partition)
+    throw RunError(
+        "an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers without a preconditioner");
 }
 
 }  // namespace
 
-ModelProblem::ModelProblem(ProblemParts parts, ProblemValues values) : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
+ModelProblem::ModelProblem(ProblemParts parts, ProblemValues values)
+    : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
   if (!parts_.partition) return;
   ghosts_.emplace(*parts_.partition, body());
   with_ghosts_ = make_field();

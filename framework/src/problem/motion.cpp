@@ -51,7 +51,8 @@ Field reactions(Problem& problem, bool dynamic, double t) {
 
 void middle_of_next_step(Problem& problem, double time_step, ConstFieldView velocity, FieldView end) {
   const std::span<const double> masses = problem.masses().by_point();
-  const ConstFieldView free = problem.constraints().free(), u = problem.state().displacement(), internal = problem.state().internal_force(),
+  const ConstFieldView free = problem.constraints().free(), u = problem.state().displacement(),
+                       internal = problem.state().internal_force(),
                        external = problem.loads().any() ? ConstFieldView(problem.state().external_force()) : ConstFieldView();
   for (std::size_t k = 0; k < end.size(); ++k) {
     const double m = masses[k % end.stride], force = internal.data[k] + (external.data ? external.data[k] : 0.0);
@@ -64,10 +65,12 @@ std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
   const int d = body.dimension();
   Point middle{};
   for (const std::int32_t p : body.internal())
-    for (std::size_t c = 0; c < 3; ++c) middle[c] += body.position(static_cast<std::size_t>(p))[c] / static_cast<double>(body.points());
+    for (std::size_t c = 0; c < 3; ++c)
+      middle[c] += body.position(static_cast<std::size_t>(p))[c] / static_cast<double>(body.points());
   double size = body.spacing();
   for (const std::int32_t p : body.internal())
-    for (std::size_t c = 0; c < 3; ++c) size = std::max(size, std::abs(body.position(static_cast<std::size_t>(p))[c] - middle[c]));
+    for (std::size_t c = 0; c < 3; ++c)
+      size = std::max(size, std::abs(body.position(static_cast<std::size_t>(p))[c] - middle[c]));
   std::vector<Field> motions;
   for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(body.make_field(d));
   for (const std::int32_t index : body.internal()) {

@@ -24,7 +24,7 @@ void ByteWriter::numbers(std::span<const double> values) {
 
 void ByteReader::bytes(void* to, std::size_t size) {
   if (size > bytes_.size()) throw InputError("the saved state is too short");
-  if (size > 0) std::memcpy(to, bytes_.data(), size);   // an empty span may point nowhere
+  if (size > 0) std::memcpy(to, bytes_.data(), size);  // an empty span may point nowhere
   bytes_ = bytes_.subspan(size);
 }
 

@@ -28,9 +28,10 @@ double bond_based_time_step(const Body& body, const Laws& laws) {
   const double delta = body.horizon(), dx = body.spacing();
   const double reach = 2 * std::ceil(delta / dx) * dx;
   const Lattice lattice = make_lattice(d, dx, {}, {reach + dx, reach + dx, reach + dx}, delta);
-  double sum = 0;   // of V_j/|xi|
+  double sum = 0;  // of V_j/|xi|
   for (const auto& offset : family_offsets(lattice, delta)) {
-    sum += std::pow(dx, d) * body.section() / (dx * std::sqrt(double(offset[0]) * offset[0] + double(offset[1]) * offset[1] + double(offset[2]) * offset[2]));
+    sum += std::pow(dx, d) * body.section() /
+           (dx * std::sqrt(double(offset[0]) * offset[0] + double(offset[1]) * offset[1] + double(offset[2]) * offset[2]));
   }
   double least = 0;
   for (const std::int32_t index : body.owned()) {

@@ -39,7 +39,8 @@ class Work {
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double mass = mass_[static_cast<std::size_t>(dofs[k]) % load.stride];
-      work += 0.5 * mass * (now[k] * now[k] - speed_[k] * speed_[k]) - 0.5 * (force_[k] + total_force(dofs[k])) * dt * half_step_velocity.data[dofs[k]];
+      work += 0.5 * mass * (now[k] * now[k] - speed_[k] * speed_[k]);
+      work -= 0.5 * (force_[k] + total_force(dofs[k])) * dt * half_step_velocity.data[dofs[k]];
     }
     speed_ = now;
     state_.energies.external_work += work;
@@ -123,7 +124,8 @@ class PartName final : public Integrator {
 
   static void evaluate(Problem& problem, bool energy, double dt) {
     State& state = problem.state();
-    const EvaluationStatus status = problem.evaluate_forces(state.displacement(), state.internal_force(), energy ? &state.energies.strain : nullptr, dt);
+    double* const strain = energy ? &state.energies.strain : nullptr;
+    const EvaluationStatus status = problem.evaluate_forces(state.displacement(), state.internal_force(), strain, dt);
     if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state.step, state.time, status.description));
   }
 
