@@ -1,3 +1,4 @@
+#include "perikit/problem/motion.hpp"
 #include "perikit/run/point_fields.hpp"
 
 #include <algorithm>
@@ -73,7 +74,7 @@ OutputField PointFields::tensor(const std::string& name, ConstFieldView field, b
 }
 
 const PointSamples& PointFields::samples() {
-  if (!samples_) problem_.model().sample(problem_.displacement(), samples_.emplace());
+  if (!samples_) problem_.model().sample(problem_.state().displacement(), samples_.emplace());
   return *samples_;
 }
 
@@ -84,12 +85,12 @@ const OutputField& PointFields::get(const std::string& name) {
 }
 
 OutputField PointFields::compute(const std::string& name) {
-  if (name == "displacement") return vector(name, problem_.displacement(), false);
-  if (name == "velocity") return vector(name, dynamic_ || !problem_.scene().initial_velocity.empty() ? ConstFieldView(problem_.velocity()) : ConstFieldView(), false);
-  if (name == "acceleration") return vector(name, dynamic_ ? problem_.acceleration(problem_.time()) : problem_.make_field(problem_.dimension()), false);
-  if (name == "internal_force") return vector(name, problem_.internal_force(), true);
-  if (name == "external_force") return vector(name, problem_.any_load() ? ConstFieldView(problem_.external_force()) : ConstFieldView(), true);
-  if (name == "reaction") return vector(name, problem_.reaction(dynamic_, problem_.time()), false);
+  if (name == "displacement") return vector(name, problem_.state().displacement(), false);
+  if (name == "velocity") return vector(name, moves_ ? ConstFieldView(problem_.state().velocity()) : ConstFieldView(), false);
+  if (name == "acceleration") return vector(name, dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field(), false);
+  if (name == "internal_force") return vector(name, problem_.state().internal_force(), true);
+  if (name == "external_force") return vector(name, problem_.loads().any() ? ConstFieldView(problem_.state().external_force()) : ConstFieldView(), true);
+  if (name == "reaction") return vector(name, reactions(problem_, dynamic_, problem_.state().time), false);
   if (name == "strain_energy_density") return scalar(name, samples().strain_energy_density);
   if (name == "deformation_gradient") return tensor(name, samples().H, true);
   if (name == "first_piola") return tensor(name, samples().P, false);
@@ -97,7 +98,7 @@ OutputField PointFields::compute(const std::string& name) {
   if (name == "von_mises") return scalar(name, samples().von_mises);
   if (name == "damage") return scalar(name, problem_.model().damage());
   if (name == "shape_tensor_condition") return scalar(name, problem_.model().shape_tensor_condition());
-  const std::size_t n = problem_.points();
+  const std::size_t n = problem_.body().points();
   OutputField out{name, 1, std::vector<double>(n)};
   if (name == "jacobian") {
     const std::vector<double>& F = get("deformation_gradient").data;
