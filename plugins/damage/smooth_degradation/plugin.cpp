@@ -39,7 +39,7 @@ PartDescription description() {
                        .equations = "T(s) = (1 - tanh n)/2,  n = beta (2 s - s_min - s_cr)/(s_cr - s_min)\n"
                                     "b = (T(s) - T(s_cr))/(T(s_min) - T(s_cr)), s the largest stretch so far",
                        .source = "Hashim et al., eq. 48, rescaled to be continuous",
-                       .limits = "a lattice is run by neighbour lists, since every bond has a number of its own"};
+                       .limits = "in groups of eight lattice points with a weakened bond, every bond has a number of its own"};
   part.parameters.number("stretch_min", "-", "Stretch where bonds begin to weaken.").require().positive();
   part.parameters.number("stretch", "-", "Stretch where nothing is left, above stretch_min.").require().positive();
   part.parameters.number("beta", "-", "Steepness in the middle of the range.").by_default("3.0").positive().at_most(100.0);
