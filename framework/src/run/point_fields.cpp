@@ -74,7 +74,7 @@ OutputField PointFields::tensor(const std::string& name, ConstFieldView field, b
 }
 
 const PointSamples& PointFields::samples() {
-  if (!samples_) problem_.model().sample(problem_.state().displacement(), samples_.emplace());
+  if (!samples_) problem_.terms().sample(problem_.state().displacement(), samples_.emplace());
   return *samples_;
 }
 
@@ -96,8 +96,8 @@ OutputField PointFields::compute(const std::string& name) {
   if (name == "first_piola") return tensor(name, samples().P, false);
   if (name == "cauchy") return tensor(name, samples().cauchy, false);
   if (name == "von_mises") return scalar(name, samples().von_mises);
-  if (name == "damage") return scalar(name, problem_.model().damage());
-  if (name == "shape_tensor_condition") return scalar(name, problem_.model().shape_tensor_condition());
+  if (name == "damage") return scalar(name, problem_.terms().damage());
+  if (name == "shape_tensor_condition") return scalar(name, problem_.terms().shape_tensor_condition());
   const std::size_t n = problem_.body().points();
   OutputField out{name, 1, std::vector<double>(n)};
   if (name == "jacobian") {

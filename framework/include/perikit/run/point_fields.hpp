@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "perikit/output/recorder.hpp"
-#include "perikit/problem/model_problem.hpp"
+#include "perikit/problem/body_problem.hpp"
 
 namespace perikit {
 
 class PointFields {
  public:
   /// moves: the state has a velocity, which dynamic runs always have.
-  PointFields(ModelProblem& problem, bool dynamic, bool moves) : problem_(problem), dynamic_(dynamic), moves_(dynamic || moves) {}
+  PointFields(BodyProblem& problem, bool dynamic, bool moves) : problem_(problem), dynamic_(dynamic), moves_(dynamic || moves) {}
 
   /// Names in the order of the documentation.
   static const std::vector<std::string>& names();
@@ -36,7 +36,7 @@ class PointFields {
   OutputField scalar(const std::string& name, ConstFieldView field) const;
   OutputField tensor(const std::string& name, ConstFieldView field, bool identity) const;
 
-  ModelProblem& problem_;
+  BodyProblem& problem_;
   bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
