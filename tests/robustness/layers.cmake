@@ -17,6 +17,7 @@ set(order
     assembly          # the tangent as a matrix
     terms             # what adds to forces, energy and tangent
     problem           # state, constraints, loads
+    fields            # fields of points by name
     sdk               # what parts are written with: laws, equilibrium, load steps
     plugin/registry   # makes parts of every kind, so it knows the interfaces of all of them
     scene             # what a file says

@@ -10,7 +10,7 @@
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
 #include "perikit/problem/body_problem.hpp"
-#include "perikit/run/point_fields.hpp"
+#include "perikit/fields/point_fields.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
