@@ -79,16 +79,17 @@ std::string Case::label() const {
                      body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
 }
 
-bool Case::conservative() const {
-  const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
-  return subject().registry.kinematics(*part)->traits().force_state == ForceState::variational;
+Formulation formulation_of(const Example& example) {
+  Registry& registry = subject().registry;
+  return make_formulation(registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, registry)));
 }
+
+bool Case::conservative() const { return formulation_of(example).force_state == ForceState::variational; }
 
 std::vector<Case> cases() {
   std::vector<Case> all;
   for (const Example& example : kinematics_examples()) {
-    const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
-    const bool selective = subject().registry.kinematics(*part)->traits().selective;
+    const bool selective = formulation_of(example).selective();
     for (int d = 1; d <= 3; ++d) {
       for (const bool cloud : {false, true}) {
         BodyOptions body;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "perikit/model/formulation.hpp"
 #include "perikit/plugin/registry.hpp"
 #include "perikit/run/simulation.hpp"
 
@@ -55,6 +56,9 @@ struct BodyOptions {
 std::string scene_text(const BodyOptions& options, const std::string& kinematics);
 std::unique_ptr<Simulation> build(const std::string& text);
 std::string kinematics_table(const Example& example);
+
+/// The kinematics of an example, taken apart.
+Formulation formulation_of(const Example& example);
 
 /// A kinematics on a body.
 struct Case {

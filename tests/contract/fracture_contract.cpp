@@ -160,10 +160,9 @@ double quantile(std::vector<Stretched> all, double share) {
 
 /// Whether the kinematics runs in this dimension and its stencils follow broken bonds; scenes with the others are refused.
 bool suits(const Example& example, int dimension) {
-  const auto kinematics = subject().registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, subject().registry));
-  const KinematicsTraits traits = kinematics->traits();
-  if (traits.force_state == ForceState::variational &&
-      (traits.order == 1 || (traits.at == EvaluationPoints::points && example.stabilization.empty())))
+  const Formulation formulation = formulation_of(example);
+  if (formulation.force_state == ForceState::variational &&
+      (formulation.order == 1 || (formulation.point && example.stabilization.empty())))
     return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
@@ -218,7 +217,7 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         CHECK(2 * update.changed == cut->problem().model().report().broken_bonds);
         CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
         const Response after = respond(problem, 6);
-        const bool selective = subject().registry.kinematics(*failing->scene().kinematics)->traits().selective;
+        const bool selective = formulation_of(example).selective();
         const std::optional<Response> expected = selective ? dense_response(*failing, height) : respond(cut->problem(), 6);
         if (expected) {
           CHECK(std::abs(after.energy - expected->energy) <= 1e-11 * expected->energy);

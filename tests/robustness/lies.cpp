@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <map>
 #include <set>
 
 #include "perikit/plugin/abi.hpp"
@@ -59,6 +60,26 @@ TEST_CASE("contract: what breaks is named with numbers, and how often it breaks"
   for (const std::string word : {"material/wrong_stress\n", "kept:   material: ", "broken: material: stress is the derivative of the energy", "P : dF = dpsi (differences): ", "error ", " > 1e-",
                                  "   (material_check.hpp:", " times more\n", " test cases kept; "})
     CHECK_MESSAGE(contains(out, word), "no '", word, "' in\n", out);
+}
+
+TEST_CASE("contract: kinematics that are none of the classes are refused by name, by the suite and by scenes") {
+  const std::string base = "the base that it maps is neither a BondKinematics nor a WeightedKinematics";
+  const std::map<std::string, std::string> reasons{
+      {"unclassed", "it is none of PointKinematics, BondKinematics, WeightedKinematics, PairKinematics and MappedKinematics"},
+      {"mapped_points", base},
+      {"mapped_twice", base}};
+  const std::string library = fmt::format("{}/no_class.so", PERIKIT_LIES);
+  const Desk desk(replaced(plate, "format = 1", fmt::format("format = 1\nplugins = [\"{}\"]", library)));
+  const Result suite = desk.perikit(fmt::format("contract '{}'", library));
+  CHECK(suite.status == 1);
+  for (const auto& [name, reason] : reasons) {
+    CHECK(contains(suite.out, fmt::format("kinematics/{} breaks its contract", name)));
+    const std::string refusal = fmt::format("kinematics '{}' of {} cannot be made: {}", name, library, reason);
+    CHECK_MESSAGE(contains(suite.out, refusal), "no '", refusal, "' in\n", suite.out);
+    const Result scene = desk.perikit("check scene.toml --trust --set kinematics.type=" + name);
+    CHECK(scene.status == 2);
+    CHECK_MESSAGE(contains(scene.err, refusal), scene.err);
+  }
 }
 
 TEST_CASE("contract: without perikit's own parts there is nothing to test with") {

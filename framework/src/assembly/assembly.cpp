@@ -9,7 +9,7 @@
 namespace perikit {
 
 Assembly::Assembly(const ModelParts& parts, int steps)
-    : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), steps_(steps) {}
+    : families_(*parts.body, *parts.influence, parts.formulation.weight), steps_(steps) {}
 
 EvaluationStatus Assembly::assemble(ConstFieldView u, BlockMatrix& K) {
   convex_ = K.convex;
@@ -73,7 +73,7 @@ namespace {
 
 template <int D>
 std::unique_ptr<Assembly> make(const ModelParts& parts) {
-  if (parts.kinematics->traits().at == EvaluationPoints::bonds) return std::make_unique<BondAssembly<D>>(parts);
+  if (parts.formulation.bond) return std::make_unique<BondAssembly<D>>(parts);
   return std::make_unique<ElementAssembly<D>>(parts);
 }
 

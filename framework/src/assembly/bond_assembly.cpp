@@ -20,12 +20,11 @@ void over_rows(std::size_t rows, Body&& body) {
 
 template <int D>
 BondAssembly<D>::BondAssembly(const ModelParts& parts)
-    : Assembly(parts, parts.kinematics->traits().base == BondBase::mean ? 3 : 2),
+    : Assembly(parts, parts.formulation.base == BondBase::mean ? 3 : 2),
       laws_(*parts.laws),
-      kinematics_(parts.kinematics),
-      traits_(parts.kinematics->traits()),
-      mean_(traits_.base == BondBase::mean),
-      symmetric_(traits_.pair_symmetric && !traits_.selective && parts.share),
+      formulation_(parts.formulation),
+      mean_(formulation_.base == BondBase::mean),
+      symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
       colouring_(cloud_reach(families().lists(), families().rows())) {
   read_bonds();
 }
@@ -48,8 +47,8 @@ void BondAssembly<D>::read_bonds() {
     families().load(i, s.family);
     families().bond_shares(i, s.family, s.share);
     s.correction.assign(D * s.family.size, 0.0);
-    kinematics_->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
-    point_gradient(s.family, families().body().horizon(), traits_.order, s.gradient);
+    formulation_.bond->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
+    point_gradient(s.family, families().body().horizon(), formulation_.order, s.gradient);
     const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
     volume_share_[i] = regular ? families().left(i) : 0.0;
     const auto neighbours = families().neighbours(i);
@@ -112,7 +111,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
     }
     for (std::size_t e = 0; e < D; ++e) {
       m.batch.H(lane, static_cast<int>(c * D + e)) = A[e] + z * bond.correction[e];
-      if (traits_.selective) m.batch.owner_H(lane, static_cast<int>(c * D + e)) = own[c * D + e];
+      if (formulation_.selective()) m.batch.owner_H(lane, static_cast<int>(c * D + e)) = own[c * D + e];
     }
   }
 }
@@ -167,7 +166,7 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
           jj[at] += far_far * M;
         }
     }
-  if (!traits_.selective) return;
+  if (!formulation_.selective()) return;
   // Selective map: mixed terms of y with Hbar_i, and Hbar_i with itself.
   const double* mixed = batch.mixed(lane);
   const double* bar = batch.bar(lane);
@@ -260,7 +259,7 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
 template <int D>
 std::int64_t BondAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
   const std::size_t rows = families().rows();
-  memory_.prepare([&] { return std::make_unique<Memory>(laws_, traits_.selective); });
+  memory_.prepare([&] { return std::make_unique<Memory>(laws_, formulation_.selective()); });
   Hbar_.resize(entries * rows);
   diagonal_.resize(coupling * rows);
   off_diagonal_.resize(coupling * families().bonds());

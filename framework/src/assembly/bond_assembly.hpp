@@ -49,8 +49,7 @@ class BondAssembly final : public Assembly {
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
 
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> kinematics_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
   bool mean_, symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each

@@ -10,8 +10,7 @@ namespace perikit {
 template <int D>
 ElementAssembly<D>::ElementAssembly(const ModelParts& parts)
     : Assembly(parts, 2), parts_(parts), laws_(*parts.laws), colouring_(cloud_reach(families().lists(), families().rows())) {
-  shape_ = {parts.kinematics, parts.kinematics->traits(), 1};
-  if (shape_.traits.at == EvaluationPoints::weighted) shape_.parts = parts.kinematics->parts(D);
+  shape_ = {parts.formulation, parts.formulation.parts(D)};
   for (std::size_t r = 0; r < families().rows() && !whole_; ++r) {
     if (!families().whole(r)) continue;
     ElementScratch<D> scratch;
@@ -43,7 +42,7 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
     for (std::size_t k = 0; k < element.width; k += pack_width) total += Pack::load(g + k) * Pack::load(du + k);
     return sum(total);
   };
-  const int owners = shape_.traits.selective ? 1 : 0;
+  const int owners = shape_.formulation.selective() ? 1 : 0;
   double Hbar[D * D] = {};
   for (int c = 0; c < D && owners > 0; ++c)
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
@@ -95,7 +94,7 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
     collect_nodes(r, m.nodes);
     const bool penalised = parts_.stabilization && m.penalty.load(parts_, families(), r);
     if (penalised) m.penalty.subtract_seen(m.batch.own(lane));
-    stiffness<D>(element, m.batch, lane, shape_.traits.selective, m.scratch);
+    stiffness<D>(element, m.batch, lane, shape_.formulation.selective(), m.scratch);
     if (penalised) m.penalty.add_springs(static_cast<std::size_t>(element.own), element.width, m.scratch.K.data());
     scatter(element, K, m);
     lane += element.points;
@@ -105,7 +104,7 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
 
 template <int D>
 std::int64_t ElementAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
-  memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.traits.selective); });
+  memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.formulation.selective()); });
   // Enough points at once to fill batches of the materials.
   const std::size_t bonds = families().bonds() / families().rows() + 1;
   const std::size_t at_once =

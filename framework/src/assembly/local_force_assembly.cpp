@@ -13,7 +13,7 @@ std::vector<double> family_volumes(const Body& body, const InfluenceFunction& in
 
 template <int D>
 LocalForceAssembly<D>::LocalForceAssembly(const ModelParts& parts)
-    : Assembly(parts, 2), kinematics_(parts.kinematics), selective_(kinematics_->traits().selective),
+    : Assembly(parts, 2), formulation_(parts.formulation), selective_(formulation_.selective()),
       family_volume_(family_volumes(*parts.body, *parts.influence)), batch_(*parts.laws, selective_) {}
 
 template <int D>
@@ -73,7 +73,7 @@ std::int64_t LocalForceAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
   for (std::size_t row = 0; row < families().rows(); ++row) {
     const std::size_t bonds = families().neighbours(row).size();
     if (bonds == 0) continue;
-    point_.build(*kinematics_, families(), row, family_volume_[row]);
+    point_.build(*formulation_.weighted, families(), row, family_volume_[row]);
     add_lanes(row, u);
     if (batch_.evaluate() >= 0) return static_cast<std::int64_t>(families().point(row));
     of_owner.assign(selective_ ? bonds * n * D : 0, 0.0);  // [l][r][b]: derivative of the stress on the owner's gradient

@@ -21,7 +21,7 @@ class LocalForceAssembly final : public Assembly {
   /// K of the force t on both ends of bond k of the row: dt = sum_l B[l] (u_l - u_i), B[l * D * D ...] row-major.
   void couple(std::size_t row, std::size_t k, const std::vector<double>& B, BlockMatrix& K) const;
 
-  std::shared_ptr<const Kinematics> kinematics_;
+  Formulation formulation_;
   bool selective_;
   std::vector<double> family_volume_;
   LocalForcePoint<D> point_;

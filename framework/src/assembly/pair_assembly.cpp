@@ -14,9 +14,9 @@ constexpr std::size_t block_rows = 64;
 
 template <int D>
 PairAssembly<D>::PairAssembly(const ModelParts& parts, const PairPoints& points)
-    : Assembly(parts, parts.kinematics->traits().dilatation ? 2 : 1),
-      law_(parts.kinematics),
-      traits_(law_->traits()),
+    : Assembly(parts, parts.formulation.dilatation ? 2 : 1),
+      formulation_(parts.formulation),
+      law_(*formulation_.pairs),
       points_(points) {}
 
 template <int D>
@@ -32,7 +32,7 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
     // b weakens the bond itself and leaves its law alone; a broken one is at rest, wherever its far end may be.
     const double b = families().integrity(families().first(row) + k);
     m.family.volume[k] *= b;
-    m.omega[k] = traits_.influence && b > 0 ? m.family.omega[k] / b : 1.0;
+    m.omega[k] = formulation_.pair_traits.influence && b > 0 ? m.family.omega[k] / b : 1.0;
     for (std::size_t c = 0; c < D && b > 0; ++c) {
       const double* value = u.component(static_cast<int>(c));
       m.du[c][k] = value[families().point(static_cast<std::size_t>(neighbours[k]))] - value[p];
@@ -92,7 +92,7 @@ bool PairAssembly<D>::dilatation(std::size_t row, ConstFieldView u, Memory& m) {
   }
   std::copy_n(own.data(), D, own_slope_.data() + D * row);
   modulus[0] = points_.dilatation_modulus.data()[p];
-  law_->dilatation_law({1, theta, modulus, nullptr, pressure, stiffness});
+  formulation_.dilatation->evaluate({1, theta, modulus, nullptr, pressure, stiffness});
   pressure_[row] = scale * pressure[0];
   stiffness_[row] = families().volume(row) * stiffness[0];
   return true;
@@ -106,11 +106,11 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
   double* own = m.places.block(K, static_cast<std::int32_t>(row), entries);
   stretch(row, u, m);
   moduli(row, m);
-  law_->bond_law({static_cast<int>(neighbours.size()), m.family.length.data(), m.omega.data(), m.extension.data(),
-                  m.modulus.data(), nullptr, m.force.data(), m.stiffness.data()});
+  law_.bond_law({static_cast<int>(neighbours.size()), m.family.length.data(), m.omega.data(), m.extension.data(),
+                 m.modulus.data(), nullptr, m.force.data(), m.stiffness.data()});
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     double T = m.force[k];
-    if (traits_.dilatation)
+    if (formulation_.dilatation)
       T += m.omega[k] * m.family.length[k] * (pressure_[row] + pressure_[static_cast<std::size_t>(neighbours[k])]);
     const double volumes = families().volume(row) * m.family.volume[k], turn = T * m.inverse_length[k];
     double* block = m.places.block(K, neighbours[k], entries);
@@ -121,7 +121,7 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
         block[a * D + b] -= value;
       }
   }
-  if (!traits_.dilatation) return;
+  if (!formulation_.dilatation) return;
   // Dilatations that this point enters: its own and those of its neighbours.
   const auto add = [&](std::size_t i, const double* slope) {
     const auto couple = [&](const double* other, std::int32_t l) {
@@ -147,7 +147,7 @@ template <int D>
 std::int64_t PairAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
   const std::size_t rows = families().rows();
   memory_.prepare([] { return std::make_unique<Memory>(); });
-  if (traits_.dilatation) {
+  if (formulation_.dilatation) {
     pressure_.resize(rows);
     stiffness_.resize(rows);
     slope_.resize(D * families().bonds());
@@ -160,7 +160,7 @@ std::int64_t PairAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
     });
   };
   over_rows([&](std::size_t r, Memory& m) {
-    if (!(traits_.dilatation ? dilatation(r, u, m) : stretch(r, u, m)))
+    if (!(formulation_.dilatation ? dilatation(r, u, m) : stretch(r, u, m)))
       bad.report(static_cast<std::int64_t>(families().point(r)));
   });
   if (bad.point() >= 0) return bad.point();
@@ -170,7 +170,7 @@ std::int64_t PairAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
 
 template <int D>
 std::size_t PairAssembly<D>::work_bytes() const noexcept {
-  return traits_.dilatation ? ((D + 2) * families().rows() + D * families().bonds()) * sizeof(double) : 0;
+  return formulation_.dilatation ? ((D + 2) * families().rows() + D * families().bonds()) * sizeof(double) : 0;
 }
 
 template class PairAssembly<1>;

@@ -33,8 +33,8 @@ class PairAssembly final : public Assembly {
   bool dilatation(std::size_t row, ConstFieldView u, Memory& m);
   void fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K, Memory& m) const;
 
-  std::shared_ptr<const Kinematics> law_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
+  const PairKinematics& law_;
   PairPoints points_;
   AlignedVector<double> pressure_;   ///< q_i = phi' d/m, by row
   AlignedVector<double> stiffness_;  ///< V_i phi'', by row

@@ -11,7 +11,7 @@ template <int D>
 bool PenaltyElement<D>::load(const ModelParts& parts, const PointFamilies& families, std::size_t row) {
   families.load(row, family_);
   if (family_.inverse_shape[0] == 0) return false;
-  const int order = parts.kinematics->traits().order;
+  const int order = parts.formulation.order;
   gradient_.clear();
   if (order > 1 && !point_gradient(family_, parts.body->horizon(), order, gradient_)) return false;
   const auto bonds = static_cast<std::size_t>(family_.bonds);

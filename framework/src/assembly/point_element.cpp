@@ -39,8 +39,8 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
   }
   families.load(row, s.family);
   const double intact = families.volume(row) * (1 - families.damage(row)), horizon = families.body().horizon();
-  if (shape.traits.at == EvaluationPoints::points) {
-    point_gradient(s.family, horizon, shape.traits.order, s.gradient);
+  if (shape.formulation.point) {
+    point_gradient(s.family, horizon, shape.formulation.order, s.gradient);
     out.g.assign(D * out.width, 0.0);
     write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
     out.points = 1;
@@ -48,9 +48,9 @@ void build_element(const PointFamilies& families, const ElementShape& shape, std
     return;
   }
   families.bond_shares(row, s.family, s.share);
-  s.stencil.build({shape.kinematics.get(), shape.traits, horizon}, s.family, s.share.data(), 0, nullptr);
+  s.stencil.build({&shape.formulation, horizon}, s.family, s.share.data(), 0, nullptr);
   s.stencil.expand(s.gradient);
-  const int owners = shape.traits.selective ? 1 : 0;
+  const int owners = shape.formulation.selective() ? 1 : 0;
   out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
   for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
     const double share = s.stencil.share(q);

@@ -11,8 +11,7 @@
 namespace perikit {
 
 struct ElementShape {
-  std::shared_ptr<const Kinematics> kinematics;
-  KinematicsTraits traits;
+  Formulation formulation;
   int parts = 1;  ///< evaluation points per point; 0: one per bond
 };
 

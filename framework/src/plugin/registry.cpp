@@ -13,6 +13,7 @@
 
 #include "perikit/plugin/abi.hpp"
 #include "perikit/sdk/plugin.hpp"
+#include "model/kinematics_class.hpp"
 #include "plugin/library.hpp"
 #include "plugin/manifest.hpp"
 #include "plugin/registrar.hpp"
@@ -263,7 +264,13 @@ std::vector<std::pair<Kind, std::string>> Registry::parts_of(const fs::path& lib
 }
 
 std::unique_ptr<Kinematics> Registry::kinematics(const PartValues& values) const {
-  return implementation_->create<Kinematics>(Kind::kinematics, values, *this);
+  std::unique_ptr<Kinematics> made = implementation_->create<Kinematics>(Kind::kinematics, values, *this);
+  try {
+    kinematics_class(*made);
+  } catch (const std::invalid_argument& error) {
+    throw implementation_->not_made(Kind::kinematics, values, error.what());
+  }
+  return made;
 }
 std::unique_ptr<Stabilization> Registry::stabilization(const PartValues& values) const {
   return implementation_->create<Stabilization>(Kind::stabilization, values, *this);

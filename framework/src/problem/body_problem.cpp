@@ -36,10 +36,9 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
       body_(partition_ ? partition_->part(static_cast<std::uint16_t>(scene.regions.size() + 1)) : whole_body(scene, damage_law_.get())) {
   if (partition_) ghosts_.emplace(*partition_, body_);
   influence_ = factory.influence(*scene_.influence);
-  kinematics_ = factory.kinematics(*scene_.kinematics);
-  const KinematicsTraits traits = kinematics_->traits();
+  formulation_ = make_formulation(factory.kinematics(*scene_.kinematics));
   const bool stress = body_.space() == Space::plane_stress || body_.space() == Space::line_stress;
-  if (traits.selective && stress) {
+  if (formulation_.selective() && stress) {
     throw InputError(
         scene_.body.position, "body",
         fmt::format(
@@ -51,7 +50,8 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
   internal_force_ = body_.make_field(dimension());
   read_damage();
   try {
-    model_ = make_model({&body_, kinematics_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, scene_.share, damage_.get()});
+    model_ = make_model({&body_, formulation_, influence_, laws_.get(), make_stabilization(factory), scene_.skip, scene_.share,
+                         damage_.get()});
   } catch (const std::domain_error& error) {
     throw InputError(scene_.body.position, scene_.body.lattice ? "body.lattice" : "body.points", error.what());
   }
@@ -63,8 +63,7 @@ BodyProblem::BodyProblem(const Scene& scene, const PartFactory& factory, bool qu
 
 std::shared_ptr<const Stabilization> BodyProblem::make_stabilization(const PartFactory& factory) const {
   if (!scene_.stabilization) return nullptr;
-  const KinematicsTraits traits = kinematics_->traits();
-  if (traits.at != EvaluationPoints::points)
+  if (!formulation_.point)
     throw InputError(scene_.kinematics->values.position("stabilization"), "kinematics.stabilization",
                      fmt::format("found '{}' over {}; allowed: over kinematics with one gradient per point", scene_.stabilization->type, scene_.kinematics->type));
   return factory.stabilization(*scene_.stabilization);
@@ -163,7 +162,7 @@ void BodyProblem::prepare_history(bool quasi_static) {
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene_.integrator->type),
              "an explicit integrator, or another material");
     }
-    if (kinematics_->traits().force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+    if (formulation_.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
   // The first evaluation only counts.
   model_->forces(displacement_, internal_force_, nullptr);

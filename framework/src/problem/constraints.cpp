@@ -172,9 +172,8 @@ std::vector<double> BodyProblem::face_shares(const Body& body, const LoadDescrip
       }
       return body.alive(static_cast<std::size_t>(p + sign * shift));
     };
-    const KinematicsTraits traits = kinematics_->traits();
-    const bool exact = traits.at != EvaluationPoints::pairs && traits.force_state == ForceState::variational;
-    const Field areas = exact ? face_areas(body, kinematics_, influence_, axis) : Field();
+    const bool exact = !formulation_.pairs && formulation_.force_state == ForceState::variational;
+    const Field areas = exact ? face_areas(body, formulation_, influence_, axis) : Field();
     const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / dx));   // that a face is felt in
     const double area = body.uniform_volume() / dx;
     double total = 0, wanted = 0;

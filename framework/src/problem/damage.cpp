@@ -32,18 +32,17 @@ double mean_bond_length(const InfluenceFunction& influence, int dimension, doubl
 
 void BodyProblem::read_damage() {
   if (!damage_law_) return;
-  const KinematicsTraits traits = kinematics_->traits();
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene_.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   if (partition_) refuse("a body on several ranks", "one rank");
-  if (traits.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
+  if (formulation_.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
   if (laws_->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene_.stabilization && traits.order > 1)
+  if (scene_.stabilization && formulation_.order > 1)
     refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
-  if (traits.at == EvaluationPoints::bonds && traits.order > 1) {
+  if (formulation_.bond && formulation_.order > 1) {
     refuse(
-        fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, traits.order),
+        fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene_.kinematics->type, formulation_.order),
         "order 1");
   }
   damage_ = std::make_unique<BodyDamage>();

@@ -31,7 +31,7 @@ class UnitMaterial final : public Material {
 
 }  // namespace
 
-Field face_areas(const Body& body, std::shared_ptr<const Kinematics> kinematics, std::shared_ptr<const InfluenceFunction> influence, int axis) {
+Field face_areas(const Body& body, const Formulation& formulation, std::shared_ptr<const InfluenceFunction> influence, int axis) {
   MaterialRecord record;
   record.material = std::make_shared<UnitMaterial>();
   record.traits = record.material->traits();
@@ -39,7 +39,8 @@ Field face_areas(const Body& body, std::shared_ptr<const Kinematics> kinematics,
   std::vector<MaterialRecord> records;
   records.push_back(std::move(record));
   const Laws laws(body.space(), std::move(records), {}, body.stride());
-  const std::unique_ptr<Model> model = make_model({.body = &body, .kinematics = std::move(kinematics), .influence = std::move(influence), .laws = &laws});
+  const std::unique_ptr<Model> model =
+      make_model({.body = &body, .formulation = formulation, .influence = std::move(influence), .laws = &laws});
   const Field rest = body.make_field(body.dimension());
   Field stretch = body.make_field(body.dimension()), areas = body.make_field(body.dimension()), area = body.make_field(1);
   for (const std::int32_t p : body.internal()) stretch.component(axis)[p] = body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)];

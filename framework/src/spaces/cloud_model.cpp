@@ -15,17 +15,17 @@ namespace perikit {
 
 template <int D>
 CloudModel<D>::CloudModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.share && !laws_.history()),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), formulation_(parts.formulation),
+      pairs_(formulation_.pair_symmetric && parts.share && !laws_.history()),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
-      families_(body_, *parts.influence, traits_.weight) {
+      families_(body_, *parts.influence, formulation_.weight) {
   const std::size_t n = body_.points();
   if (parts.damage) this->watch_bonds(families_.bond_state());
   const BlockReach reach = cloud_reach(families_.lists, n);
   if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(reach);
   u_.resize(n);
   flux_.resize(D * n);
-  if (traits_.at == EvaluationPoints::bonds) {
+  if (formulation_.bond) {
     gradient_.resize(D * n);
     force_.resize(n);
     colouring_ = Colouring(reach);
@@ -36,8 +36,8 @@ CloudModel<D>::CloudModel(const ModelParts& parts)
       upper_[p] = families_.lists.first[p] + (std::upper_bound(family.begin(), family.end(), static_cast<std::int32_t>(p)) - family.begin());
       scale_[p] = families_.normaliser[p] > 0 ? position_[p][3] / families_.normaliser[p] : 0.0;
     }
-    if (traits_.order > 1) store_stencils();
-    if (traits_.selective) {
+    if (formulation_.order > 1) store_stencils();
+    if (formulation_.selective()) {
       volume_.resize(n);
       pressure_.resize(n);
       for (std::size_t p = 0; p < n; ++p) volume_[p][volume_share] = share_of_volume(p);
@@ -54,7 +54,7 @@ void CloudModel<D>::store_stencils() {
     std::vector<double> g;
     for (std::size_t p = b * block_points; p < std::min(body_.points(), (b + 1) * block_points); ++p) {
       families_.load(p, family);
-      lower += reproducing_kernel(family, body_.horizon(), traits_.order, g) < traits_.order;
+      lower += reproducing_kernel(family, body_.horizon(), formulation_.order, g) < formulation_.order;
       std::copy(g.begin(), g.end(), stencil_.begin() + D * families_.lists.first[p]);
     }
   });
@@ -156,10 +156,10 @@ void CloudModel<D>::points_block(std::size_t b, Pass& pass) {
 
 template <int D>
 int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy) {
-  const bool sample = pass.work.work() == Work::sample, tangent = pass.work.tangent(), mean = traits_.base == BondBase::mean;
+  const bool sample = pass.work.work() == Work::sample, tangent = pass.work.tangent(), mean = formulation_.base == BondBase::mean;
   const bool half = pairs_ && !pass.alone();
-  double* const H = traits_.selective ? s.Ht : s.H;
-  double* const dH = traits_.selective ? s.dHt : s.dH;
+  double* const H = formulation_.selective() ? s.Ht : s.H;
+  double* const dH = formulation_.selective() ? s.dHt : s.dH;
   double* xi = s.bond[0];
   double* g = s.bond[1];
   double* length = s.bond[2];
@@ -189,7 +189,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
       omega[l] = real ? families_.omega[k] : 0.0;
       volume[l] = real ? position_[j][3] : 0.0;
-      const double factor = !real ? 0.0 : traits_.weight == BondWeight::kernel ? families_.omega[k] : families_.integrity(k);
+      const double factor = !real ? 0.0 : formulation_.weight == BondWeight::kernel ? families_.omega[k] : families_.integrity(k);
       s.weight[l] = scale_[p] * position_[j][3] * factor;
       s.far_weight[l] = scale_[j] * x[3] * factor;
       s.owner[l] = static_cast<std::int32_t>(p);
@@ -203,7 +203,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       for (int c = 0; c < D; ++c) s.du[c * batch_points + l] = s.dw[c * batch_points + l] = 0.0;
       for (int c = 0; c < D * D; ++c) s.A[c * batch_points + l] = s.dA[c * batch_points + l] = 0.0;
     }
-    if (traits_.selective) {
+    if (formulation_.selective()) {
       // One group for the owner, then those of the far ends.
       constexpr int group = static_cast<int>(padding);
       s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular == 0 && !families_.fails()};
@@ -217,7 +217,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
       }
     }
     const FamilyView view{D, n, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, &families_.inverse[6 * p], 0};
-    kinematics_->correction(view, g, batch_points);
+    formulation_.bond->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
     bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
     if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, dH);
@@ -244,7 +244,7 @@ int CloudModel<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
         if (mean) flux_[D * j + static_cast<std::size_t>(e)] += stress;
       }
     }
-    if (traits_.selective) {
+    if (formulation_.selective()) {
       const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };
       for (int l = 0; l < n; ++l) {
         pressure_[p] += pressure(l);
@@ -345,7 +345,7 @@ template <int D>
 EvaluationStatus CloudModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   mirror_rows(pass.u, body_.points(), u_);
-  const bool alone = pass.alone(), tangent = pass.work.tangent(), points = traits_.at == EvaluationPoints::points;
+  const bool alone = pass.alone(), tangent = pass.work.tangent(), points = formulation_.point != nullptr;
   const int last = points ? 2 : 3;
   if (tangent) mirror_rows(pass.w, body_.points(), w_);
   if (alone || tangent) quiet_.wake();
@@ -368,15 +368,15 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
         if (tangent) gradient_rows(p, w_, direction_);
         force_[p] = Row{};
         for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
-        if (traits_.selective) pressure_[p] = Row{};
+        if (formulation_.selective()) pressure_[p] = Row{};
       });
-      if (traits_.selective) volumes_block(b, tangent);
+      if (formulation_.selective()) volumes_block(b, tangent);
     });
     if (alone) {
       parallel_for(blocks(), [&](std::size_t b) { bonds_block(b, pass); });
     } else {
       colouring_.for_each(awake(2, [&](std::size_t b) { bonds_block(b, pass); }));
-      if (traits_.selective) parallel_for(blocks(), awake(2, [&](std::size_t b) { pressures_block(b, tangent); }));
+      if (formulation_.selective()) parallel_for(blocks(), awake(2, [&](std::size_t b) { pressures_block(b, tangent); }));
       if (stencil_.empty()) {
         parallel_for(blocks(), awake(2, [&](std::size_t b) { over_points(b, [&](std::size_t p) { flux_row(p, &flux_[D * p], &flux_[D * p]); }); }));
       } else {
@@ -397,32 +397,32 @@ EvaluationStatus CloudModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus CloudModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, traits_.selective, blocks(), u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, formulation_.selective(), blocks(), u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus CloudModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
+  const BatchWork work(laws_, Work::tangent, false, formulation_.selective());
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus CloudModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, formulation_.selective(), u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 std::vector<BondChange> CloudModel<D>::bonds_changed(std::span<const std::int32_t> points) {
   std::vector<BondChange> fragments = families_.changed(points);
-  if (traits_.selective)
+  if (formulation_.selective())
     for (const std::int32_t p : points) volume_[static_cast<std::size_t>(p)][volume_share] = share_of_volume(static_cast<std::size_t>(p));
   return fragments;
 }
 
 template <int D>
 double CloudModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
-  return run_energy(body_, laws_, traits_.selective, blocks(), u, marks, families_.bond_state(),
+  return run_energy(body_, laws_, formulation_.selective(), blocks(), u, marks, families_.bond_state(),
                     [&](Pass& pass) { return run(pass); });
 }
 
@@ -433,7 +433,7 @@ ModelReport CloudModel<D>::report() const {
   report.broken_bonds = families_.broken;
   report.singular_families = families_.singular;
   report.fallbacks = fallbacks_;
-  const bool bonds = traits_.at == EvaluationPoints::bonds;
+  const bool bonds = formulation_.bond != nullptr;
   report.evaluation_points = bonds ? (pairs_ ? report.bonds / 2 : report.bonds) : body_.points();
   report.bytes = families_.bytes() + stencil_.size() * sizeof(double) + upper_.size() * sizeof(std::int64_t) +
                  scale_.size() * sizeof(double) +

@@ -57,13 +57,12 @@ class CloudModel final : public AssemblingModel {
   /// Rows of Q = S K^-1 from rows of S.
   void flux_row(std::size_t p, const Row* S, Row* Q) const noexcept;
   void divergence(std::size_t p, FieldView out) const noexcept;
-  int bonds_at_once() const noexcept { return traits_.selective && pairs_ ? batch_points / 2 : batch_points; }
+  int bonds_at_once() const noexcept { return formulation_.selective() && pairs_ ? batch_points / 2 : batch_points; }
   std::size_t blocks() const noexcept { return (body_.points() + block_points - 1) / block_points; }
 
   const Body& body_;
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> kinematics_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
   bool pairs_;
   const Row* position_;                        ///< {x, y, z, V}
   CloudFamilies families_;

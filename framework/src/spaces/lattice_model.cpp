@@ -37,10 +37,10 @@ std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<st
 
 template <int D>
 LatticeModel<D>::LatticeModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      pairs_(traits_.at == EvaluationPoints::bonds && traits_.pair_symmetric && parts.share && !laws_.history()),
-      families_(body_, *parts.influence, traits_.weight, laws_.history() && traits_.at == EvaluationPoints::points), operator_(families_),
-      slots_at_once_(traits_.selective && pairs_ ? slots_at_once / 2 : slots_at_once) {
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), formulation_(parts.formulation),
+      pairs_(formulation_.pair_symmetric && parts.share && !laws_.history()),
+      families_(body_, *parts.influence, formulation_.weight, laws_.history() && formulation_.point), operator_(families_),
+      slots_at_once_(formulation_.selective() && pairs_ ? slots_at_once / 2 : slots_at_once) {
   if (parts.skip && !laws_.history()) quiet_ = QuietBlocks(families_.reach);
   if (parts.damage) this->watch_bonds(bonds_.emplace(families_));
   const auto alive = body_.alive_bits();
@@ -50,15 +50,15 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
       const std::uint8_t live = alive[static_cast<std::size_t>(first / chunk_points)];
       if (live != 0xff) partly_dead_.emplace_back(first, live);
     }
-  if (traits_.at != EvaluationPoints::bonds) {
+  if (!formulation_.bond) {
     row_gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.row_reach)));
     for (const LatticeRow& row : families_.rows) most_cells_ = std::max(most_cells_, static_cast<std::int64_t>(rows_at_once(row)) * row_width(row));
     return;
   }
-  if (traits_.order > 1) stencils_.emplace(families_, traits_.order);
+  if (formulation_.order > 1) stencils_.emplace(families_, formulation_.order);
   flux_ = body_.make_field(D * D);
   gradient_ = body_.make_field(D * D);
-  if (traits_.selective) {
+  if (formulation_.selective()) {
     volume_ = body_.make_field(volume_components);
     pressure_ = body_.make_field(2);
     for (const LatticeChunk& chunk : families_.chunks)
@@ -82,16 +82,16 @@ LatticeModel<D>::LatticeModel(const ModelParts& parts)
     length[s] = std::sqrt(r2);
     volume[s] = families_.volume;
     omega[s] = families_.omega[s];
-    slot_weight_.push_back(families_.volume * (traits_.weight == BondWeight::kernel ? omega[s] : 1.0));
+    slot_weight_.push_back(families_.volume * (formulation_.weight == BondWeight::kernel ? omega[s] : 1.0));
   }
   FamilyView view{D, static_cast<int>(slots), body_.horizon(), {slot_xi_[0].data(), slot_xi_[1].data(), slot_xi_[2].data()},
                   length.data(), volume.data(), omega.data(), nullptr, 0};
   double inverse[6];
   families_.inverse_shape(families_.whole, 0, inverse);
   view.inverse_shape = inverse;
-  kinematics_->correction(view, g.data(), size);
+  formulation_.bond->correction(view, g.data(), size);
   for (int c = 0; c < D; ++c) slot_g_[c].assign(g.begin() + static_cast<std::ptrdiff_t>(c * size), g.begin() + static_cast<std::ptrdiff_t>((c + 1) * size));
-  if (!traits_.g_from_xi_only) store_corrections();
+  if (!formulation_.g_from_xi_only) store_corrections();
 }
 
 template <int D>
@@ -276,7 +276,7 @@ void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
   if (!pass.alone()) {
     zero_rows(block, pass.out);
     zero_rows(block, flux_);
-    if (traits_.selective) zero_rows(block, pressure_);
+    if (formulation_.selective()) zero_rows(block, pressure_);
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     if (!pass.gradient_wanted(families_.chunks[c].first)) {
@@ -294,7 +294,7 @@ void LatticeModel<D>::gradient_block(std::size_t b, Pass& pass) {
     }
     c += static_cast<std::size_t>(n);
   }
-  for (std::size_t c = block.chunk_begin; c < block.chunk_end && traits_.selective; ++c) {
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end && formulation_.selective(); ++c) {
     if (!pass.gradient_wanted(families_.chunks[c].first)) continue;
     owner_volume(laws_.space(), owner_gradients(families_.chunks[c], tangent), volume_.data() + families_.chunks[c].first, volume_.stride());
   }
@@ -333,7 +333,7 @@ void LatticeModel<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
 
 template <int D>
 void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const {
-  if (chunk.pattern < 0 || traits_.g_from_xi_only) {
+  if (chunk.pattern < 0 || formulation_.g_from_xi_only) {
     vectors.per_slot = true;
     for (int c = 0; c < D; ++c) {
       vectors.xi[c] = slot_xi_[c].data() + slot;
@@ -375,7 +375,7 @@ void LatticeModel<D>::bond_vectors(const LatticeChunk& chunk, std::size_t slot, 
     for (int e = 0; e < symmetric_components(D); ++e) inverse[e * batch_points + l] = own[e];
   }
   const FamilyView view{D, lanes, body_.horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, length, volume, omega, inverse, batch_points};
-  kinematics_->correction(view, g, batch_points);
+  formulation_.bond->correction(view, g, batch_points);
   vectors.per_slot = false;
   for (int c = 0; c < D; ++c) {
     vectors.xi[c] = xi + c * batch_points;
@@ -387,12 +387,12 @@ template <int D>
 int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy) {
   const LatticePattern& pattern = families_.pattern(chunk);
   const LaneFactors& factors = lane_factors();
-  const bool mean = traits_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
+  const bool mean = formulation_.base == BondBase::mean, tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample;
   const bool both_ends = pairs_ && !pass.alone();
   const std::int64_t p = chunk.first;
-  double* const H = traits_.selective ? s.Ht : s.H;
-  double* const dH = traits_.selective ? s.dHt : s.dH;
-  if (traits_.selective) point_to_volumes(chunk, slot, slots, s);
+  double* const H = formulation_.selective() ? s.Ht : s.H;
+  double* const dH = formulation_.selective() ? s.dHt : s.dH;
+  if (formulation_.selective()) point_to_volumes(chunk, slot, slots, s);
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
@@ -442,7 +442,7 @@ int LatticeModel<D>::bonds_of_chunk(const LatticeChunk& chunk, std::size_t slot,
   }
   if (pass.only) return -1;
   choose(adjoint);
-  if (traits_.selective) add_pressures(chunk, slot, slots, s, both_ends, tangent);
+  if (formulation_.selective()) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
 }
 
@@ -473,7 +473,7 @@ void LatticeModel<D>::finish_stress(std::size_t b, Pass& pass) {
   for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) {
     const LatticeChunk& chunk = families_.chunks[c];
     double* const stress = flux_.data() + chunk.first;
-    if (traits_.selective) {
+    if (formulation_.selective()) {
       add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
                        stress, flux_.stride());
     }
@@ -512,7 +512,7 @@ template <int D>
 EvaluationStatus LatticeModel<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   const std::size_t blocks = families_.blocks.size();
-  const bool alone = pass.alone(), points = traits_.at == EvaluationPoints::points;
+  const bool alone = pass.alone(), points = formulation_.point != nullptr;
   const int last = points ? 2 : 3;
   if (alone || pass.work.tangent()) quiet_.wake();
   else quiet_.look(last, [&](std::size_t b) { return families_.moves(b, pass.u); });
@@ -542,33 +542,33 @@ EvaluationStatus LatticeModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus LatticeModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, traits_.selective, families_.blocks.size(), u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, formulation_.selective(), families_.blocks.size(), u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus LatticeModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  if (traits_.at == EvaluationPoints::bonds && direction_.size() == 0) direction_ = body_.make_field(D * D);
-  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
+  if (formulation_.bond && direction_.size() == 0) direction_ = body_.make_field(D * D);
+  const BatchWork work(laws_, Work::tangent, false, formulation_.selective());
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus LatticeModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, formulation_.selective(), u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 std::vector<BondChange> LatticeModel<D>::bonds_changed(std::span<const std::int32_t> points) {
   for (const std::int32_t p : points)
-    if (traits_.selective)
+    if (formulation_.selective())
       volume_.component(volume_share)[p] = share_of_volume(families_.chunks[static_cast<std::size_t>(families_.chunk_of(p))], p % chunk_points);
   return families_.fragment_bonds(points);
 }
 
 template <int D>
 double LatticeModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
-  return run_energy(body_, laws_, traits_.selective, families_.blocks.size(), u, marks, *bonds_,
+  return run_energy(body_, laws_, formulation_.selective(), families_.blocks.size(), u, marks, *bonds_,
                     [&](Pass& pass) { return run(pass); });
 }
 
@@ -598,7 +598,7 @@ ModelReport LatticeModel<D>::report() const {
   report.bytes = families_.bytes() + (stencils_ ? stencils_->bytes() : 0) + row_bytes + flux_.bytes() + gradient_.bytes() +
                  direction_.bytes() + scale_.bytes() + volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
                  (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double) + this->fracture_bytes();
-  const bool bonds = traits_.at == EvaluationPoints::bonds;
+  const bool bonds = formulation_.bond != nullptr;
   report.evaluation_points = bonds ? (pairs_ ? families_.bonds / 2 : families_.bonds) : body_.points();
   const double per_bond = static_cast<double>(families_.bonds);
   report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",

@@ -70,8 +70,7 @@ class LatticeModel final : public AssemblingModel {
 
   const Body& body_;
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> kinematics_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
   bool pairs_;                       ///< each bond evaluated once for both ends
   LatticeFamilies families_;
   LatticeOperator<D> operator_;      ///< order 1

@@ -10,8 +10,8 @@ namespace perikit {
 
 template <int D>
 LocalForceModel<D>::LocalForceModel(const ModelParts& parts, std::unique_ptr<Model> variational)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), kinematics_(parts.kinematics), traits_(kinematics_->traits()),
-      variational_(std::move(variational)), families_(body_, *parts.influence, traits_.weight),
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), formulation_(parts.formulation),
+      variational_(std::move(variational)), families_(body_, *parts.influence, formulation_.weight),
       family_volume_(family_volumes(body_, *parts.influence)), colouring_(cloud_reach(families_.lists(), families_.rows())) {}
 
 /// H[(c * D + e) * stride] of a stencil.
@@ -34,9 +34,9 @@ void LocalForceModel<D>::gradient(std::size_t row, const double* g, ConstFieldVi
 template <int D>
 bool LocalForceModel<D>::bond_forces(std::size_t row, Memory& m, BatchScratch& s, Pass& pass) const {
   LocalForcePoint<D>& point = m.point;
-  point.build(*kinematics_, families_, row, family_volume_[row]);
+  point.build(*formulation_.weighted, families_, row, family_volume_[row]);
   const auto bonds = static_cast<std::size_t>(point.family.bonds);
-  const bool tangent = pass.work.tangent(), selective = traits_.selective;
+  const bool tangent = pass.work.tangent(), selective = formulation_.selective();
   double* const H = selective ? s.Ht : s.H;
   double* const dH = selective ? s.dHt : s.dH;
   double pressure[2][padding] = {}, owner_H[9 * padding] = {}, owner_dH[9 * padding] = {};
@@ -113,14 +113,14 @@ EvaluationStatus LocalForceModel<D>::forces(ConstFieldView u, FieldView force, d
     const EvaluationStatus status = variational_->forces(u, force, energy);
     if (!status.ok()) return status;
   }
-  const BatchWork work(laws_, Work::force, false, traits_.selective);
+  const BatchWork work(laws_, Work::force, false, formulation_.selective());
   Pass pass{work, u, {}, force, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus LocalForceModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
+  const BatchWork work(laws_, Work::tangent, false, formulation_.selective());
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }

@@ -44,8 +44,7 @@ class LocalForceModel final : public AssemblingModel {
 
   const Body& body_;
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> kinematics_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
   std::unique_ptr<Model> variational_;
   PointFamilies families_;
   std::vector<double> family_volume_;  ///< sum of V over the whole family, by row

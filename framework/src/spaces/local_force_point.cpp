@@ -28,7 +28,7 @@ bool stencil(const FamilyArrays& f, const double* omega, double* g) {
 }  // namespace
 
 template <int D>
-void LocalForcePoint<D>::build(const Kinematics& kinematics, const PointFamilies& families, std::size_t row, double family_volume) {
+void LocalForcePoint<D>::build(const WeightedKinematics& kinematics, const PointFamilies& families, std::size_t row, double family_volume) {
   families.load(row, family);
   families.bond_shares(row, family, share);
   point_gradient(family, families.body().horizon(), 1, own);

@@ -19,7 +19,7 @@ struct LocalForcePoint {
     return domain.data() + (q * static_cast<std::size_t>(family.bonds) + k) * D;
   }
   /// For one block row of families. family_volume: sum of V over the whole family.
-  void build(const Kinematics& kinematics, const PointFamilies& families, std::size_t row, double family_volume);
+  void build(const WeightedKinematics& kinematics, const PointFamilies& families, std::size_t row, double family_volume);
 
  private:
   AlignedVector<double> omega_;

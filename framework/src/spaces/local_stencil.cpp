@@ -216,7 +216,7 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
   lever_.resize(D * row_);
   if (rules.at_points()) {
     std::vector<double> g;
-    fallbacks_ = reproducing_kernel(family, rules.horizon, rules.traits.order, g) < rules.traits.order;
+    fallbacks_ = reproducing_kernel(family, rules.horizon, rules.formulation->order, g) < rules.formulation->order;
     std::fill(lever_.begin(), lever_.end(), 0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
       for (std::size_t e = 0; e < D; ++e) lever_[e * row_ + k] = g[k * D + e];
@@ -229,14 +229,14 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
 template <int D>
 void LocalStencil<D>::weigh(const StencilRules& rules, const FamilyArrays& family, double* rows) {
   FamilyView view = family.view(rules.horizon);
-  if (family.integrity.empty()) return rules.kinematics->weights(view, rows, row_);
+  if (family.integrity.empty()) return rules.formulation->weighted->weights(view, rows, row_);
   // Weakened bonds: the influence is that of whole ones, times b, however a kinematics makes use of omega.
   whole_.assign(row_, 0.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
     if (family.integrity[k] > 0) whole_[k] = family.omega[k] / family.integrity[k];
   view.omega = whole_.data();
-  rules.kinematics->weights(view, rows, row_);
-  for (int q = rules.traits.selective ? 1 : 0; q < points_; ++q, rows += row_)
+  rules.formulation->weighted->weights(view, rows, row_);
+  for (int q = rules.formulation->selective() ? 1 : 0; q < points_; ++q, rows += row_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k) rows[k] *= family.integrity[k];
 }
 
@@ -248,7 +248,7 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
   fallbacks_ = dropped_ = 0;
   set_lever(rules, family);
   constexpr std::size_t entries = symmetric_components(D);
-  const int parts = rules.at_points() ? 1 : rules.kinematics->parts(D), first = rules.traits.selective ? 1 : 0;
+  const int parts = rules.formulation->parts(D), first = rules.formulation->selective() ? 1 : 0;
   const bool by_bond = parts == 0;
   points_ = first + (by_bond ? bonds_ : parts);
   lanes_ = padded(static_cast<std::size_t>(points_));
@@ -295,7 +295,7 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
       use_family(q);
     } else if (!regular) {
       ++dropped_;
-    } else if (rules.traits.part_weight == PartWeight::equal) {
+    } else if (rules.formulation->part_weight == PartWeight::equal) {
       total += share = 1.0;
     } else {
       // Volume of the part: bonds that it shares count with their share.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "perikit/core/field.hpp"
-#include "perikit/model/kinematics.hpp"
+#include "perikit/model/formulation.hpp"
 
 namespace perikit {
 
@@ -27,10 +27,9 @@ struct FamilyArrays {
 
 /// What the stencil of any family needs to know.
 struct StencilRules {
-  const Kinematics* kinematics;
-  KinematicsTraits traits;
+  const Formulation* formulation;
   double horizon;
-  bool at_points() const noexcept { return traits.at == EvaluationPoints::points; }  ///< a point gradient of higher order
+  bool at_points() const noexcept { return formulation->point != nullptr; }  ///< a point gradient of higher order
 };
 
 /// Evaluation points of one point. With the selective map, the owner's own gradient comes first, with no share.

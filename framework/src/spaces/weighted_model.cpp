@@ -18,12 +18,11 @@ WeightedModel<D>::WeightedModel(const ModelParts& parts)
     : AssemblingModel(parts),
       body_(*parts.body),
       laws_(*parts.laws),
-      kinematics_(parts.kinematics),
-      traits_(kinematics_->traits()),
-      rules_{kinematics_.get(), traits_, body_.horizon()},
+      formulation_(parts.formulation),
+      rules_{&formulation_, body_.horizon()},
       share_(parts.share),
-      owners_(traits_.selective ? 1 : 0),
-      parts_(rules_.at_points() ? 1 : kinematics_->parts(D)),
+      owners_(formulation_.selective() ? 1 : 0),
+      parts_(formulation_.parts(D)),
       condition_(body_.make_field(1)),
       damage_(body_.make_field(1)) {
   if (body_.lattice())
@@ -81,7 +80,7 @@ std::vector<BondChange> WeightedModel<D>::bonds_changed(std::span<const std::int
 template <int D>
 double WeightedModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
   const BondState& bonds = lattice_ ? static_cast<const BondState&>(*lattice_bonds_) : cloud_->bond_state();
-  return run_energy(body_, laws_, traits_.selective, block_first_.size() - 1, u, marks, bonds,
+  return run_energy(body_, laws_, formulation_.selective(), block_first_.size() - 1, u, marks, bonds,
                     [&](Pass& pass) { return run(pass); });
 }
 
@@ -119,7 +118,7 @@ void WeightedModel<D>::load_own_family(std::int32_t p, Memory& m) const {
 
 template <int D>
 void WeightedModel<D>::prepare_lattice(const InfluenceFunction& influence) {
-  const LatticeFamilies& f = lattice_.emplace(body_, influence, traits_.weight);
+  const LatticeFamilies& f = lattice_.emplace(body_, influence, formulation_.weight);
   quiet_ = QuietBlocks(f.reach);
   bonds_ = f.bonds;
   broken_ = f.broken;
@@ -202,7 +201,7 @@ void WeightedModel<D>::group_points(std::span<const std::int32_t> points, std::i
 
 template <int D>
 void WeightedModel<D>::prepare_cloud(const InfluenceFunction& influence) {
-  const CloudFamilies& f = cloud_.emplace(body_, influence, traits_.weight);
+  const CloudFamilies& f = cloud_.emplace(body_, influence, formulation_.weight);
   bonds_ = f.bonds();
   broken_ = f.broken;
   singular_ = f.singular;
@@ -244,7 +243,7 @@ template <int D>
 void WeightedModel<D>::set_lattice_shares(double scale, Memory& m) const {
   m.share.assign(m.family.size, 0.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(m.family.bonds); ++k)
-    m.share[k] = scale * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
+    m.share[k] = scale * (formulation_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
 }
 
 template <int D>
@@ -252,7 +251,7 @@ void WeightedModel<D>::set_cloud_shares(std::size_t p, Memory& m) const {
   m.share.assign(m.family.size, 0.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(m.family.bonds); ++k) {
     const double b = m.family.integrity.empty() ? 1.0 : m.family.integrity[k];
-    m.share[k] = m.family.volume[k] * (traits_.weight == BondWeight::kernel ? m.family.omega[k] : b) / cloud_->normaliser[p];
+    m.share[k] = m.family.volume[k] * (formulation_.weight == BondWeight::kernel ? m.family.omega[k] : b) / cloud_->normaliser[p];
   }
 }
 
@@ -372,13 +371,13 @@ std::int32_t WeightedModel<D>::evaluate_family(std::int32_t p, Memory& m, BatchS
   build(m, tangent ? 2 : 1, fields);
   LocalStencil<D>& stencil = m.stencil;
   double pressure[2][8] = {};  // on the owner's gradient (selective map), and its rate
-  double* const H = traits_.selective ? s.Ht : s.H;
-  double* const dH = traits_.selective ? s.dHt : s.dH;
+  double* const H = formulation_.selective() ? s.Ht : s.H;
+  double* const dH = formulation_.selective() ? s.dHt : s.dH;
   for (int first = 0; first < stencil.points(); first += batch_points) {
     const int n = std::min(batch_points, stencil.points() - first);
     stencil.gradient(0, first, n, H, batch_points);
     if (tangent) stencil.gradient(1, first, n, dH, batch_points);
-    if (traits_.selective && first == 0) keep_owner_gradients(1, left(p), m, s, tangent);
+    if (formulation_.selective() && first == 0) keep_owner_gradients(1, left(p), m, s, tangent);
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
       s.weight[l] = weight(p, stencil.share(first + l));
@@ -386,14 +385,14 @@ std::int32_t WeightedModel<D>::evaluate_family(std::int32_t p, Memory& m, BatchS
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
     if (sample) pass.work.add_samples(n, s, *pass.sums);
     if (alone) continue;
-    for (int l = 0; l < n && traits_.selective; ++l) {
+    for (int l = 0; l < n && formulation_.selective(); ++l) {
       pressure[0][0] += s.pressure[l];
       if (tangent) pressure[1][0] += s.pressure_rate[l];
     }
     stencil.add_stress(first, n, s.P, batch_points);
   }
   if (alone) return -1;
-  if (traits_.selective) {
+  if (formulation_.selective()) {
     double stress[D * D][8] = {};
     add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, pressure[0], pressure[1], stress[0], 8);
     for (auto& component : stress) std::fill_n(component + 1, 7, 0.0);
@@ -432,8 +431,8 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
   coefficients(pass.u, m.u, m.m);
   if (tangent) coefficients(pass.w, m.w, m.dm);
   double lane_weight[8], pressure[2][8] = {};  // pressure: on the owners' gradients (selective map), and its rate
-  double* const H = traits_.selective ? s.Ht : s.H;
-  double* const dH = traits_.selective ? s.dHt : s.dH;
+  double* const H = formulation_.selective() ? s.Ht : s.H;
+  double* const dH = formulation_.selective() ? s.dHt : s.dH;
   for (int l = 0; l < 8; ++l) lane_weight[l] = here >> l & 1 ? weight(members[l], 1.0) : 0.0;
   const std::vector<MirrorBasis::Orbit>& orbits = stencil.point_basis().orbits;
   for (auto begin = orbits.begin(); begin != orbits.end();) {
@@ -450,17 +449,17 @@ std::int32_t WeightedModel<D>::together(const Group& g, Memory& m, BatchScratch&
           s.weight[(slots + i) * 8 + l] = lane_weight[l] * stencil.share(end->element[i]);
         }
     }
-    if (traits_.selective && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
+    if (formulation_.selective() && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
     if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
-    if (traits_.selective && !alone) add_pressures(slots * 8, s, tangent, pressure);
+    if (formulation_.selective() && !alone) add_pressures(slots * 8, s, tangent, pressure);
     slots = 0;
     for (; begin != end; slots += begin++->size)
       if (!alone) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
   }
   if (alone) return -1;
-  if (traits_.selective) {
+  if (formulation_.selective()) {
     owner_stresses(m, tangent, pressure, s);
     orbit_stresses<D>(orbits.front(), s.P, 0, m.m.data());
   }
@@ -488,15 +487,15 @@ std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memor
     for (std::size_t l = 0; l < members.size(); ++l)
       stencils.scatter(stencil + l, first, n, static_cast<std::size_t>(members[l]), s.P + l, batch_points, out_rows_.data());
   };
-  double* const H = traits_.selective ? s.Ht : s.H;
-  double* const dH = traits_.selective ? s.dHt : s.dH;
+  double* const H = formulation_.selective() ? s.Ht : s.H;
+  double* const dH = formulation_.selective() ? s.dHt : s.dH;
   double pressure[2][8] = {};  // on the owners' gradients (selective map), and its rate
   for (int first = 0; first < owners_ + parts_; first += batch_points / 8) {
     const int n = std::min(batch_points / 8, owners_ + parts_ - first);
     gradients(u_rows_, first, n, H);
     if (tangent) gradients(w_rows_, first, n, dH);
     if (!all) clear_lanes(here, 0, n, H, tangent ? dH : nullptr);
-    if (traits_.selective && first == 0) keep_owner_gradients(8, 1.0, m, s, tangent);
+    if (formulation_.selective() && first == 0) keep_owner_gradients(8, 1.0, m, s, tangent);
     for (int l = 0; l < 8 * n; ++l) {
       const auto lane = static_cast<std::size_t>(l % 8);
       s.owner[l] = members[lane < members.size() ? lane : 0];
@@ -506,10 +505,10 @@ std::int32_t WeightedModel<D>::side_by_side(const Group& g, std::size_t b, Memor
     if (bad >= 0) return s.owner[bad];
     if (sample) pass.work.add_samples(8 * n, s, *pass.sums);
     if (alone) continue;
-    if (traits_.selective) add_pressures(8 * n, s, tangent, pressure);
+    if (formulation_.selective()) add_pressures(8 * n, s, tangent, pressure);
     scatter(first, n);
   }
-  if (alone || !traits_.selective) return -1;
+  if (alone || !formulation_.selective()) return -1;
   owner_stresses(m, tangent, pressure, s);
   scatter(0, 1);
   return -1;
@@ -578,19 +577,19 @@ EvaluationStatus WeightedModel<D>::run(Pass& pass) {
 
 template <int D>
 EvaluationStatus WeightedModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
-  return run_forces(laws_, traits_.selective, block_first_.size() - 1, u, force, energy, [&](Pass& pass) { return run(pass); });
+  return run_forces(laws_, formulation_.selective(), block_first_.size() - 1, u, force, energy, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>
 EvaluationStatus WeightedModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const BatchWork work(laws_, Work::tangent, false, traits_.selective);
+  const BatchWork work(laws_, Work::tangent, false, formulation_.selective());
   Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
   return run(pass);
 }
 
 template <int D>
 EvaluationStatus WeightedModel<D>::sample(ConstFieldView u, PointSamples& samples) {
-  return run_samples(body_, laws_, traits_.selective, u, samples, [&](Pass& pass) { return run(pass); });
+  return run_samples(body_, laws_, formulation_.selective(), u, samples, [&](Pass& pass) { return run(pass); });
 }
 
 template <int D>

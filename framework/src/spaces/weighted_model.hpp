@@ -111,8 +111,7 @@ class WeightedModel final : public AssemblingModel {
 
   const Body& body_;
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> kinematics_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
   StencilRules rules_;
   bool share_;
   int owners_;  ///< evaluation points without a share, for the selective map

@@ -61,7 +61,7 @@ class CloudPairs final : public PairLoop {
   void gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept;
 
   const Body& body_;
-  const Kinematics& law_;
+  const PairKinematics& law_;
   const PairFields& fields_;
   bool dilatation_, half_;
   const Row* position_;                        ///< {x, y, z, V}
@@ -78,7 +78,7 @@ class CloudPairs final : public PairLoop {
 
 template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
-    : body_(parts.body), law_(parts.law), fields_(parts.fields), dilatation_(parts.law.traits().dilatation), half_(parts.half),
+    : body_(parts.body), law_(parts.law), fields_(parts.fields), dilatation_(parts.law.dilatation() != nullptr), half_(parts.half),
       position_(reinterpret_cast<const Row*>(body_.rows().data())),
       lists_(find_families(body_.rows(), body_.points(), D, body_.horizon())) {
   const std::size_t n = body_.points();

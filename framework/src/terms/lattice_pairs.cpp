@@ -19,7 +19,7 @@ template <int D>
 class LatticePairs final : public PairLoop {
  public:
   explicit LatticePairs(const PairLoopParts& parts)
-      : law_(parts.law), fields_(parts.fields), dilatation_(parts.law.traits().dilatation), half_(parts.half),
+      : law_(parts.law), fields_(parts.fields), dilatation_(parts.law.dilatation() != nullptr), half_(parts.half),
         families_(parts.body, parts.influence, BondWeight::volume), squared_volume_(families_.volume * families_.volume) {
     if (parts.quiet) watch(families_.reach);
     for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
@@ -97,7 +97,7 @@ class LatticePairs final : public PairLoop {
 
   void family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const;
 
-  const Kinematics& law_;
+  const PairKinematics& law_;
   const PairFields& fields_;
   bool dilatation_, half_;
   LatticeFamilies families_;

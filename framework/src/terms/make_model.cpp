@@ -25,11 +25,12 @@ std::unique_ptr<Model> make_stabilized(const ModelParts& parts) {
 
 template <int D>
 std::unique_ptr<Model> make(const ModelParts& parts) {
-  const KinematicsTraits traits = parts.kinematics->traits();
-  if (traits.at == EvaluationPoints::pairs) return std::make_unique<PairModel<D>>(parts);
-  if (traits.force_state == ForceState::local) return std::make_unique<LocalForceModel<D>>(parts, std::make_unique<WeightedModel<D>>(parts));
+  const Formulation& formulation = parts.formulation;
+  if (formulation.pairs) return std::make_unique<PairModel<D>>(parts);
+  if (formulation.force_state == ForceState::local)
+    return std::make_unique<LocalForceModel<D>>(parts, std::make_unique<WeightedModel<D>>(parts));
   // Point gradients of higher order are stencils like any other.
-  if (traits.at == EvaluationPoints::weighted || (traits.at == EvaluationPoints::points && traits.order > 1))
+  if (formulation.weighted || (formulation.point && formulation.order > 1))
     return make_stabilized<D, WeightedModel<D>>(parts);
   if (parts.body->lattice()) return make_stabilized<D, LatticeModel<D>>(parts);
   return make_stabilized<D, CloudModel<D>>(parts);

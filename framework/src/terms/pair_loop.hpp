@@ -93,7 +93,7 @@ class PairLoop {
 struct PairLoopParts {
   const Body& body;
   const InfluenceFunction& influence;
-  const Kinematics& law;
+  const PairKinematics& law;
   const PairFields& fields;
   bool half;                      ///< each bond once, for both ends
   bool quiet;                     ///< without the parts that no wave has reached

@@ -16,7 +16,7 @@ namespace {
 
 /// Stiffness of the bonds of a family against a homogeneous stretch along each axis: 1/2 sum_j V_j w''(0) (|xi| cos^2)^2.
 template <int D>
-std::array<double, D> axial_stiffness(const Kinematics& law, double modulus, const std::vector<FamilyBond>& bonds) {
+std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus, const std::vector<FamilyBond>& bonds) {
   const std::size_t n = padded(bonds.size());
   AlignedVector<double> length(n, 1.0), omega(n, 0.0), rest(n, 0.0), moduli(n, modulus), stiffness(n, 0.0);
   for (std::size_t k = 0; k < bonds.size(); ++k) {
@@ -71,14 +71,15 @@ std::vector<FamilyBond> regular_family(const Body& body, const InfluenceFunction
 
 template <int D>
 PairModel<D>::PairModel(const ModelParts& parts)
-    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), law_(parts.kinematics), traits_(law_->traits()), share_(parts.share), damage_(body_.make_field(1)) {
-  const PairLoopParts loop{body_, *parts.influence, *law_, fields_, share_, parts.skip};
+    : AssemblingModel(parts), body_(*parts.body), laws_(*parts.laws), formulation_(parts.formulation), law_(*formulation_.pairs),
+      share_(parts.share), damage_(body_.make_field(1)) {
+  const PairLoopParts loop{body_, *parts.influence, law_, fields_, share_, parts.skip};
   loop_ = body_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
-  if (traits_.dilatation) {
+  if (formulation_.dilatation) {
     for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
   }
   set_moduli();
-  if (traits_.surface_correction) set_correction(*parts.influence);
+  if (formulation_.pair_traits.surface_correction) set_correction(*parts.influence);
   if (parts.damage) this->watch_bonds(loop_->bond_state());
 }
 
@@ -104,10 +105,10 @@ bool PairModel<D>::set_moduli_of(const std::vector<FamilyBond>& bonds, const std
       x = point(p);
       x.weighted_volume = m;
       x.intact = share;
-      moduli = law_->pair_moduli(x);
+      moduli = law_.moduli(x);
       const MaterialRecord* record = &laws_.record_of(p);
       if (std::find(warned_.begin(), warned_.end(), record) == warned_.end()) {
-        const std::string warning = law_->pair_warning(x);
+        const std::string warning = law_.warning(x);
         if (!warning.empty()) {
           warned_.push_back(record);
           if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
@@ -116,7 +117,7 @@ bool PairModel<D>::set_moduli_of(const std::vector<FamilyBond>& bonds, const std
     }
     // A point without bonds is a free mass: nothing to divide by, nothing stored.
     if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
-    if (!traits_.dilatation) continue;
+    if (!formulation_.dilatation) continue;
     scale_.data()[p] = m > 0 ? D / m : 0.0;
     dilatation_modulus_.data()[p] = moduli.dilatation;
   }
@@ -129,8 +130,8 @@ void PairModel<D>::set_moduli() {
   loop_->families([&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points) {
     if (!set_moduli_of(bonds, points, modulus)) lone_ += points.size();
   });
-  if (share_ && laws_.single() && traits_.constant_moduli && !traits_.surface_correction) {
-    fields_.uniform = law_->pair_moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
+  if (share_ && laws_.single() && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
+    fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
   } else {
     fields_.modulus = std::move(modulus);
   }
@@ -145,7 +146,7 @@ std::vector<BondChange> PairModel<D>::bonds_changed(std::span<const std::int32_t
 template <int D>
 double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
   if (density_.size() == 0) density_ = body_.make_field(2);
-  if (traits_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
+  if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
   loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
   double energy = 0;
   for (std::size_t p = 0; p < body_.stride(); ++p) {
@@ -157,12 +158,12 @@ double PairModel<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
 template <int D>
 void PairModel<D>::set_correction(const InfluenceFunction& influence) {
   fields_.correction = body_.make_field(D);
-  const std::vector<FamilyBond> regular = regular_family<D>(body_, influence, traits_.influence);
+  const std::vector<FamilyBond> regular = regular_family<D>(body_, influence, formulation_.pair_traits.influence);
   // Pre-cracks weaken a body on purpose: the correction is that of the uncut family.
   loop_->families([&](const std::vector<FamilyBond>& bonds, const std::vector<std::int32_t>& points) {
     const auto stiffness = [&](const std::vector<FamilyBond>& family, PairPoint x) {
       x.weighted_volume = weighted_volume(family, false);
-      return axial_stiffness<D>(*law_, law_->pair_moduli(x).bond, family);
+      return axial_stiffness<D>(law_, law_.moduli(x).bond, family);
     };
     std::array<double, D> G;
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -201,7 +202,8 @@ EvaluationStatus PairModel<D>::dilatation(ConstFieldView u, ConstFieldView w, st
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
-    law_->dilatation_law({n, theta, dilatation_modulus_.data() + first, energies || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
+                                       energies || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
@@ -216,7 +218,7 @@ EvaluationStatus PairModel<D>::dilatation(ConstFieldView u, ConstFieldView w, st
 template <int D>
 EvaluationStatus PairModel<D>::forces(ConstFieldView u, FieldView force, double* energy) {
   std::vector<double> volumetric, bonds(energy ? loop_->blocks() : 0, 0.0);
-  if (traits_.dilatation) {
+  if (formulation_.dilatation) {
     const EvaluationStatus status = dilatation(u, {}, energy ? &volumetric : nullptr, nullptr);
     if (!status.ok()) return status;
   }
@@ -231,7 +233,7 @@ EvaluationStatus PairModel<D>::forces(ConstFieldView u, FieldView force, double*
 
 template <int D>
 EvaluationStatus PairModel<D>::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  if (traits_.dilatation) {
+  if (formulation_.dilatation) {
     const EvaluationStatus status = dilatation(u, w, nullptr, nullptr);
     if (!status.ok()) return status;
   }
@@ -248,7 +250,7 @@ EvaluationStatus PairModel<D>::sample(ConstFieldView u, PointSamples& samples) {
   samples = {};
   samples.strain_energy_density = body_.make_field(1);
   Field volumetric = body_.make_field(1);
-  if (traits_.dilatation) {
+  if (formulation_.dilatation) {
     const EvaluationStatus status = dilatation(u, {}, nullptr, volumetric.data());
     if (!status.ok()) return status;
   }

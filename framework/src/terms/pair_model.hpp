@@ -38,8 +38,8 @@ class PairModel final : public AssemblingModel {
 
   const Body& body_;
   const Laws& laws_;
-  std::shared_ptr<const Kinematics> law_;
-  KinematicsTraits traits_;
+  Formulation formulation_;
+  const PairKinematics& law_;
   bool share_;
   PairFields fields_;
   std::unique_ptr<PairLoop> loop_;

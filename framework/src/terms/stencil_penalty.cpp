@@ -25,7 +25,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
  public:
   explicit StencilPenalty(const ModelParts& parts)
-      : families_(*parts.body, *parts.influence, parts.kinematics->traits().weight), stencil_(families_.rows(), -1) {
+      : families_(*parts.body, *parts.influence, parts.formulation.weight), stencil_(families_.rows(), -1) {
     const BlockReach reach = cloud_reach(families_.lists(), families_.rows());
     colouring_ = Colouring(reach);
     if (parts.skip) quiet_ = QuietBlocks(reach);

@@ -9,15 +9,31 @@ namespace {
 
 /// YOUR PHYSICS: the stencil of a formulation with one evaluation point per bond,
 ///   H_b = A_b + (u_b - A_b xi) (x) g_b,   A_b = (Hbar_i + Hbar_j)/2 (BondBase::mean) or Hbar_i (BondBase::own).
-/// The engine makes gradients, forces -dE/du and tangents of it. perikit/model/kinematics.hpp has the other shapes: evaluation points at points,
-/// several weighted ones per family, and pair laws.
-class PartName final : public Kinematics {
+/// The engine makes gradients, forces -dE/du and tangents of it. A kinematics can be one of three other classes instead
+/// (perikit/model/kinematics.hpp), each with what it must state:
+///
+///   class PartName final : public PointKinematics {        // H_i = Hbar_i
+///     int order() const noexcept override;                 // of the point gradient
+///   };
+///   class PartName final : public WeightedKinematics {     // H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1
+///     WeightedTraits traits() const noexcept override;
+///     int parts(int dimension) const override;             // evaluation points per point; 0: one per bond
+///     void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override;   // omega_q(k)
+///   };
+///   class PartName final : public PairKinematics {         // E = sum V_i V_j w(e) + sum V_i phi(theta)
+///     PairTraits traits() const noexcept override;
+///     PairModuli moduli(const PairPoint& point) const noexcept override;      // from the small strain of the material
+///     std::string warning(const PairPoint& point) const override;            // what the law cannot represent there, or nothing
+///     void bond_law(const BondBatch& batch) const noexcept override;          // w and its derivatives
+///     const DilatationLaw* dilatation() const noexcept override;              // phi and its derivatives; null: none
+///   };
+class PartName final : public BondKinematics {
  public:
   explicit PartName(BondWeight weight) : weight_(weight) {}
 
-  KinematicsTraits traits() const noexcept override {
+  BondTraits traits() const noexcept override {
     // pair_symmetric: g is odd in xi and the same for ij and ji; g_from_xi_only: it reads nothing else of the family.
-    return {.at = EvaluationPoints::bonds, .base = BondBase::mean, .weight = weight_, .pair_symmetric = true, .g_from_xi_only = true};
+    return {.base = BondBase::mean, .weight = weight_, .pair_symmetric = true, .g_from_xi_only = true};
   }
 
   /// Default: g = xi/|xi|^2, which makes the gradient exact along the bond.

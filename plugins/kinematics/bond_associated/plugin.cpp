@@ -9,11 +9,12 @@ using namespace perikit;
 namespace {
 
 /// Each bond's own domain: the part of the family that is near the bond's far end.
-class BondAssociated final : public Kinematics {
+class BondAssociated final : public WeightedKinematics {
  public:
   BondAssociated(double ratio, BondWeight weight, ForceState force_state) : ratio_(ratio), weight_(weight), force_state_(force_state) {}
 
-  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::weighted, .weight = weight_, .force_state = force_state_}; }
+  WeightedTraits traits() const noexcept override { return {.weight = weight_, .force_state = force_state_}; }
+  int parts(int /*dimension*/) const override { return 0; }
 
   /// omega where |xi_k - xi_q| <= bond horizon, else 0. Lattice points on the sphere count, whatever the rounding.
   void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {

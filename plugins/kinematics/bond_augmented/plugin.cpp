@@ -13,13 +13,11 @@ constexpr int symmetric_index(int dimension, int a, int b) noexcept { return a =
 
 /// Least squares in which the bond itself counts lambda times. The changed shape tensor K + c xi (x) xi is inverted by the
 /// Sherman-Morrison formula, so that only the point's K^-1 is needed.
-class BondAugmented final : public Kinematics {
+class BondAugmented final : public BondKinematics {
  public:
   BondAugmented(double lambda, BondWeight weight) : lambda_(lambda), weight_(weight) {}
 
-  KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::bonds, .base = BondBase::own, .weight = weight_};
-  }
+  BondTraits traits() const noexcept override { return {.base = BondBase::own, .weight = weight_}; }
 
   void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override {
     switch (family.dimension) {

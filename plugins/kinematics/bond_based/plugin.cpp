@@ -11,18 +11,18 @@ using namespace perikit;
 namespace {
 
 /// Springs: w = c e^2/(2 |xi|), the prototype microelastic law.
-class BondBased final : public Kinematics {
+class BondBased final : public PairKinematics {
  public:
   explicit BondBased(bool surface_correction) : surface_correction_(surface_correction) {}
 
-  KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::pairs, .influence = false, .constant_moduli = true, .surface_correction = surface_correction_};
+  PairTraits traits() const noexcept override {
+    return {.influence = false, .constant_moduli = true, .surface_correction = surface_correction_};
   }
 
-  PairModuli pair_moduli(const PairPoint& x) const noexcept override { return {x.micromodulus(), 0}; }
+  PairModuli moduli(const PairPoint& x) const noexcept override { return {x.micromodulus(), 0}; }
 
   /// One modulus fixes Poisson's ratio.
-  std::string pair_warning(const PairPoint& x) const override {
+  std::string warning(const PairPoint& x) const override {
     const int d = dimension(x.space);
     const double nu = x.moduli.poisson(), fixed = x.space == Space::plane_stress ? 1.0 / 3 : 1.0 / 4;
     if (d == 1 || std::abs(nu - fixed) <= 1e-6) return {};
@@ -38,6 +38,8 @@ class BondBased final : public Kinematics {
       if (b.stiffness) stiffness.store(b.stiffness + k);
     }
   }
+
+  const DilatationLaw* dilatation() const noexcept override { return nullptr; }
 
  private:
   bool surface_correction_;

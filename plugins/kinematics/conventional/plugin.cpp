@@ -8,10 +8,10 @@ using namespace perikit;
 namespace {
 
 /// The point gradient itself, which is a service of the engine: nothing to add.
-class Conventional final : public Kinematics {
+class Conventional final : public PointKinematics {
  public:
   explicit Conventional(int order) : order_(order) {}
-  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::points, .order = order_}; }
+  int order() const noexcept override { return order_; }
 
  private:
   int order_;

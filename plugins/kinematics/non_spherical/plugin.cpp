@@ -10,11 +10,12 @@ using namespace perikit;
 namespace {
 
 /// Each bond's own family: bonds of like length and direction count most.
-class NonSpherical final : public Kinematics {
+class NonSpherical final : public WeightedKinematics {
  public:
   NonSpherical(double n1, double n2, BondWeight weight) : n1_(n1), n2_(n2), weight_(weight) {}
 
-  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::weighted, .weight = weight_}; }
+  WeightedTraits traits() const noexcept override { return {.weight = weight_}; }
+  int parts(int /*dimension*/) const override { return 0; }
 
   void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
     if (n2_ == 0.0) return weights(family, omega, stride, [](Pack) { return Pack(1.0); });

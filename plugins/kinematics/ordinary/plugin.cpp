@@ -7,24 +7,37 @@ using namespace perikit;
 
 namespace {
 
+/// phi = k theta^2/2.
+class VolumeSpring final : public DilatationLaw {
+ public:
+  void evaluate(const DilatationBatch& b) const noexcept override {
+    for (int k = 0; k < b.n; k += pack_width) {
+      const Pack stiffness = Pack::load(b.modulus + k), theta = Pack::load(b.theta + k), pressure = stiffness * theta;
+      if (b.energy) (0.5 * pressure * theta).store(b.energy + k);
+      if (b.pressure) pressure.store(b.pressure + k);
+      if (b.stiffness) stiffness.store(b.stiffness + k);
+    }
+  }
+};
+
 /// The linear peridynamic solid. Its energy density, with e_dev = e - theta |xi|/d and sum omega e_dev^2 V =
 /// sum omega e^2 V - m theta^2/d^2, is that of springs a mu omega/m and a volumetric term:
 ///   K theta^2/2 + (a mu/(2m)) sum omega e_dev^2 V = (K - a mu/d^2) theta^2/2 + (a mu/(2m)) sum omega e^2 V,  a = 15 (3D), 8 (2D)
-class Ordinary final : public Kinematics {
+class Ordinary final : public PairKinematics {
  public:
   explicit Ordinary(bool surface_correction) : surface_correction_(surface_correction) {}
 
-  KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::pairs, .dilatation = true, .surface_correction = surface_correction_};
-  }
+  PairTraits traits() const noexcept override { return {.surface_correction = surface_correction_}; }
 
-  PairModuli pair_moduli(const PairPoint& x) const noexcept override {
+  PairModuli moduli(const PairPoint& x) const noexcept override {
     const int d = dimension(x.space);
     // A line has no shape to keep: springs alone.
     const double shear = d == 3 ? 15 * x.moduli.mu : d == 2 ? 8 * x.moduli.mu : x.bulk();
     // Broken bonds weaken both terms; the springs of a pair count half from each end.
     return {2 * x.intact * shear / x.weighted_volume, d == 1 ? 0.0 : x.intact * (x.bulk() - shear / (d * d))};
   }
+
+  std::string warning(const PairPoint&) const override { return {}; }
 
   void bond_law(const BondBatch& b) const noexcept override {
     for (int k = 0; k < b.n; k += pack_width) {
@@ -35,17 +48,11 @@ class Ordinary final : public Kinematics {
     }
   }
 
-  void dilatation_law(const DilatationBatch& b) const noexcept override {
-    for (int k = 0; k < b.n; k += pack_width) {
-      const Pack stiffness = Pack::load(b.modulus + k), theta = Pack::load(b.theta + k), pressure = stiffness * theta;
-      if (b.energy) (0.5 * pressure * theta).store(b.energy + k);
-      if (b.pressure) pressure.store(b.pressure + k);
-      if (b.stiffness) stiffness.store(b.stiffness + k);
-    }
-  }
+  const DilatationLaw* dilatation() const noexcept override { return &volume_; }
 
  private:
   bool surface_correction_;
+  VolumeSpring volume_;
 };
 
 PartDescription description() {

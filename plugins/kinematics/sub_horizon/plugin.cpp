@@ -15,13 +15,12 @@ Pack side(Pack distance, Pack length) {
 }
 
 /// One gradient per half, quadrant or octant of the family.
-class SubHorizon final : public Kinematics {
+class SubHorizon final : public WeightedKinematics {
  public:
   explicit SubHorizon(const ParameterValues& options) : options_(options) {}
 
-  KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::weighted,
-            .part_weight = options_.text("weights") == "volume" ? PartWeight::volume : PartWeight::equal};
+  WeightedTraits traits() const noexcept override {
+    return {.part_weight = options_.text("weights") == "volume" ? PartWeight::volume : PartWeight::equal};
   }
 
   int parts(int dimension) const override {

@@ -8,10 +8,12 @@ using namespace perikit;
 namespace {
 
 /// A bond-based law whose force has the opposite sign of its energy's derivative.
-class OppositeForce final : public Kinematics {
+class OppositeForce final : public PairKinematics {
  public:
-  KinematicsTraits traits() const noexcept override { return {.at = EvaluationPoints::pairs, .influence = false, .constant_moduli = true}; }
-  PairModuli pair_moduli(const PairPoint& point) const noexcept override { return {.bond = point.bulk()}; }
+  PairTraits traits() const noexcept override { return {.influence = false, .constant_moduli = true}; }
+  PairModuli moduli(const PairPoint& point) const noexcept override { return {.bond = point.bulk()}; }
+  std::string warning(const PairPoint&) const override { return {}; }
+  const DilatationLaw* dilatation() const noexcept override { return nullptr; }
   void bond_law(const BondBatch& b) const noexcept override {
     for (int k = 0; k < b.n; k += pack_width) {
       const Pack stiffness = Pack::load(b.modulus + k) / Pack::load(b.length + k), e = Pack::load(b.extension + k);

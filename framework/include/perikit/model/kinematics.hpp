@@ -1,17 +1,17 @@
 #pragma once
-/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at evaluation points. A kinematics states
-/// its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the momentum balances hold
-/// for every formulation without further code.
+/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at evaluation
+/// points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the
+/// momentum balances hold for every formulation without further code. A library implements one of four small classes:
 ///
-/// Three shapes cover the family of correspondence formulations:
+///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
+///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = Hbar_i or (Hbar_i + Hbar_j)/2 (baqp, projection, ...)
+///   WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1 (non_spherical, sub_horizon, ...)
+///   PairKinematics      no gradients and no material evaluations: central forces along the bonds (bond_based, ordinary)
 ///
-///   point     one evaluation point per point:   H_i = Hbar_i, the point gradient of order n          (conventional)
-///   bond      one per bond, H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = Hbar_i or (Hbar_i + Hbar_j)/2  (baqp, projection, ...)
-///   weighted  one or more per point, H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1               (non_spherical, sub_horizon, ...)
-///   pairs     no gradients and no material evaluations: central forces along the bonds                 (bond_based, ordinary)
+/// or puts a map of the gradients over one with evaluation points at bonds or parts of families: MappedKinematics (selective).
 ///
 /// Hbar is the point gradient, a service of the engine: (sum_j omega V_j u_ij (x) xi_ij) K_i^-1 for order 1.
-/// Every shape with gradients is exact for affine motion whatever the plugin returns.
+/// All gradients are exact for affine motion whatever the library returns.
 ///
 /// A pair law is stated by its energy, with e = |xi + u_j - u_i| - |xi| the extension of a bond:
 ///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e V_j,
@@ -75,58 +75,95 @@ struct DilatationBatch {
   double* stiffness = nullptr;        ///< d2phi/dtheta2 [Pa]
 };
 
-enum class EvaluationPoints { points, bonds, weighted, pairs };
-enum class BondBase { own, mean };          ///< A_b of the bond shape
-enum class BondWeight { volume, kernel };   ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
+enum class BondBase { own, mean };              ///< A_b: the gradient of the owner, or the mean of both ends
+enum class BondWeight { volume, kernel };       ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
 enum class ForceState { variational, local };   ///< forces: -dE/du, or each bond's own force state alone
-enum class PartWeight { equal, volume };    ///< W_q of the admissible parts of point i: the same share of V_i, or shares as their volumes
+enum class PartWeight { equal, volume };        ///< W_q of the admissible parts of a point: equal shares of V_i, or shares as their volumes
+enum class GradientMap { identity, selective }; ///< selective: the volume change of every evaluation point is that of its owner
 
-struct KinematicsTraits {
-  EvaluationPoints at = EvaluationPoints::points;
-  int order = 1;                            ///< of the point gradient (point and bond shapes)
-  BondBase base = BondBase::own;            ///< bond shape
-  BondWeight weight = BondWeight::volume;   ///< evaluation points that belong to bonds
-  PartWeight part_weight = PartWeight::equal;   ///< evaluation points that belong to parts of the family
-  /// bond shape: g depends on xi alone, so that ij and ji give the same H and are evaluated once (base = mean)
-  bool pair_symmetric = false;
-  /// bond shape: g is odd in xi and independent of omega and the shape tensor
-  bool g_from_xi_only = false;
-  /// The volume change of every evaluation point is that of its owner: F_q <- (Jbar_i / J_q)^(1/3) F_q. Not in plane or uniaxial
-  /// stress, and not with evaluation points at points.
-  bool selective = false;
-  /// local (weighted shape by bond only, for comparison): T_ij = (sum of V over the domain / sum of V over H_i) omega P_ij K_ij^-1 xi_ij.
-  /// Not conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
+struct BondTraits {
+  int order = 1;                            ///< of the point gradient
+  BondBase base = BondBase::own;
+  BondWeight weight = BondWeight::volume;
+  bool pair_symmetric = false;              ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
+  bool g_from_xi_only = false;              ///< g is odd in xi and independent of omega and the shape tensor
+};
+
+struct WeightedTraits {
+  BondWeight weight = BondWeight::volume;       ///< of evaluation points that belong to bonds
+  PartWeight part_weight = PartWeight::equal;   ///< of evaluation points that belong to parts of the family
+  /// local (one evaluation point per bond only, for comparison): T_ij = (V of the domain / V of the family) omega P_ij K_ij^-1 xi_ij. Not
+  /// conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
   ForceState force_state = ForceState::variational;
-  bool dilatation = false;                  ///< pairs: phi is not zero
-  bool influence = true;                    ///< pairs: w or theta depends on omega
-  bool constant_moduli = false;             ///< pairs: c_i depends on the material alone, not on the family
-  /// pairs: moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as
-  /// in a whole family (w must be proportional to c_ij)
+};
+
+struct PairTraits {
+  bool influence = true;                    ///< w or theta depends on omega
+  bool constant_moduli = false;             ///< c_i depends on the material alone, not on the family
+  /// Moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as in a whole
+  /// family (w must be proportional to c_ij).
   bool surface_correction = false;
 };
 
+/// What a library hands out: an object of exactly one of the classes below.
 class Kinematics {
  public:
   virtual ~Kinematics() = default;
-  virtual KinematicsTraits traits() const noexcept = 0;
-  /// weighted shape: evaluation points per point of a body of this dimension; 0: one per bond.
-  /// Throws InputError where the options do not suit the dimension; asked at set-up.
-  virtual int parts(int /*dimension*/) const { return 0; }
-  /// bond shape: g_b for each bond of the view, g[c * stride + k], c < dimension [1/m]. Fully overwritten.
-  virtual void correction(const FamilyView&, double* /*g*/, std::size_t /*stride*/) const noexcept {}
-  /// weighted shape: influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k],
-  /// at most the view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a
-  /// well-conditioned gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family
-  /// without any part, use the whole family.
-  virtual void weights(const FamilyView&, double* /*omega*/, std::size_t /*stride*/) const noexcept {}
-  /// pairs: moduli of one point, asked for at set-up.
-  virtual PairModuli pair_moduli(const PairPoint&) const noexcept { return {}; }
-  /// pairs: what is wrong with the law for such a point, as one line for the log; empty: nothing.
-  virtual std::string pair_warning(const PairPoint&) const { return {}; }
-  /// pairs: w and its derivatives.
-  virtual void bond_law(const BondBatch&) const noexcept {}
-  /// pairs: phi and its derivatives.
-  virtual void dilatation_law(const DilatationBatch&) const noexcept {}
+};
+
+class PointKinematics : public Kinematics {
+ public:
+  /// Of the point gradient, from 1.
+  virtual int order() const noexcept = 0;
+};
+
+class BondKinematics : public Kinematics {
+ public:
+  virtual BondTraits traits() const noexcept = 0;
+  /// g_b for each bond of the view, g[c * stride + k], c < dimension [1/m]. Fully overwritten.
+  virtual void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept = 0;
+};
+
+class WeightedKinematics : public Kinematics {
+ public:
+  virtual WeightedTraits traits() const noexcept = 0;
+  /// Evaluation points per point of a body of this dimension; 0: one per bond. Throws InputError where the options do not suit the
+  /// dimension; asked at set-up.
+  virtual int parts(int dimension) const = 0;
+  /// Influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k], at most the
+  /// view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a well-conditioned
+  /// gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family without any part, use
+  /// the whole family.
+  virtual void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept = 0;
+};
+
+/// phi and its derivatives.
+class DilatationLaw {
+ public:
+  virtual ~DilatationLaw() = default;
+  virtual void evaluate(const DilatationBatch& batch) const noexcept = 0;
+};
+
+class PairKinematics : public Kinematics {
+ public:
+  virtual PairTraits traits() const noexcept = 0;
+  /// Moduli of one point, asked for at set-up.
+  virtual PairModuli moduli(const PairPoint& point) const noexcept = 0;
+  /// What is wrong with the law for such a point, as one line for the log; empty: nothing.
+  virtual std::string warning(const PairPoint& point) const = 0;
+  /// w and its derivatives.
+  virtual void bond_law(const BondBatch& batch) const noexcept = 0;
+  /// Null: phi is zero. Else it lives as long as the kinematics.
+  virtual const DilatationLaw* dilatation() const noexcept = 0;
+};
+
+/// A map of the gradients over a base with evaluation points at bonds or parts of families.
+///   selective: F_q <- (Jbar_i / J_q)^(1/3) F_q, Jbar_i from the point gradient of the owner i. Not in plane or uniaxial stress.
+class MappedKinematics : public Kinematics {
+ public:
+  virtual GradientMap map() const noexcept = 0;
+  /// A BondKinematics or a WeightedKinematics, the same at each call, that lives as long as the map.
+  virtual const Kinematics& base() const noexcept = 0;
 };
 
 }  // namespace perikit

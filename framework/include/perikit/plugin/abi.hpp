@@ -13,7 +13,7 @@
 
 /// Raised whenever a released public class changes its layout or its virtual functions. Between releases the hash in the build id keeps
 /// libraries of other headers out.
-#define PERIKIT_ABI_VERSION 2
+#define PERIKIT_ABI_VERSION 3
 
 #define PERIKIT_STRINGIFY_(x) #x
 #define PERIKIT_STRINGIFY(x) PERIKIT_STRINGIFY_(x)

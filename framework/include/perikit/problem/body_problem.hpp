@@ -143,7 +143,7 @@ class BodyProblem final : public Problem {
   std::optional<Ghosts> ghosts_;
   mutable Field with_ghosts_, direction_with_ghosts_;
   std::shared_ptr<const InfluenceFunction> influence_;
-  std::shared_ptr<const Kinematics> kinematics_;
+  Formulation formulation_;
   std::unique_ptr<Laws> laws_;
   std::unique_ptr<BodyDamage> damage_;
   std::unique_ptr<Model> model_;

@@ -9,13 +9,12 @@
 
 namespace perikit {
 
-class ProjectedBond final : public Kinematics {
+class ProjectedBond final : public BondKinematics {
  public:
   ProjectedBond(BondBase base, BondWeight weight, int order) : base_(base), weight_(weight), order_(order) {}
 
-  KinematicsTraits traits() const noexcept override {
-    return {.at = EvaluationPoints::bonds,
-            .order = order_,
+  BondTraits traits() const noexcept override {
+    return {.order = order_,
             .base = base_,
             .weight = weight_,
             .pair_symmetric = base_ == BondBase::mean,

@@ -13,7 +13,7 @@
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/families/fracture.hpp"
 #include "perikit/operators/laws.hpp"
-#include "perikit/model/kinematics.hpp"
+#include "perikit/model/formulation.hpp"
 #include "perikit/model/stabilization.hpp"
 
 namespace perikit {
@@ -87,7 +87,7 @@ class Model {
 
 struct ModelParts {
   const Body* body = nullptr;
-  std::shared_ptr<const Kinematics> kinematics;
+  Formulation formulation;
   std::shared_ptr<const InfluenceFunction> influence;
   const Laws* laws = nullptr;
   std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients of order 1

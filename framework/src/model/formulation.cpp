@@ -1,0 +1,60 @@
+#include "model/kinematics_class.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace perikit {
+
+namespace {
+
+void read_traits(Formulation& f) {
+  if (f.point) f.order = f.point->order();
+  if (f.bond) {
+    const BondTraits traits = f.bond->traits();
+    f.order = traits.order;
+    f.base = traits.base;
+    f.weight = traits.weight;
+    f.pair_symmetric = traits.pair_symmetric;
+    f.g_from_xi_only = traits.g_from_xi_only;
+  }
+  if (f.weighted) {
+    const WeightedTraits traits = f.weighted->traits();
+    f.weight = traits.weight;
+    f.part_weight = traits.part_weight;
+    f.force_state = traits.force_state;
+  }
+  if (f.pairs) {
+    f.pair_traits = f.pairs->traits();
+    f.dilatation = f.pairs->dilatation();
+  }
+}
+
+}  // namespace
+
+Formulation kinematics_class(const Kinematics& kinematics) {
+  Formulation f;
+  const auto* const mapped = dynamic_cast<const MappedKinematics*>(&kinematics);
+  if (mapped) f.map = mapped->map();
+  const Kinematics& base = mapped ? mapped->base() : kinematics;
+  f.point = dynamic_cast<const PointKinematics*>(&base);
+  f.bond = dynamic_cast<const BondKinematics*>(&base);
+  f.weighted = dynamic_cast<const WeightedKinematics*>(&base);
+  f.pairs = dynamic_cast<const PairKinematics*>(&base);
+  if (mapped && !f.bond && !f.weighted)
+    throw std::invalid_argument("the base that it maps is neither a BondKinematics nor a WeightedKinematics");
+  const int classes = (f.point != nullptr) + (f.bond != nullptr) + (f.weighted != nullptr) + (f.pairs != nullptr);
+  if (classes != 1)
+    throw std::invalid_argument(std::string(classes == 0 ? "it is none of" : "it is several of") +
+                                " PointKinematics, BondKinematics, WeightedKinematics, PairKinematics and MappedKinematics");
+  return f;
+}
+
+Formulation make_formulation(std::shared_ptr<const Kinematics> kinematics) {
+  Formulation f = kinematics_class(*kinematics);
+  read_traits(f);
+  f.kinematics = std::move(kinematics);
+  return f;
+}
+
+}  // namespace perikit

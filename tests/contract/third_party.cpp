@@ -1,0 +1,94 @@
+/// Kinematics of every class as a third party may write them: no part of perikit, no example tables, no dense reference.
+
+#include <memory>
+
+#include "perikit/sdk/plugin.hpp"
+
+using namespace perikit;
+
+namespace {
+
+class Points final : public PointKinematics {
+ public:
+  int order() const noexcept override { return 2; }
+};
+
+/// A gradient that is not exact along the bond.
+class Bonds final : public BondKinematics {
+ public:
+  BondTraits traits() const noexcept override { return {.base = BondBase::mean, .pair_symmetric = true, .g_from_xi_only = true}; }
+  void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override {
+    for (int c = 0; c < family.dimension; ++c, g += stride)
+      for (int k = 0; k < family.bonds; ++k) g[k] = 0.7 * family.xi[c][k] / (family.length[k] * family.length[k]);
+  }
+};
+
+/// One domain per bond: the family, in which the bond itself counts twenty times.
+class Domains final : public WeightedKinematics {
+ public:
+  WeightedTraits traits() const noexcept override { return {}; }
+  int parts(int /*dimension*/) const override { return 0; }
+  void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
+    for (int q = 0; q < family.bonds; ++q, omega += stride)
+      for (int k = 0; k < family.bonds; ++k) omega[k] = family.omega[k] * (k == q ? 20.0 : 1.0);
+  }
+};
+
+class VolumeSpring final : public DilatationLaw {
+ public:
+  void evaluate(const DilatationBatch& b) const noexcept override {
+    for (int k = 0; k < b.n; ++k) {
+      if (b.energy) b.energy[k] = 0.5 * b.modulus[k] * b.theta[k] * b.theta[k];
+      if (b.pressure) b.pressure[k] = b.modulus[k] * b.theta[k];
+      if (b.stiffness) b.stiffness[k] = b.modulus[k];
+    }
+  }
+};
+
+class Pairs final : public PairKinematics {
+ public:
+  PairTraits traits() const noexcept override { return {}; }
+  PairModuli moduli(const PairPoint& x) const noexcept override {
+    return {.bond = x.intact * x.moduli.mu / x.weighted_volume, .dilatation = x.intact * x.bulk()};
+  }
+  std::string warning(const PairPoint&) const override { return {}; }
+  void bond_law(const BondBatch& b) const noexcept override {
+    for (int k = 0; k < b.n; ++k) {
+      const double stiffness = b.modulus[k] * b.omega[k], e = b.extension[k];
+      if (b.energy) b.energy[k] = 0.5 * stiffness * e * e;
+      if (b.force) b.force[k] = stiffness * e;
+      if (b.stiffness) b.stiffness[k] = stiffness;
+    }
+  }
+  const DilatationLaw* dilatation() const noexcept override { return &volume_; }
+
+ private:
+  VolumeSpring volume_;
+};
+
+template <class Base>
+class Selective final : public MappedKinematics {
+ public:
+  GradientMap map() const noexcept override { return GradientMap::selective; }
+  const Kinematics& base() const noexcept override { return base_; }
+
+ private:
+  Base base_;
+};
+
+template <class Part>
+void add(Registrar& registrar, const char* name) {
+  registrar.kinematics({.name = name, .summary = name, .parameters = {}, .examples = {""}},
+                       [](const ParameterValues&, const PartFactory&) { return std::make_unique<Part>(); });
+}
+
+}  // namespace
+
+PERIKIT_PLUGIN(registrar) {
+  add<Points>(registrar, "their_points");
+  add<Bonds>(registrar, "their_bonds");
+  add<Domains>(registrar, "their_domains");
+  add<Pairs>(registrar, "their_pairs");
+  add<Selective<Bonds>>(registrar, "their_selective_bonds");
+  add<Selective<Domains>>(registrar, "their_selective_domains");
+}
