@@ -98,23 +98,23 @@ void measure(Registry& registry, Row& row, const std::string& kinematics, const 
     Problem& problem = simulation.problem();
     StepTimer timer;
     simulation.run(timer);
-    row.points = problem.points();
+    row.points = problem.body().points();
     const auto points = static_cast<double>(row.points);
     row.bytes = static_cast<double>(simulation.problem().bytes()) / points;
     row.step = std::min(row.step, timer.best() / points);
     if (counts_operations) row.operations = static_cast<double>(timer.operations()) / points;
     if (!all) return;
     row.set_up /= points;
-    Field w = problem.make_field(row.dimension), Kw = problem.make_field(row.dimension);
-    std::copy_n(problem.displacement().data, w.components() * w.stride(), w.data());
+    Field w = problem.body().make_field(row.dimension), Kw = problem.body().make_field(row.dimension);
+    std::copy_n(problem.state().displacement().data, w.components() * w.stride(), w.data());
     const auto check = [](const EvaluationStatus& status) {
       if (!status.ok()) throw RunError(fmt::format("bench: {}", status.description));
     };
-    row.tangent = fastest([&] { check(problem.tangent_action(problem.displacement(), w, Kw)); }) / points;
+    row.tangent = fastest([&] { check(problem.tangent_action(problem.state().displacement(), w, Kw)); }) / points;
     if (!options.assembly) return;
     BlockMatrix K;
-    check(problem.assemble_tangent(problem.displacement(), K));   // with the pattern, which later ones keep
-    row.assembly = fastest([&] { check(problem.assemble_tangent(problem.displacement(), K)); }) / points;
+    check(problem.assemble_tangent(problem.state().displacement(), K));   // with the pattern, which later ones keep
+    row.assembly = fastest([&] { check(problem.assemble_tangent(problem.state().displacement(), K)); }) / points;
   };
   timed(4, false);
   if (counts_operations) return;

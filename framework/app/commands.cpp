@@ -62,7 +62,7 @@ void run(const Options& options) {
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
     const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
-                                                                        recorder.resumed_step(), simulation.problem().time())
+                                                                        recorder.resumed_step(), simulation.problem().state().time)
                                                           : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
     if (!options.quiet) fmt::print("{}\n", from);
@@ -78,14 +78,14 @@ void run(const Options& options) {
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
-  const std::string closing = simulation.problem().fracture_summary() + simulation.problem().quiet_summary() + recorder.closing(set_up);
+  const std::string closing = recorder.closing(set_up);
   log_end(recorder, closing);
   if (!options.quiet)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format(
         "stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
-        simulation.problem().step(), simulation.problem().time(), recorder.frames() - 1, folder.string());
+        simulation.problem().state().step, simulation.problem().state().time, recorder.frames() - 1, folder.string());
     log_end(recorder, stopped);
     throw RunError(stopped);
   }

@@ -20,8 +20,8 @@ constexpr int note_every = 1000;
 }  // namespace
 
 Relaxation::Relaxation(Problem& problem, const RelaxationOptions& options)
-    : options_(options), eigenvector_(problem.declare("relaxation_eigenvector", problem.dimension())), r_(problem.make_field(problem.dimension())),
-      last_r_(problem.make_field(problem.dimension())), v_(problem.make_field(problem.dimension())) {}
+    : options_(options), eigenvector_(problem.state().declare("relaxation_eigenvector")), r_(problem.make_field()),
+      last_r_(problem.make_field()), v_(problem.make_field()) {}
 
 double Relaxation::find_mass(Problem& problem, ConstFieldView u, ConstFieldView free) {
   // Central differences of step 1 are stable while omega_max^2 = lambda_max/m <= 4.

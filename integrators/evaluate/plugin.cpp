@@ -15,8 +15,9 @@ class Evaluate final : public Integrator {
   }
   void run(Problem& problem, Observer& observer) override {
     refuse_damage(problem);
-    if (problem.any_load()) problem.evaluate_loads(0.0, problem.external_force());
-    const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), problem.internal_force(), &problem.energies().strain);
+    State& state = problem.state();
+    if (problem.loads().any()) problem.loads().evaluate(0.0, state.external_force());
+    const EvaluationStatus status = problem.evaluate_forces(state.displacement(), state.internal_force(), &state.energies.strain);
     if (!status.ok()) throw RunError(status.description);
     observer.wants_sample(0, 0.0);
     observer.step_done({});

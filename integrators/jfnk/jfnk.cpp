@@ -15,12 +15,12 @@ KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, s
     : problem_(problem),
       options_(options),
       preconditioner_(std::move(preconditioner)),
-      right_(problem.make_field(problem.dimension())),
-      u_(problem.make_field(problem.dimension())),
+      right_(problem.make_field()),
+      u_(problem.make_field()),
       right_vector_(wrap(problem, right_, context_)) {
   if (options.differences) {
-    moved_ = problem.make_field(problem.dimension());
-    force_ = problem.make_field(problem.dimension());
+    moved_ = problem.make_field();
+    force_ = problem.make_field();
   }
   // Preconditioned from the right: GMRES then watches the true residual.
   gmres_.reset(SUNLinSol_SPGMR(right_vector_.get(), preconditioner_ ? SUN_PREC_RIGHT : SUN_PREC_NONE, options.restart, context_));
@@ -50,7 +50,7 @@ bool KrylovEquations::difference(Equilibrium& equilibrium, ConstFieldView w, Fie
     fill(0.0, Kw);
     return true;
   }
-  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.spacing() / largest;
+  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.body().spacing() / largest;
   for (const double sign : {1.0, -1.0}) {
     combine(1, u_, sign * eps, w, moved_);
     const EvaluationStatus status = problem_.evaluate_forces(moved_, sign > 0 ? Kw : FieldView(force_), nullptr);

@@ -46,9 +46,9 @@ void check(int flag, const char* what) {
 KinsolSolver::KinsolSolver(Problem& problem, const KinsolOptions& options, std::unique_ptr<Preconditioner> preconditioner)
     : options_(options),
       strategy_(strategy_number(options.strategy)),
-      start_(problem.make_field(problem.dimension())),
-      displacement_scale_(problem.make_field(problem.dimension())),
-      force_scale_(problem.make_field(problem.dimension())),
+      start_(problem.make_field()),
+      displacement_scale_(problem.make_field()),
+      force_scale_(problem.make_field()),
       preconditioner_(std::move(preconditioner)),
       template_(wrap(problem, start_, context_)),
       displacement_scale_vector_(wrap(problem, displacement_scale_, context_)),
@@ -185,7 +185,7 @@ bool KinsolSolver::predict(Equilibrium& equilibrium, bool extrapolated, std::str
   const ConstFieldView u = equilibrium.displacement();
   if (!extrapolated && (preconditioner_ || matrix_)) {
     // Made at the start as it is: that is where the tangent of the prediction is taken.
-    Field r = equilibrium.problem().make_field(equilibrium.problem().dimension());
+    Field r = equilibrium.problem().make_field();
     if (!equilibrium.residual(u, r)) {
       failure = equilibrium.failure();
       return false;
@@ -229,7 +229,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   const FieldView u = equilibrium.displacement();
   if (!predict(equilibrium, extrapolated, solution.failure)) return solution;
   copy(u, start_);
-  Field r = problem.make_field(problem.dimension());
+  Field r = problem.make_field();
   const auto evaluate = [&] {
     if (equilibrium.residual(u, r)) return true;
     solution.failure = equilibrium.failure();
@@ -237,7 +237,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   };
   if (!evaluate()) return solution;
   if (fixed_point()) {
-    if (eigenvector_.size() == 0) eigenvector_ = problem.make_field(problem.dimension());
+    if (eigenvector_.size() == 0) eigenvector_ = problem.make_field();
     mass_ = largest_eigenvalue(problem, u, equilibrium.free(), eigenvector_, false);
     if (!(mass_ > 0)) {
       solution.failure = "the stiffness of the free points is zero or cannot be found";
@@ -246,9 +246,9 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   }
   // KINSOL measures forces by their largest component, a fixed-point iteration by steps, here times m.
   fill(1.0, force_scale_);
-  fill(fixed_point() ? mass_ : 1 / problem.spacing(), displacement_scale_);
+  fill(fixed_point() ? mass_ : 1 / problem.body().spacing(), displacement_scale_);
   const double free_components = std::sqrt(std::max(1.0, dot(equilibrium.free(), equilibrium.free())));
-  check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.spacing())), "the largest step");
+  check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.body().spacing())), "the largest step");
   check(KINSetScaledStepTol(memory_, 1e-15), "the smallest step");
   // Reactions, and with them the reference, change on the way: the target is set anew until the equilibrium itself says that it
   // is met.

@@ -6,10 +6,10 @@ namespace perikit {
 
 TangentMatrix::TangentMatrix(Problem& problem, SUNContext context) {
   // The pattern does not depend on the state.
-  const Field rest = problem.make_field(problem.dimension());
+  const Field rest = problem.make_field();
   BlockMatrix K;
   if (!problem.assemble_tangent(rest, K).ok()) throw RunError("kinsol: the tangent of the undeformed body cannot be assembled");
-  const ConstFieldView mask = problem.free_mask();
+  const ConstFieldView mask = problem.constraints().free();
   free_ = FreeMatrix(K, mask);
   free_.pattern(K, false, first_, row_);
   unknown_at_.assign(mask.size(), -1);

@@ -6,7 +6,7 @@
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_nvector.h>
 
-#include "perikit/problem/integrator.hpp"
+#include "perikit/problem/problem.hpp"
 
 namespace perikit {
 
@@ -28,7 +28,7 @@ struct VectorDeleter {
 };
 using FieldVector = std::unique_ptr<_generic_N_Vector, VectorDeleter>;
 
-/// A vector over somebody else's field; its clones own fields of Problem::make_field, so that both suit the kernels.
+/// A vector over somebody else's field; its clones own fields of the same body, so that both suit the kernels.
 /// problem and view must outlive the vector and its clones.
 FieldVector wrap(const Problem& problem, FieldView view, SUNContext context);
 

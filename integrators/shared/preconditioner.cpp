@@ -8,6 +8,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/problem/motion.hpp"
 
 namespace perikit {
 
@@ -104,7 +105,7 @@ class CompanionCycle final : public Preconditioner {
  private:
   bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
     equilibrium.problem().assemble_companion(u, springs_);
-    multigrid_.make(springs_, equilibrium.free(), equilibrium.problem().rigid_motions(u));
+    multigrid_.make(springs_, equilibrium.free(), rigid_motions(equilibrium.problem().body(), u));
     return true;
   }
   double patience() const noexcept override { return 1.3; }  // it is cheap
@@ -116,8 +117,8 @@ class CompanionCycle final : public Preconditioner {
 }  // namespace
 
 Preconditioner::Preconditioner(Problem& problem)
-    : state_(problem.declare("preconditioner_state", problem.dimension())),
-      numbers_(problem.declare_numbers("preconditioner", 4)) {}
+    : state_(problem.state().declare("preconditioner_state")),
+      numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;

@@ -8,6 +8,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/simd.hpp"
+#include "perikit/sdk/stable_step.hpp"
 
 namespace perikit {
 
@@ -17,15 +18,15 @@ namespace {
 class Stepper {
  public:
   explicit Stepper(Problem& problem)
-      : problem_(problem), u_(problem.displacement()), v_(problem.declare("half_step_velocity", problem.dimension())),
-        force_(problem.internal_force()), mass_(problem.mass().data()), uniform_(problem.uniform_mass()),
-        loaded_(problem.any_load()), external_(loaded_ ? problem.external_force() : FieldView{}) {
-    if (loaded_) problem.evaluate_loads(problem.time(), external_);
+      : problem_(problem), state_(problem.state()), constraints_(problem.constraints()), u_(state_.displacement()),
+        v_(state_.declare("half_step_velocity")), force_(state_.internal_force()), mass_(problem.masses().by_point().data()),
+        uniform_(problem.masses().uniform()), loaded_(problem.loads().any()), external_(loaded_ ? state_.external_force() : FieldView{}) {
+    if (loaded_) problem.loads().evaluate(state_.time, external_);
   }
 
   void evaluate(double* energy, double dt) {
     const EvaluationStatus status = problem_.evaluate_forces(u_, force_, energy, dt);
-    if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", problem_.step(), problem_.time(), status.description));
+    if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state_.step, state_.time, status.description));
   }
 
   /// target = source + dt a on all points, and where asked u += drift target.
@@ -51,7 +52,7 @@ class Stepper {
 
   /// Kick and drift; prescribed components move as prescribed.
   void advance(double kick_dt, double dt, double t, double t_next) {
-    const auto dofs = problem_.constrained();
+    const auto dofs = constraints_.dofs();
     held_.resize(dofs.size());
     before_.resize(dofs.size());
     for (std::size_t k = 0; k < dofs.size(); ++k) {
@@ -61,7 +62,7 @@ class Stepper {
     kick(v_, v_, kick_dt, dt);
     if (dofs.empty()) return;
     for (std::size_t k = 0; k < dofs.size(); ++k) u_.data[dofs[k]] = held_[k];
-    problem_.prescribe_half_step_velocity(t, t_next, v_);
+    constraints_.prescribe_half_step_velocity(t, t_next, u_, v_);
     for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
   }
 
@@ -73,20 +74,20 @@ class Stepper {
       const double now = dot(external_, v_);
       work = dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
     }
-    const auto dofs = problem_.constrained();
+    const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
       held += 0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]];
       speed_[k] = now;
     }
-    problem_.energies().external_work += work + communicator().sum(held);
+    state_.energies.external_work += work + communicator().sum(held);
   }
 
   /// Velocities of the prescribed components at full step t.
   void prescribed_speed(double t, FieldView scratch) {
-    if (!problem_.any_constraint()) return;
-    problem_.prescribe_velocity(t, scratch);
-    const auto dofs = problem_.constrained();
+    if (!constraints_.any()) return;
+    constraints_.prescribe_velocity(t, scratch);
+    const auto dofs = constraints_.dofs();
     full_.resize(dofs.size());
     for (std::size_t k = 0; k < dofs.size(); ++k) full_[k] = scratch.data[dofs[k]];
   }
@@ -100,6 +101,8 @@ class Stepper {
   double total_force(std::int64_t dof) const noexcept { return force_.data[dof] + (loaded_ ? external_.data[dof] : 0.0); }
 
   Problem& problem_;
+  State& state_;
+  Constraints& constraints_;
   FieldView u_, v_, force_;
   const double* mass_;
   double uniform_;
@@ -111,8 +114,8 @@ class Stepper {
 }  // namespace
 
 double Verlet::stable_step(Problem& problem) const {
-  if (options_.bond_based) return options_.safety * problem.bond_based_time_step();
-  const double eigenvalue = problem.largest_eigenvalue(problem.displacement());
+  if (options_.bond_based) return options_.safety * bond_based_time_step(problem.body(), problem.laws());
+  const double eigenvalue = largest_eigenvalue(problem, problem.state().displacement());
   return eigenvalue > 0 ? options_.safety * 2 / std::sqrt(eigenvalue) : options_.end_time;
 }
 
@@ -128,12 +131,13 @@ std::string Verlet::plan(Problem& problem) {
   const double dt = options_.time_step > 0 ? options_.time_step : stable_step(problem);
   const double steps = steps_to_end(0, dt);
   return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
-                     options_.end_time / steps, options_.end_time, problem.bond_based_time_step());
+                     options_.end_time / steps, options_.end_time, bond_based_time_step(problem.body(), problem.laws()));
 }
 
 void Verlet::run(Problem& problem, Observer& observer) {
+  State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
-  const std::span<double> plan = problem.declare_numbers("verlet_plan", 6);
+  const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
   double& first = plan[0];     // step at which the plan was made
   double& start = plan[1];     // and its time
   double& dt = plan[2];
@@ -142,19 +146,19 @@ void Verlet::run(Problem& problem, Observer& observer) {
   double& broke = plan[5];     // whether bonds have failed since the last estimate
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
-    first = static_cast<double>(problem.step());
-    start = problem.time();
+    first = static_cast<double>(state.step);
+    start = state.time;
     counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
   Stepper stepper(problem);
-  const FieldView v = problem.velocity();
-  Field speeds = problem.any_constraint() ? problem.make_field(problem.dimension()) : Field();
-  Field old_external = stepper.loaded() && problem.loads_depend_on_time() ? problem.make_field(problem.dimension()) : Field();
+  const FieldView v = state.velocity();
+  Field speeds = problem.constraints().any() ? problem.make_field() : Field();
+  Field old_external = stepper.loaded() && problem.loads().depend_on_time() ? problem.make_field() : Field();
   const auto report = [&] {
     StepReport r;
-    r.step = problem.step();
-    r.time = problem.time();
+    r.step = state.step;
+    r.time = state.time;
     r.time_step = dt;
     r.end_time = options_.end_time;
     r.steps_expected = static_cast<std::int64_t>(first + counter);
@@ -164,46 +168,48 @@ void Verlet::run(Problem& problem, Observer& observer) {
   if (fresh) {
     make_plan(estimated ? stable_step(problem) : options_.time_step);
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
-    stepper.prescribed_speed(problem.time(), speeds);
-    if (problem.any_constraint()) problem.prescribe_velocity(problem.time(), v);
-    const bool sample = observer.wants_sample(0, problem.time());
-    stepper.evaluate(sample ? &problem.energies().strain : nullptr, dt);
+    stepper.prescribed_speed(state.time, speeds);
+    problem.constraints().prescribe_velocity(state.time, v);
+    const bool sample = observer.wants_sample(0, state.time);
+    stepper.evaluate(sample ? &state.energies.strain : nullptr, dt);
     std::copy_n(v.data, v.size(), stepper.half().data);
     last_dt = 0;
     observer.step_done(report());
   } else {
-    stepper.prescribed_speed(problem.time(), speeds);
+    stepper.prescribed_speed(state.time, speeds);
   }
   stepper.start_speed();
-  while (problem.step() < static_cast<std::int64_t>(first + counter) && !observer.cancelled()) {
-    const double t = problem.time();
+  while (state.step < static_cast<std::int64_t>(first + counter) && !observer.cancelled()) {
+    const double t = state.time;
     // Half of the last step and half of the next: equal steps make it a whole one.
-    const auto next = static_cast<double>(problem.step() + 1);
+    const auto next = static_cast<double>(state.step + 1);
     const double t_next = next == first + counter ? options_.end_time : start + (next - first) * dt;
     stepper.advance(0.5 * (last_dt + dt), dt, t, t_next);
-    problem.time() = t_next;
-    ++problem.step();
-    const bool sample = observer.wants_sample(problem.step(), t_next);
-    stepper.evaluate(sample ? &problem.energies().strain : nullptr, dt);
+    state.time = t_next;
+    ++state.step;
+    const bool sample = observer.wants_sample(state.step, t_next);
+    stepper.evaluate(sample ? &state.energies.strain : nullptr, dt);
     if (old_external.size() > 0) {
       std::copy_n(stepper.external().data, old_external.size(), old_external.data());
-      problem.evaluate_loads(t_next, stepper.external());
+      problem.loads().evaluate(t_next, stepper.external());
     }
     stepper.prescribed_speed(t_next, speeds);
     stepper.add_work(dt, old_external);
     last_dt = dt;
     if (sample) {
       stepper.kick(stepper.half(), v, 0.5 * dt);
-      if (problem.any_constraint()) problem.prescribe_velocity(t_next, v);
+      problem.constraints().prescribe_velocity(t_next, v);
     }
-    if (problem.advance_history(dt, stepper.half())) broke = 1;
-    const bool last = problem.step() == static_cast<std::int64_t>(first + counter);
-    if (estimated && !last && !problem.constant_stiffness() && problem.step() % (broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every) == 0) {
+    if (problem.advance(dt, stepper.half())) broke = 1;
+    const bool last = state.step == static_cast<std::int64_t>(first + counter);
+    const std::int64_t check_every = broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every;
+    if (estimated && !last && !problem.constant_stiffness() && state.step % check_every == 0) {
       broke = 0;
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", problem.step(), counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
+                                 state.step, counter, dt));
       }
     }
     observer.step_done(report());

@@ -74,7 +74,7 @@ Row measure(Registry& registry, const Job& job, double most) {
     if (!problem.late()) fmt::print(stderr, "{}, {}: {}\n", job.body, job.name, error.what());
   }
   row.seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  row.points = problem.points();
+  row.points = problem.body().points();
   row.forces = problem.forces;
   row.actions = problem.actions;
   row.assemblies = problem.assemblies;

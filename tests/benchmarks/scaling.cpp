@@ -67,7 +67,7 @@ Row measure(Registry& registry, const std::string& kinematics, int cells, int th
     row.set_up = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     FastestStep fastest;
     simulation.run(fastest);
-    row.points = simulation.problem().points();
+    row.points = simulation.problem().body().points();
     const auto n = static_cast<double>(row.points);
     row.processor = fastest.processor / n;
     row.wall = fastest.wall / n;

@@ -29,15 +29,15 @@ std::vector<std::string> materials() {
   return all;
 }
 
-BlockMatrix assembled(BodyProblem& problem, ConstFieldView u) {
+BlockMatrix assembled(ModelProblem& problem, ConstFieldView u) {
   BlockMatrix K;
   const EvaluationStatus status = problem.assemble_tangent(u, K);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return K;
 }
 
-Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w) {
-  Field out = problem.make_field(K.dimension);
+Field product(const ModelProblem& problem, const BlockMatrix& K, ConstFieldView w) {
+  Field out = problem.body().make_field(K.dimension);
   const auto d = static_cast<std::size_t>(K.dimension);
   for (std::size_t r = 0; r < K.rows(); ++r)
     for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
@@ -90,15 +90,15 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
       c.body.material = material;
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const Body& body = problem.body();
-      deform(body, problem.displacement(), 71, 0.02);
-      Field w = problem.make_field(problem.dimension()), expected = problem.make_field(problem.dimension());
+      deform(body, problem.state().displacement(), 71, 0.02);
+      Field w = problem.make_field(), expected = problem.make_field();
       Noise random(72);
       set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
       expected.fill(std::numeric_limits<double>::quiet_NaN());
-      REQUIRE(problem.tangent_action(problem.displacement(), w, expected).ok());
-      const BlockMatrix K = assembled(problem, problem.displacement());
+      REQUIRE(problem.tangent_action(problem.state().displacement(), w, expected).ok());
+      const BlockMatrix K = assembled(problem, problem.state().displacement());
       REQUIRE(K.dimension == body.dimension());
       REQUIRE(K.rows() == body.points());
       CHECK(std::is_sorted(K.point.begin(), K.point.end()));
@@ -124,22 +124,22 @@ TEST_CASE("kinematics: the assembled tangent is bitwise the same for one and two
     if (options.dimension == 1) options.cells = 2000;
     if (options.dimension == 2) options.cells = 36;
     const auto simulation = build(scene_text(options, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
-    deform(problem.body(), problem.displacement(), 81, 0.02);
+    ModelProblem& problem = simulation->problem();
+    deform(problem.body(), problem.state().displacement(), 81, 0.02);
     const int threads = thread_count();
     set_thread_count(1);
-    const BlockMatrix one = assembled(problem, problem.displacement());
+    const BlockMatrix one = assembled(problem, problem.state().displacement());
     set_thread_count(2);
-    BlockMatrix two = assembled(problem, problem.displacement());
+    BlockMatrix two = assembled(problem, problem.state().displacement());
     set_thread_count(threads);
     CHECK(same_pattern(one, two));
     CHECK_MESSAGE(one.values == two.values, "the values depend on the number of threads");
     // A second state into the same matrix, and back.
-    const Field rest = problem.make_field(problem.dimension());
+    const Field rest = problem.make_field();
     const double* values = two.values.data();
     REQUIRE(problem.assemble_tangent(rest, two).ok());
     CHECK(one.values != two.values);
-    REQUIRE(problem.assemble_tangent(problem.displacement(), two).ok());
+    REQUIRE(problem.assemble_tangent(problem.state().displacement(), two).ok());
     CHECK(values == two.values.data());
     CHECK(same_pattern(one, two));
     CHECK_MESSAGE(one.values == two.values, "the values depend on what was there before");
@@ -150,11 +150,11 @@ TEST_CASE("kinematics: the size of an assembled tangent is known before") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const AssembledSize size = problem.assembled_size();
-    const BlockMatrix K = assembled(problem, problem.displacement());
+    const BlockMatrix K = assembled(problem, problem.state().displacement());
     const double ratio = static_cast<double>(size.blocks) / static_cast<double>(K.blocks());
-    if (problem.points() <= 256) CHECK(size.blocks == K.blocks());
+    if (problem.body().points() <= 256) CHECK(size.blocks == K.blocks());
     CHECK(std::abs(ratio - 1) <= 0.05);
     CHECK(size.bytes > K.values.size() * sizeof(double) * 9 / 10);
   }
@@ -166,17 +166,17 @@ TEST_CASE("kinematics: assembling reports an inadmissible deformation") {
     if (options.crack || options.plane == "stress") continue;
     INFO(c.label());
     const auto simulation = build(scene_text(options, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
     // Inside out, or (pair laws) all on one point.
     const double factor = problem.model().has_gradients() ? -1.5 : -1.0;
-    set_field(body, problem.displacement(), [&](const Point& x) { return Point{factor * x[0], 0, 0}; });
+    set_field(body, problem.state().displacement(), [&](const Point& x) { return Point{factor * x[0], 0, 0}; });
     if (!problem.model().has_gradients())
-      set_field(body, problem.displacement(), [&](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
-    Field f = problem.make_field(problem.dimension());
-    const EvaluationStatus expected = problem.evaluate_forces(problem.displacement(), f, nullptr);
+      set_field(body, problem.state().displacement(), [&](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
+    Field f = problem.make_field();
+    const EvaluationStatus expected = problem.evaluate_forces(problem.state().displacement(), f, nullptr);
     BlockMatrix K;
-    const EvaluationStatus status = problem.assemble_tangent(problem.displacement(), K);
+    const EvaluationStatus status = problem.assemble_tangent(problem.state().displacement(), K);
     REQUIRE(!expected.ok());
     CHECK(!status.ok());
     CHECK(status.description.find("point") != std::string::npos);

@@ -57,10 +57,10 @@ struct Response {
   Field force;
 };
 
-Response respond(BodyProblem& problem, std::uint64_t seed) {
-  stretch_at_random(problem.body(), problem.displacement(), seed);
-  Response r{0, problem.make_field(problem.dimension())};
-  const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), r.force, &r.energy);
+Response respond(ModelProblem& problem, std::uint64_t seed) {
+  stretch_at_random(problem.body(), problem.state().displacement(), seed);
+  Response r{0, problem.make_field()};
+  const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
@@ -73,15 +73,15 @@ double difference(const Body& body, const Field& a, const Field& b) {
 }
 
 /// |K w - Kw| of the assembled tangent and the tangent action along noise, relative to Kw.
-double tangent_difference(BodyProblem& problem) {
+double tangent_difference(ModelProblem& problem) {
   const Body& body = problem.body();
-  Field w = problem.make_field(problem.dimension()), Kw = problem.make_field(problem.dimension());
+  Field w = problem.make_field(), Kw = problem.make_field();
   Noise random(21);
   set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
-  REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
+  REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
   const double scale = largest(body, Kw);
   BlockMatrix K;
-  REQUIRE(problem.model().assemble(problem.displacement(), K).ok());
+  REQUIRE(problem.model().assemble(problem.state().displacement(), K).ok());
   const auto d = static_cast<std::size_t>(K.dimension);
   for (std::size_t r = 0; r < K.rows(); ++r)
     for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
@@ -93,12 +93,12 @@ double tangent_difference(BodyProblem& problem) {
 }
 
 /// How far the slope of the energy along a random direction is from -force, relative to it.
-double slope_error(BodyProblem& problem, const Response& r) {
+double slope_error(ModelProblem& problem, const Response& r) {
   const int d = problem.dimension();
-  Field w = problem.make_field(d), kept = problem.make_field(d), scratch = problem.make_field(d);
+  Field w = problem.body().make_field(d), kept = problem.body().make_field(d), scratch = problem.body().make_field(d);
   Noise random(3);
   set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-  const FieldView u = problem.displacement();
+  const FieldView u = problem.state().displacement();
   std::copy_n(u.data, u.size(), kept.data());
   const double h = 1e-5;
   double energies[2] = {};
@@ -112,13 +112,13 @@ double slope_error(BodyProblem& problem, const Response& r) {
 }
 
 /// Largest difference of sampled gradients of an affine motion from its own, fragments apart.
-double affine_error(BodyProblem& problem) {
+double affine_error(ModelProblem& problem) {
   const int d = problem.dimension();
-  set_field(problem.body(), problem.displacement(), [&](const Point& x) {
+  set_field(problem.body(), problem.state().displacement(), [&](const Point& x) {
     return d == 1 ? Point{0.1 * x[0]} : Point{0.1 * x[0] - 0.07 * x[1], 0.03 * x[0] - 0.06 * x[1], d == 3 ? 0.05 * x[2] : 0.0};
   });
   PointSamples samples;
-  REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+  REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
   const Field damage = problem.model().damage();
   const double G[3][3] = {{0.1, -0.07, 0}, {0.03, -0.06, 0}, {0, 0, 0.05}};
   double worst = 0;
@@ -171,7 +171,7 @@ bool suits(const Example& example, int dimension) {
 /// `selective` knows of bonds that fail in the course of a run: what the dense reference says of this body as it is, the bonds across the
 /// plane failed. Nothing where the reference does not know the kinematics.
 std::optional<Response> dense_response(Simulation& simulation, double height) {
-  BodyProblem& problem = simulation.problem();
+  ModelProblem& problem = simulation.problem();
   const Body& body = problem.body();
   const auto influence = subject().registry.influence(*simulation.scene().influence);
   reference::Cloud cloud = cloud_of(body, *influence);
@@ -183,8 +183,8 @@ std::optional<Response> dense_response(Simulation& simulation, double height) {
   const auto description = description_of(*simulation.scene().kinematics);
   if (!description) return std::nullopt;
   const reference::Operator op = reference::build(cloud, *description);
-  const reference::Vector u = dense(body, problem.displacement()), f = reference::force(op, saint_venant_kirchhoff(), u);
-  Response r{reference::energy(op, saint_venant_kirchhoff(), u), problem.make_field(problem.dimension())};
+  const reference::Vector u = dense(body, problem.state().displacement()), f = reference::force(op, saint_venant_kirchhoff(), u);
+  Response r{reference::energy(op, saint_venant_kirchhoff(), u), problem.make_field()};
   const auto d = static_cast<std::size_t>(problem.dimension());
   for (std::size_t i = 0; i < body.points(); ++i)
     for (std::size_t c = 0; c < d; ++c) r.force.component(static_cast<int>(c))[body.internal()[i]] = f[static_cast<Eigen::Index>(d * i + c)];
@@ -206,16 +206,16 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         const auto failing = build(scene_text(options, kinematics_table(example)));
         options.conditions = crack_text(whole->problem().body());
         const auto cut = build(scene_text(options, kinematics_table(example)));
-        BodyProblem& problem = failing->problem();
+        ModelProblem& problem = failing->problem();
         const Body& body = problem.body();
         // Before anything fails the criterion changes nothing.
         const Response before = respond(problem, 5), plain = respond(whole->problem(), 5);
         CHECK(difference(body, before.force, plain.force) == 0);
         CHECK(before.energy == plain.energy);
-        part_at(body, problem.displacement(), height);
-        const BondUpdate update = problem.model().update_bonds(problem.displacement());
+        part_at(body, problem.state().displacement(), height);
+        const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
         CHECK(2 * update.changed == cut->problem().model().report().broken_bonds);
-        CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
+        CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
         const Response after = respond(problem, 6);
         const bool selective = formulation_of(example).selective();
         const std::optional<Response> expected = selective ? dense_response(*failing, height) : respond(cut->problem(), 6);
@@ -228,8 +228,8 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         const Field damage = problem.model().damage(), cut_damage = cut->problem().model().damage();
         for (const std::int32_t p : body.internal()) CHECK(std::abs(damage.data()[p] - cut_damage.data()[p]) <= 1e-12);
         // At rest again, and closed: nothing heals.
-        set_field(body, problem.displacement(), [](const Point&) { return Point{}; });
-        CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
+        set_field(body, problem.state().displacement(), [](const Point&) { return Point{}; });
+        CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
         CHECK(problem.model().changed_bonds().size() == update.changed);
       }
 }
@@ -242,15 +242,15 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         if (!suits(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud};
         const auto plain = build(scene_text(options, kinematics_table(example)));
-        stretch_at_random(plain->problem().body(), plain->problem().displacement(), 11);
-        const double most = quantile(stretches(plain->problem().body(), plain->problem().displacement()), 0.95);
+        stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 11);
+        const double most = quantile(stretches(plain->problem().body(), plain->problem().state().displacement()), 0.95);
         options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\nno_fail = [\"part\"]\n", most);
         const std::string text = scene_text(options, kinematics_table(example));
         const auto simulation = build(text);
-        BodyProblem& problem = simulation->problem();
+        ModelProblem& problem = simulation->problem();
         const Body& body = problem.body();
         const auto intact = respond(problem, 11);
-        const BondUpdate update = problem.model().update_bonds(problem.displacement());
+        const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
         CHECK(update.changed > 0);
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.released) <= 1e-11 * intact.energy);
@@ -269,7 +269,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
           CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
         }
         std::size_t expected = 0;
-        for (const Stretched& b : stretches(body, problem.displacement())) {
+        for (const Stretched& b : stretches(body, problem.state().displacement())) {
           if (b.stretch <= most || safe.contains(b.point) || safe.contains(b.far)) continue;
           ++expected;
           CHECK(named.contains({b.point, b.far}));
@@ -297,16 +297,16 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
       if (!suits(example, d)) continue;
       BodyOptions options{.dimension = d, .cloud = true};
       const auto plain = build(scene_text(options, kinematics_table(example)));
-      stretch_at_random(plain->problem().body(), plain->problem().displacement(), 17);
-      const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().displacement());
+      stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 17);
+      const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().state().displacement());
       options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n",
                                        quantile(all, 0.5), quantile(all, 0.97));
       const std::string text = scene_text(options, kinematics_table(example));
       const auto simulation = build(text);
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const Body& body = problem.body();
       const Response intact = respond(problem, 17);
-      const BondUpdate update = problem.model().update_bonds(problem.displacement());
+      const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
       const BondChecks checks = problem.model().bond_checks();
       CHECK(checks.weakened > 0);
       CHECK(checks.failed > 0);
@@ -337,21 +337,21 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));
           if (!plain->problem().model().has_gradients()) continue;
-          stretch_at_random(plain->problem().body(), plain->problem().displacement(), 13);
+          stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 13);
           options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\n",
-                                           quantile(stretches(plain->problem().body(), plain->problem().displacement()), share));
+                                           quantile(stretches(plain->problem().body(), plain->problem().state().displacement()), share));
           const auto simulation = build(scene_text(options, kinematics_table(example)));
-          BodyProblem& problem = simulation->problem();
+          ModelProblem& problem = simulation->problem();
           const Body& body = problem.body();
           const Response intact = respond(problem, 13);
-          const BondUpdate update = problem.model().update_bonds(problem.displacement());
+          const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
           const Response left = respond(problem, 13);
           // Bonds of fragments are accounted for like the others, and named once.
           CHECK(std::abs(intact.energy - left.energy - update.released) <= 1e-11 * intact.energy);
           std::set<std::pair<std::int32_t, std::int32_t>> named;
           for (const BondChange& b : problem.model().changed_bonds()) CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
           CHECK(named.size() == update.changed);
-          CHECK(problem.model().update_bonds(problem.displacement()).changed == 0);
+          CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
           for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
           // No family is left near singular: 0.1 of an intact one, whose condition is below 20, in its weakest direction.
           const Field condition = problem.model().shape_tensor_condition(), damage = problem.model().damage();
@@ -374,15 +374,15 @@ TEST_CASE("kinematics: points without bonds are free masses") {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
-        BodyProblem& problem = simulation->problem();
+        ModelProblem& problem = simulation->problem();
         const Body& body = problem.body();
-        set_field(body, problem.displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
-        CHECK(problem.model().update_bonds(problem.displacement()).released > 0);
+        set_field(body, problem.state().displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
+        CHECK(problem.model().update_bonds(problem.state().displacement()).released > 0);
         // Wherever they fly, even onto each other.
-        set_field(body, problem.displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
-        Field force = problem.make_field(d);
+        set_field(body, problem.state().displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
+        Field force = problem.body().make_field(d);
         double energy = 1;
-        REQUIRE(problem.evaluate_forces(problem.displacement(), force, &energy).ok());
+        REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
         CHECK(energy == 0);
         CHECK(largest(body, force) == 0);
         const Field damage = problem.model().damage();
@@ -400,7 +400,7 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
       options.conditions = limit;
       const auto failing = build(scene_text(options, kinematics_table(example)));
       CHECK(plain->problem().model().report().bytes < failing->problem().model().report().bytes);
-      CHECK(plain->problem().model().update_bonds(plain->problem().displacement()).changed == 0);
+      CHECK(plain->problem().model().update_bonds(plain->problem().state().displacement()).changed == 0);
       CHECK(plain->problem().model().bond_checks().updates == 0);
       CHECK(plain->problem().fracture_summary().empty());
     }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "perikit/build/problem.hpp"
 #include "perikit/core/parallel.hpp"
 #include "tests/contract/fixture.hpp"
 
@@ -30,7 +31,7 @@ std::string rate_scene(const Example& kinematics, int dimension, bool cloud, boo
 
 /// check(problem) for every kinematics with gradients in every dimension, on lattices and clouds; half of them with a second
 /// material without history, cracked in 2D (small bodies in 3D would fall apart).
-void for_every_model(const std::function<void(BodyProblem&)>& check) {
+void for_every_model(const std::function<void(ModelProblem&)>& check) {
   for (const Example& example : examples(Kind::kinematics))
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
@@ -46,7 +47,7 @@ void for_every_model(const std::function<void(BodyProblem&)>& check) {
         }
 }
 
-std::vector<double> kept(const BodyProblem& problem) {
+std::vector<double> kept(const ModelProblem& problem) {
   const std::span<const double> values = std::as_const(*problem.laws().history()).values();
   return {values.begin(), values.end()};
 }
@@ -57,41 +58,41 @@ struct Response {
 };
 
 /// Energies and forces on all points agree to the bit.
-bool same(const BodyProblem& problem, const Response& a, const Response& b) {
+bool same(const ModelProblem& problem, const Response& a, const Response& b) {
   bool equal = a.energy == b.energy;
   for (const std::int32_t p : problem.body().internal())
     for (int c = 0; c < problem.dimension(); ++c) equal = equal && a.force.component(c)[p] == b.force.component(c)[p];
   return equal;
 }
 
-Response respond(BodyProblem& problem, ConstFieldView u, double time_step) {
-  Response r{0, problem.make_field(problem.dimension())};
+Response respond(ModelProblem& problem, ConstFieldView u, double time_step) {
+  Response r{0, problem.make_field()};
   r.force.fill(std::numeric_limits<double>::quiet_NaN());
   const EvaluationStatus status = problem.evaluate_forces(u, r.force, &r.energy, time_step);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
 
-Field deformed(const BodyProblem& problem, std::uint64_t seed, double noise) {
-  Field u = problem.make_field(problem.dimension());
+Field deformed(const ModelProblem& problem, std::uint64_t seed, double noise) {
+  Field u = problem.make_field();
   deform(problem.body(), u, seed, noise);
   return u;
 }
 
 /// Three steps of a path; the last response.
-Response walk(BodyProblem& problem) {
+Response walk(ModelProblem& problem) {
   Response r;
   for (const std::uint64_t seed : {31, 32, 33}) {
     r = respond(problem, deformed(problem, seed, 0.01), step);
-    problem.advance_history(step);
+    problem.advance(step);
   }
   return r;
 }
 
 /// x + u turned by an angle about the third axis, as a displacement.
-Field turned(const BodyProblem& problem, ConstFieldView u, double angle) {
+Field turned(const ModelProblem& problem, ConstFieldView u, double angle) {
   const Body& body = problem.body();
-  Field v = problem.make_field(problem.dimension());
+  Field v = problem.make_field();
   const double c = std::cos(angle), s = std::sin(angle);
   for (const std::int32_t p : body.internal()) {
     const Point x = body.position(static_cast<std::size_t>(p));
@@ -106,19 +107,19 @@ Field turned(const BodyProblem& problem, ConstFieldView u, double angle) {
 }  // namespace
 
 TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
-  for_every_model([](BodyProblem& problem) {
+  for_every_model([](ModelProblem& problem) {
     walk(problem);
     const std::vector<double> before = kept(problem);
     CHECK_MESSAGE(std::any_of(before.begin(), before.end(), [](double x) { return x != 0; }), "no history is kept");
     const Field u = deformed(problem, 34, 0.01), w = deformed(problem, 35, 0.5);
-    Field Kw = problem.make_field(problem.dimension());
+    Field Kw = problem.make_field();
     PointSamples samples;
     const Response one = respond(problem, u, step), two = respond(problem, u, 0.0), three = respond(problem, u, step);
     CHECK_MESSAGE((same(problem, one, two) && same(problem, one, three)), "an evaluation depends on the one before");
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
     REQUIRE(problem.model().sample(u, samples).ok());
     CHECK_MESSAGE(kept(problem) == before, "an evaluation advanced the history");
-    problem.advance_history(step);
+    problem.advance(step);
     CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
     // At the end of the step the increment is zero: the same stress, from the history alone.
     CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one),
@@ -135,7 +136,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
 }
 
 TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does no work") {
-  for_every_model([](BodyProblem& problem) {
+  for_every_model([](ModelProblem& problem) {
     if (problem.dimension() == 1) return;
     const Response r = walk(problem);
     constexpr double angle = 1.1;
@@ -154,16 +155,16 @@ TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does n
 }
 
 TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's forces") {
-  for_every_model([](BodyProblem& problem) {
+  for_every_model([](ModelProblem& problem) {
     walk(problem);
     const Field u = deformed(problem, 34, 0.01);
-    Field w = problem.make_field(problem.dimension()), Kw = w;
+    Field w = problem.make_field(), Kw = w;
     Noise random(36);
     set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
     const double h = 5e-4 * problem.body().spacing();
     const auto force = [&](double by) {
-      Field v = problem.make_field(problem.dimension());
+      Field v = problem.make_field();
       for (std::size_t k = 0; k < v.size(); ++k) v.data()[k] = u.data()[k] + by * w.data()[k];
       return respond(problem, v, 0.0).force;
     };
@@ -180,7 +181,7 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
 
 TEST_CASE("kinematics: rate laws are the same for any number of threads, and restored runs go on bitwise") {
   const int threads = thread_count();
-  for_every_model([&](BodyProblem& problem) {
+  for_every_model([&](ModelProblem& problem) {
     const std::vector<std::byte> fresh = problem.snapshot();
     set_thread_count(1);
     const Response one = walk(problem);
@@ -191,7 +192,7 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
     problem.restore(fresh);
     set_thread_count(2);
     CHECK_MESSAGE((same(problem, walk(problem), one) && kept(problem) == history), "depends on the number of threads");
-    problem.advance_history(step);  // something else
+    problem.advance(step);  // something else
     problem.restore(after);
     CHECK_MESSAGE(same(problem, respond(problem, u, step), next), "a restored run differs");
   });
@@ -202,8 +203,8 @@ TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a 
   const std::vector<Example> all = examples(Kind::kinematics);
   if (all.empty()) return;  // a stabilization is tested
   const Scene scene = parse_scene(rate_scene(all.front(), 2, false, false), "contract.toml", subject().registry);
-  CHECK_THROWS_WITH_AS(BodyProblem(scene, subject().registry, true),
+  CHECK_THROWS_WITH_AS(build_problem(scene, subject().registry, {.quasi_static = true}),
                        doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
                        InputError);
-  CHECK_NOTHROW(BodyProblem(scene, subject().registry, false));
+  CHECK_NOTHROW(build_problem(scene, subject().registry, {}));
 }

@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "perikit/core/parallel.hpp"
+#include "perikit/problem/motion.hpp"
+#include "perikit/sdk/stable_step.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 
 using namespace perikit;
@@ -59,7 +61,7 @@ std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrato
 /// The largest step that central differences bear: 2 / omega_max [s].
 double stable_step(const BodyOptions& body) {
   const auto simulation = build(scene_text(body, kinematics));
-  return 2 / std::sqrt(simulation->problem().largest_eigenvalue(simulation->problem().displacement()));
+  return 2 / std::sqrt(largest_eigenvalue(simulation->problem(), simulation->problem().state().displacement()));
 }
 
 }  // namespace
@@ -117,7 +119,7 @@ TEST_CASE("integrator: equal steps, none longer than asked for, hit the end time
       const double expected = std::ceil(steps * (1 - 1e-9));
       REQUIRE(watch.reports.size() == static_cast<std::size_t>(expected) + 1);
       CHECK(watch.reports.back().time == end);
-      CHECK(simulation->problem().time() == end);
+      CHECK(simulation->problem().state().time == end);
       for (std::size_t k = 0; k < watch.reports.size(); ++k) {
         const StepReport& report = watch.reports[k];
         CHECK(report.step == static_cast<std::int64_t>(k));
@@ -139,7 +141,7 @@ TEST_CASE("integrator: prescribed motions are exact") {
   for (const Example& integrator : dynamic_integrators(end, h)) {
     INFO(integrator.part);
     const auto simulation = build_run(body, integrator);
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& state_of = problem.body();
     Watch watch(*simulation);
     double displaced = 0, moved = 0, speed = 0;
@@ -147,13 +149,13 @@ TEST_CASE("integrator: prescribed motions are exact") {
       const double t = report.time;
       for (const std::int32_t p : state_of.set("left")) {
         const double x = state_of.position(static_cast<std::size_t>(p))[0];
-        displaced = std::max(displaced, std::abs(problem.displacement().component(0)[p] - 0.01 * x * std::cos(0.4 * t)));
-        displaced = std::max(displaced, std::abs(problem.displacement().component(1)[p]));
+        displaced = std::max(displaced, std::abs(problem.state().displacement().component(0)[p] - 0.01 * x * std::cos(0.4 * t)));
+        displaced = std::max(displaced, std::abs(problem.state().displacement().component(1)[p]));
       }
       for (const std::int32_t p : state_of.set("right")) {
         const double x = state_of.position(static_cast<std::size_t>(p))[0];
-        moved = std::max(moved, std::abs(problem.displacement().component(0)[p] - 0.01 * x - 0.02 * t + 0.0002 * t * t));
-        speed = std::max(speed, std::abs(problem.velocity().component(0)[p] - 0.02 + 0.0004 * t));
+        moved = std::max(moved, std::abs(problem.state().displacement().component(0)[p] - 0.01 * x - 0.02 * t + 0.0002 * t * t));
+        speed = std::max(speed, std::abs(problem.state().velocity().component(0)[p] - 0.02 + 0.0004 * t));
       }
     };
     simulation->run(watch);
@@ -171,10 +173,10 @@ TEST_CASE("integrator: a constant load gives a free body its momentum, and work 
     for (const Example& integrator : dynamic_integrators(end, h)) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const auto momentum = [&](int c) {
         double sum = 0;
-        for (const std::int32_t p : problem.body().internal()) sum += problem.mass()[static_cast<std::size_t>(p)] * problem.velocity().component(c)[p];
+        for (const std::int32_t p : problem.body().internal()) sum += problem.masses().by_point()[static_cast<std::size_t>(p)] * problem.state().velocity().component(c)[p];
         return sum;
       };
       const double before[2] = {momentum(0), momentum(1)}, force[2] = {0.03, -0.02};
@@ -184,8 +186,8 @@ TEST_CASE("integrator: a constant load gives a free body its momentum, and work 
         CHECK_MESSAGE(std::abs(gained - force[c] * end) <= 1e-12 * (std::abs(before[c]) + std::abs(force[c]) * end), "momentum gained ", gained, ", expected ", force[c] * end);
       }
       // Nothing moves at first: the displacement at the end is the distance.
-      const double work = dot(problem.body(), problem.external_force(), problem.displacement());
-      CHECK_MESSAGE(std::abs(problem.energies().external_work - work) <= 1e-12 * std::abs(work), "work ", problem.energies().external_work, ", force times distance ", work);
+      const double work = dot(problem.body(), problem.state().external_force(), problem.state().displacement());
+      CHECK_MESSAGE(std::abs(problem.state().energies.external_work - work) <= 1e-12 * std::abs(work), "work ", problem.state().energies.external_work, ", force times distance ", work);
     }
   }
 }
@@ -200,31 +202,31 @@ TEST_CASE("integrator: reactions carry loads and inertia") {
     INFO(integrator.part);
     const auto simulation = build_run(body, integrator);
     run(*simulation, 1000);
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& b = problem.body();
-    const Field reaction = problem.reaction(true, problem.time());
+    const Field reaction = reactions(problem, true, problem.state().time);
     const double scale = largest(b, reaction);
     double worst = 0;
     const auto check = [&](const std::string& set, int c, double acceleration) {
       for (const std::int32_t p : b.set(set)) {
-        const double others = problem.internal_force().component(c)[p] + problem.external_force().component(c)[p];
-        worst = std::max(worst, std::abs(reaction.component(c)[p] + others - problem.mass()[static_cast<std::size_t>(p)] * acceleration));
+        const double others = problem.state().internal_force().component(c)[p] + problem.state().external_force().component(c)[p];
+        worst = std::max(worst, std::abs(reaction.component(c)[p] + others - problem.masses().by_point()[static_cast<std::size_t>(p)] * acceleration));
       }
     };
     check("left", 0, 1e-6);
     check("right", 0, 1e-6);
     check("right", 1, 0.0);
     CHECK_MESSAGE(worst <= 1e-8 * scale, "reaction is not m a - internal - external: ", worst, " of ", scale);
-    const ConstFieldView free = problem.free_mask();
+    const ConstFieldView free = problem.constraints().free();
     for (std::size_t k = 0; k < free.size(); ++k) {
       if (free.data[k] == 1.0) CHECK_MESSAGE(reaction.data()[k] == 0.0, "a free component has a reaction");
     }
     // Internal forces cancel: reactions and loads alone accelerate the body.
-    const Field acceleration = problem.acceleration(problem.time());
+    const Field acceleration = accelerations(problem, problem.state().time);
     for (const int c : {0, 1}) {
       double inertia = 0;
-      for (const std::int32_t p : b.internal()) inertia += problem.mass()[static_cast<std::size_t>(p)] * acceleration.component(c)[p];
-      CHECK(std::abs(total(b, reaction, c) + total(b, problem.external_force(), c) - inertia) <= 1e-10 * scale * static_cast<double>(b.points()));
+      for (const std::int32_t p : b.internal()) inertia += problem.masses().by_point()[static_cast<std::size_t>(p)] * acceleration.component(c)[p];
+      CHECK(std::abs(total(b, reaction, c) + total(b, problem.state().external_force(), c) - inertia) <= 1e-10 * scale * static_cast<double>(b.points()));
     }
   }
 }
@@ -243,13 +245,13 @@ TEST_CASE("integrator: a run that continues from a saved state is bitwise the ru
         const auto whole = build_run(body, integrator), first = build_run(body, integrator), second = build_run(body, integrator);
         const std::int64_t steps = run(*whole).reports.back().step, half = steps / 2;
         run(*first, half);
-        REQUIRE(first->problem().step() == half);
+        REQUIRE(first->problem().state().step == half);
         const std::vector<std::byte> saved = first->problem().snapshot();
         second->problem().restore(saved);
         CHECK(second->problem().snapshot() == saved);
         const Watch rest = run(*second);
         CHECK_MESSAGE(rest.reports.front().step == half + 1, "a continued run begins with step ", rest.reports.front().step, " after ", half);
-        CHECK(second->problem().time() == end);
+        CHECK(second->problem().state().time == end);
         CHECK_MESSAGE(state(*second) == state(*whole), "the continued run differs by ", difference(state(*second), state(*whole)));
         // The same simulation can also go on in memory.
         run(*first);
@@ -307,24 +309,24 @@ TEST_CASE("integrator: an evaluation leaves the initial displacement alone and s
     for (const Example& integrator : integrators(only_evaluates, {})) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const std::vector<double> before = displacement(*simulation);
       const Watch watch = run(*simulation);
       REQUIRE(watch.reports.size() == 1);
       CHECK(watch.reports[0].step == 0);
       CHECK(displacement(*simulation) == before);
-      Field force = problem.make_field(2);
+      Field force = problem.body().make_field(2);
       double energy = 0;
-      REQUIRE(problem.evaluate_forces(problem.displacement(), force, &energy).ok());
-      CHECK(problem.energies().strain == energy);
+      REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
+      CHECK(problem.state().energies.strain == energy);
       CHECK(energy > 0);
-      CHECK(std::equal(force.data(), force.data() + force.size(), problem.internal_force().data));
+      CHECK(std::equal(force.data(), force.data() + force.size(), problem.state().internal_force().data));
       PointSamples samples;
-      REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+      REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
       double sum = 0;
       for (const std::int32_t p : problem.body().internal()) sum += samples.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
       CHECK(std::abs(sum - energy) <= 1e-13 * energy);
-      CHECK(std::abs(total(problem.body(), problem.external_force(), 0) - 0.25) <= 1e-15);
+      CHECK(std::abs(total(problem.body(), problem.state().external_force(), 0) - 0.25) <= 1e-15);
     }
   }
 }

@@ -1,3 +1,4 @@
+#include "perikit/problem/motion.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 
 #include <fmt/format.h>
@@ -9,10 +10,10 @@
 namespace perikit::contract {
 
 void Watch::step_done(const StepReport& report) {
-  BodyProblem& problem = simulation_.problem();
-  if (simulation_.dynamic()) problem.energies().kinetic = problem.kinetic_energy(problem.velocity());
+  ModelProblem& problem = simulation_.problem();
+  if (simulation_.dynamic()) problem.state().energies.kinetic = kinetic_energy(problem, problem.state().velocity());
   reports.push_back(report);
-  energies.push_back(problem.energies());
+  energies.push_back(problem.state().energies);
   if (each) each(report);
 }
 
@@ -70,19 +71,19 @@ Watch run(Simulation& simulation, std::int64_t last) {
 
 std::vector<double> displacement(Simulation& simulation) {
   std::vector<double> values;
-  const FieldView u = simulation.problem().displacement();
+  const FieldView u = simulation.problem().state().displacement();
   for (const std::int32_t p : simulation.problem().body().internal())
     for (int c = 0; c < u.components; ++c) values.push_back(u.component(c)[p]);
   return values;
 }
 
 std::vector<double> state(Simulation& simulation) {
-  BodyProblem& problem = simulation.problem();
-  const Energies& e = problem.energies();
-  std::vector<double> values{problem.time(), static_cast<double>(problem.step()), e.strain, e.kinetic, e.external_work, e.dissipated};
-  std::vector<FieldView> fields{problem.displacement(), problem.internal_force()};
-  if (simulation.dynamic()) fields.push_back(problem.velocity());
-  if (problem.any_load()) fields.push_back(problem.external_force());
+  ModelProblem& problem = simulation.problem();
+  const Energies& e = problem.state().energies;
+  std::vector<double> values{problem.state().time, static_cast<double>(problem.state().step), e.strain, e.kinetic, e.external_work, e.dissipated};
+  std::vector<FieldView> fields{problem.state().displacement(), problem.state().internal_force()};
+  if (simulation.dynamic()) fields.push_back(problem.state().velocity());
+  if (problem.loads().any()) fields.push_back(problem.state().external_force());
   for (const FieldView& field : fields) values.insert(values.end(), field.data, field.data + field.size());
   return values;
 }

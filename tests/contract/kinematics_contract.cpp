@@ -40,34 +40,34 @@ class Exceptions {
 };
 
 /// Poisoned output: whatever a kernel forgets to write shows.
-Field poisoned(const BodyProblem& problem) {
-  Field f = problem.make_field(problem.dimension());
+Field poisoned(const ModelProblem& problem) {
+  Field f = problem.make_field();
   f.fill(std::numeric_limits<double>::quiet_NaN());
   return f;
 }
 
-double energy_of(BodyProblem& problem, ConstFieldView u) {
+double energy_of(ModelProblem& problem, ConstFieldView u) {
   Field f = poisoned(problem);
   double energy = 0;
   REQUIRE(problem.evaluate_forces(u, f, &energy).ok());
   return energy;
 }
 
-Field force_of(BodyProblem& problem, ConstFieldView u) {
+Field force_of(ModelProblem& problem, ConstFieldView u) {
   Field f = poisoned(problem);
   const EvaluationStatus status = problem.evaluate_forces(u, f, nullptr);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return f;
 }
 
-Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
-  Field v = problem.make_field(u.components);
+Field shifted(const ModelProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
+  Field v = problem.body().make_field(u.components);
   for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
   return v;
 }
 
-Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
-  Field w = problem.make_field(problem.dimension());
+Field random_direction(const ModelProblem& problem, std::uint64_t seed) {
+  Field w = problem.make_field();
   Noise random(seed);
   set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
   return w;
@@ -79,10 +79,10 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
-    deform(body, problem.displacement(), 11, 0.02);
-    const ConstFieldView u = problem.displacement();
+    deform(body, problem.state().displacement(), 11, 0.02);
+    const ConstFieldView u = problem.state().displacement();
     const bool conservative = c.conservative();
     CHECK(problem.model().conservative() == conservative);
     const Field w = random_direction(problem, 12), v = random_direction(problem, 13);
@@ -112,17 +112,17 @@ TEST_CASE("kinematics: linear and angular momentum") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
-    deform(body, problem.displacement(), 21, 0.02);
-    const Field f = force_of(problem, problem.displacement());
+    deform(body, problem.state().displacement(), 21, 0.02);
+    const Field f = force_of(problem, problem.state().displacement());
     const double scale = largest(body, f);
     Point total{}, moment{};
     double extent = 0, broken = 0;
     for (const std::int32_t p : body.internal()) {
       Point y = body.position(static_cast<std::size_t>(p)), force{};
       for (int a = 0; a < body.dimension(); ++a) {
-        y[static_cast<std::size_t>(a)] += problem.displacement().component(a)[p];
+        y[static_cast<std::size_t>(a)] += problem.state().displacement().component(a)[p];
         force[static_cast<std::size_t>(a)] = f.component(a)[p];
         total[static_cast<std::size_t>(a)] += force[static_cast<std::size_t>(a)];
         extent = std::max(extent, std::abs(y[static_cast<std::size_t>(a)]));
@@ -154,21 +154,21 @@ TEST_CASE("kinematics: affine motion is exact") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
     const double G[3][3] = {{0.1, -0.07, 0.05}, {0.03, -0.06, 0.02}, {-0.04, 0.08, 0.09}};
     const auto d = static_cast<std::size_t>(body.dimension());
-    set_field(body, problem.displacement(), [&](const Point& x) {
+    set_field(body, problem.state().displacement(), [&](const Point& x) {
       Point v{0.3, -0.2, 0.1};
       for (std::size_t a = 0; a < d; ++a)
         for (std::size_t b = 0; b < d; ++b) v[a] += G[a][b] * x[b];
       return v;
     });
     PointSamples samples;
-    REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+    REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
     const bool gradients = problem.model().has_gradients();   // a pair law has none, only energies
     const Field condition = problem.model().shape_tensor_condition();
-    double worst = 0, densities = 0, energy = energy_of(problem, problem.displacement());
+    double worst = 0, densities = 0, energy = energy_of(problem, problem.state().displacement());
     for (const std::int32_t p : body.internal()) {
       densities += samples.strain_energy_density.data()[p] * body.volume(static_cast<std::size_t>(p));
       if (!gradients || !std::isfinite(condition.data()[p]) || condition.data()[p] > 1e4) continue;
@@ -195,7 +195,7 @@ TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores t
     if (c.body.dimension == 1) continue;
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     if (problem.model().has_gradients() && !problem.laws().objective()) continue;
     const Body& body = problem.body();
     // Rotation about (1, 2, 3)/sqrt(14) in 3D, about z in 2D.
@@ -205,11 +205,11 @@ TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores t
     const double cross[3][3] = {{0, -axis[2], axis[1]}, {axis[2], 0, -axis[0]}, {-axis[1], axis[0], 0}};
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) R[a][b] = (a == b ? co : 0.0) + (1 - co) * axis[a] * axis[b] + si * cross[a][b];
-    deform(body, problem.displacement(), 31, 0.02);
-    const FieldView u = problem.displacement();
+    deform(body, problem.state().displacement(), 31, 0.02);
+    const FieldView u = problem.state().displacement();
     const double energy = energy_of(problem, u);
     const Field f = force_of(problem, u);
-    Field rotated = problem.make_field(u.components), turned = problem.make_field(u.components);
+    Field rotated = problem.body().make_field(u.components), turned = problem.body().make_field(u.components);
     for (const std::int32_t p : body.internal()) {
       const Point x = body.position(static_cast<std::size_t>(p));
       for (int a = 0; a < u.components; ++a) {
@@ -245,9 +245,9 @@ TEST_CASE("kinematics: a body at rest is bitwise at rest") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
-    CHECK(energy_of(problem, problem.displacement()) == 0.0);
-    CHECK(largest(problem.body(), force_of(problem, problem.displacement())) == 0.0);
+    ModelProblem& problem = simulation->problem();
+    CHECK(energy_of(problem, problem.state().displacement()) == 0.0);
+    CHECK(largest(problem.body(), force_of(problem, problem.state().displacement())) == 0.0);
   }
 }
 
@@ -263,18 +263,18 @@ TEST_CASE("kinematics: neither units nor a factor of the influence function matt
     plain.influence = "type = \"expression\", formula = \"exp(-r^2)\"";
     factor.influence = "type = \"expression\", formula = \"37.5 * exp(-r^2)\"";
     const auto with_factor = build(scene_text(factor, kinematics_table(c.example)));
-    deform(simulation->problem().body(), simulation->problem().displacement(), 41, 0.02);
+    deform(simulation->problem().body(), simulation->problem().state().displacement(), 41, 0.02);
     const auto copy = [&](Simulation& to, double scale) {
-      for (std::size_t k = 0; k < simulation->problem().displacement().size(); ++k) {
-        to.problem().displacement().data[k] = scale * simulation->problem().displacement().data[k];
+      for (std::size_t k = 0; k < simulation->problem().state().displacement().size(); ++k) {
+        to.problem().state().displacement().data[k] = scale * simulation->problem().state().displacement().data[k];
       }
     };
     copy(*scaled, other.scale);
     copy(*with_factor, 1.0);
     const Body& body = simulation->problem().body();
-    const Field f = force_of(simulation->problem(), simulation->problem().displacement());
-    const Field g = force_of(scaled->problem(), scaled->problem().displacement());
-    const Field h = force_of(with_factor->problem(), with_factor->problem().displacement());
+    const Field f = force_of(simulation->problem(), simulation->problem().state().displacement());
+    const Field g = force_of(scaled->problem(), scaled->problem().state().displacement());
+    const Field h = force_of(with_factor->problem(), with_factor->problem().state().displacement());
     double units = 0, factors = 0;
     const double area = other.scale * other.scale;
     for (const std::int32_t p : body.internal())
@@ -296,16 +296,16 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     if (body.dimension == 2) body.cells = 60;
     if (body.dimension == 3) body.cells = c.body.cloud ? 12 : 16;
     const auto simulation = build(scene_text(body, kinematics_table(c.example)));
-    BodyProblem& problem = simulation->problem();
-    deform(problem.body(), problem.displacement(), 51, 0.02);
+    ModelProblem& problem = simulation->problem();
+    deform(problem.body(), problem.state().displacement(), 51, 0.02);
     const int threads = thread_count();
     set_thread_count(1);
-    const Field one = force_of(problem, problem.displacement());
-    const double energy = energy_of(problem, problem.displacement());
+    const Field one = force_of(problem, problem.state().displacement());
+    const double energy = energy_of(problem, problem.state().displacement());
     for (const int count : {2, 3}) {
       set_thread_count(count);
-      const Field more = force_of(problem, problem.displacement());
-      bool same = energy == energy_of(problem, problem.displacement());
+      const Field more = force_of(problem, problem.state().displacement());
+      bool same = energy == energy_of(problem, problem.state().displacement());
       for (const std::int32_t p : problem.body().internal())
         for (int a = 0; a < one.components(); ++a) same = same && one.component(a)[p] == more.component(a)[p];
       CHECK_MESSAGE(same, "the result is another one with ", count, " threads");
@@ -313,16 +313,16 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     set_thread_count(threads);
     body.skip = body.share = false;
     const auto plain = build(scene_text(body, kinematics_table(c.example)));
-    std::copy_n(problem.displacement().data, problem.displacement().size(), plain->problem().displacement().data);
-    const Field full = force_of(plain->problem(), plain->problem().displacement());
+    std::copy_n(problem.state().displacement().data, problem.state().displacement().size(), plain->problem().state().displacement().data);
+    const Field full = force_of(plain->problem(), plain->problem().state().displacement());
     double worst = 0;
     for (const std::int32_t p : problem.body().internal())
       for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(one.component(a)[p] - full.component(a)[p]));
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
     const Field w = random_direction(problem, 52);
     Field Kw = poisoned(problem), expected = poisoned(problem);
-    REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
-    REQUIRE(plain->problem().tangent_action(problem.displacement(), w, expected).ok());
+    REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+    REQUIRE(plain->problem().tangent_action(problem.state().displacement(), w, expected).ok());
     worst = 0;
     for (const std::int32_t p : problem.body().internal())
       for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(Kw.component(a)[p] - expected.component(a)[p]));

@@ -44,21 +44,21 @@ TEST_CASE("kinematics: agrees with the dense reference") {
     for (const BodyOptions& options : bodies()) {
       INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice", options.crack ? " cracked" : ""));
       const auto simulation = build(scene_text(options, kinematics_table(example)));
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const Body& body = problem.body();
-      deform(body, problem.displacement(), 61, 0.02);
+      deform(body, problem.state().displacement(), 61, 0.02);
       const auto d = static_cast<Eigen::Index>(body.dimension()), n = static_cast<Eigen::Index>(body.points());
-      const reference::Vector u = dense(body, problem.displacement());
+      const reference::Vector u = dense(body, problem.state().displacement());
       const auto influence = subject().registry.influence(*simulation->scene().influence);
       const reference::Operator op = reference::build(cloud_of(body, *influence), *description);
       const reference::Vector expected = reference::force(op, saint_venant_kirchhoff(), u);
       const double expected_energy = reference::energy(op, saint_venant_kirchhoff(), u), scale = expected.cwiseAbs().maxCoeff();
       double energy = 0, worst = 0;
       Eigen::Index at = 0;
-      REQUIRE(problem.evaluate_forces(problem.displacement(), problem.internal_force(), &energy).ok());
+      REQUIRE(problem.evaluate_forces(problem.state().displacement(), problem.state().internal_force(), &energy).ok());
       for (Eigen::Index i = 0; i < n; ++i)
         for (Eigen::Index c = 0; c < d; ++c) {
-          const double error = std::abs(problem.internal_force().component(static_cast<int>(c))[body.internal()[static_cast<std::size_t>(i)]] - expected[d * i + c]);
+          const double error = std::abs(problem.state().internal_force().component(static_cast<int>(c))[body.internal()[static_cast<std::size_t>(i)]] - expected[d * i + c]);
           if (!(error <= worst)) worst = error, at = i;
         }
       CHECK_MESSAGE(std::abs(energy - expected_energy) <= tolerance * expected_energy, "energy ", energy, ", reference ", expected_energy);

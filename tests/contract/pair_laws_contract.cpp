@@ -41,10 +41,10 @@ double distance_to_surface(const Body& body, const Point& x) {
 
 /// Energy densities under u = H x, H diagonal.
 Field densities(Simulation& simulation, const Point& H) {
-  BodyProblem& problem = simulation.problem();
-  set_field(problem.body(), problem.displacement(), [&](const Point& x) { return Point{H[0] * x[0], H[1] * x[1], H[2] * x[2]}; });
+  ModelProblem& problem = simulation.problem();
+  set_field(problem.body(), problem.state().displacement(), [&](const Point& x) { return Point{H[0] * x[0], H[1] * x[1], H[2] * x[2]}; });
   PointSamples samples;
-  REQUIRE(problem.model().sample(problem.displacement(), samples).ok());
+  REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
   return samples.strain_energy_density;
 }
 
@@ -65,18 +65,18 @@ TEST_CASE("kinematics: pair laws agree with the dense reference") {
             options.crack = crack;
             options.plane = plane;
             const auto simulation = build(scene_text(options, kinematics_table(law)));
-            BodyProblem& problem = simulation->problem();
+            ModelProblem& problem = simulation->problem();
             const Body& body = problem.body();
             Noise random(61);
-            set_field(body, problem.displacement(), [&](const Point& x) {
+            set_field(body, problem.state().displacement(), [&](const Point& x) {
               return Point{0.05 * x[0] + 0.03 * random(), 0.05 * x[1] + 0.03 * random(), 0.05 * x[2] + 0.03 * random()};
             });
-            const reference::Vector u = dense(body, problem.displacement());
+            const reference::Vector u = dense(body, problem.state().displacement());
             const auto influence = subject().registry.influence(*simulation->scene().influence);
             const reference::Cloud cloud_of_body = cloud_of(body, *influence);
-            Field f = problem.make_field(d);
+            Field f = problem.body().make_field(d);
             double energy = 0;
-            REQUIRE(problem.evaluate_forces(problem.displacement(), f, &energy).ok());
+            REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &energy).ok());
             const reference::Vector expected = reference::pair_force(cloud_of_body, law.part, elasticity(body), u);
             const double expected_energy = reference::pair_energy(cloud_of_body, law.part, elasticity(body), u);
             const double worst = (dense(body, f) - expected).cwiseAbs().maxCoeff();
@@ -198,13 +198,13 @@ TEST_CASE("kinematics: a pair law reports points on top of each other") {
       options.dimension = 2;
       options.cloud = cloud;
       const auto simulation = build(scene_text(options, kinematics_table(law)));
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const Body& body = problem.body();
       const auto p = static_cast<std::size_t>(body.internal()[40]), q = static_cast<std::size_t>(body.internal()[41]);
       const Point x = body.position(p), y = body.position(q);
-      for (int c = 0; c < 2; ++c) problem.displacement().component(c)[q] = x[static_cast<std::size_t>(c)] - y[static_cast<std::size_t>(c)];
-      Field f = problem.make_field(2);
-      const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), f, nullptr);
+      for (int c = 0; c < 2; ++c) problem.state().displacement().component(c)[q] = x[static_cast<std::size_t>(c)] - y[static_cast<std::size_t>(c)];
+      Field f = problem.body().make_field(2);
+      const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), f, nullptr);
       CHECK(!status.ok());
       CHECK(status.description.find("non-finite length") != std::string::npos);
     }

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "perikit/core/parallel.hpp"
+#include "perikit/problem/motion.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 
 using namespace perikit;
@@ -39,14 +40,14 @@ std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrato
 }
 
 /// Largest |internal + external| over free components, in units of the largest reaction.
-double residual(BodyProblem& problem) {
-  const ConstFieldView free = problem.free_mask();
-  const FieldView external = problem.any_load() ? problem.external_force() : FieldView{};
+double residual(ModelProblem& problem) {
+  const ConstFieldView free = problem.constraints().free();
+  const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
   double most = 0;
   for (std::size_t k = 0; k < free.size(); ++k) {
-    if (free.data[k] == 1.0) most = std::max(most, std::abs(problem.internal_force().data[k] + (external.data ? external.data[k] : 0.0)));
+    if (free.data[k] == 1.0) most = std::max(most, std::abs(problem.state().internal_force().data[k] + (external.data ? external.data[k] : 0.0)));
   }
-  return most / largest(problem.body(), problem.reaction(false, problem.time()));
+  return most / largest(problem.body(), reactions(problem, false, problem.state().time));
 }
 
 }  // namespace
@@ -60,21 +61,21 @@ TEST_CASE("integrator: quasi-static steps are in equilibrium, meet what is presc
     for (const Example& integrator : quasi_static_integrators(5)) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const Body& b = problem.body();
       Watch watch(*simulation);
       double missed = 0, unbalanced = 0, load = 0;
       watch.each = [&](const StepReport& report) {
         if (report.step == 0) return;
         const double t = report.time;
-        CHECK(problem.time() == t);
+        CHECK(problem.state().time == t);
         for (const std::int32_t p : b.set("right")) {
           const double x = b.position(static_cast<std::size_t>(p))[0];
-          missed = std::max({missed, std::abs(problem.displacement().component(0)[p] - 0.3 * t),
-                             std::abs(problem.displacement().component(1)[p] - 0.1 * std::sin(std::numbers::pi * t / 2) * x)});
+          missed = std::max({missed, std::abs(problem.state().displacement().component(0)[p] - 0.3 * t),
+                             std::abs(problem.state().displacement().component(1)[p] - 0.1 * std::sin(std::numbers::pi * t / 2) * x)});
         }
         unbalanced = std::max(unbalanced, residual(problem));
-        load = std::max(load, std::abs(total(b, problem.external_force(), 1) - 0.02 * t));
+        load = std::max(load, std::abs(total(b, problem.state().external_force(), 1) - 0.02 * t));
       };
       simulation->run(watch);
       CHECK(watch.reports.back().time == 1.0);
@@ -83,15 +84,15 @@ TEST_CASE("integrator: quasi-static steps are in equilibrium, meet what is presc
       CHECK_MESSAGE(missed <= 1e-15, "a prescribed displacement is missed by ", missed);
       CHECK_MESSAGE(unbalanced <= 100 * tolerance, "a free component keeps a residual of ", unbalanced, " of the largest reaction");
       CHECK_MESSAGE(load <= 1e-15, "the load at a step is off by ", load);
-      const Field reaction = problem.reaction(false, 1.0);
+      const Field reaction = reactions(problem, false, 1.0);
       for (const int c : {0, 1}) {
-        const double sum = total(b, reaction, c) + total(b, problem.external_force(), c);
+        const double sum = total(b, reaction, c) + total(b, problem.state().external_force(), c);
         CHECK_MESSAGE(std::abs(sum) <= 100 * tolerance * static_cast<double>(b.points()) * largest(b, reaction), "reactions and loads leave ", sum);
       }
       double energy = 0;
-      Field force = problem.make_field(2);
-      REQUIRE(problem.evaluate_forces(problem.displacement(), force, &energy).ok());
-      CHECK(std::abs(problem.energies().strain - energy) <= 1e-12 * energy);
+      Field force = problem.body().make_field(2);
+      REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
+      CHECK(std::abs(problem.state().energies.strain - energy) <= 1e-12 * energy);
     }
   }
 }
@@ -110,13 +111,13 @@ TEST_CASE("integrator: a linear quasi-static problem has linear answers, and its
       watch.each = [&](const StepReport& report) {
         if (report.time != 0.5) return;
         half = displacement(*simulation);
-        energy_at_half = simulation->problem().energies().strain;
+        energy_at_half = simulation->problem().state().energies.strain;
       };
       simulation->run(watch);
       std::vector<double> whole = displacement(*simulation), twice = half;
       REQUIRE_MESSAGE(half.size() == whole.size(), "no step at half the load");
       for (double& u : twice) u *= 2;
-      const Energies& energies = simulation->problem().energies();
+      const Energies& energies = simulation->problem().state().energies;
       CHECK_MESSAGE(difference(twice, whole) <= 1e-7 * largest(whole), "twice half the load moves ", difference(twice, whole), " further");
       CHECK(std::abs(4 * energy_at_half - energies.strain) <= 1e-7 * energies.strain);
       CHECK_MESSAGE(std::abs(energies.external_work - energies.strain) <= 1e-7 * energies.strain, "work ", energies.external_work, ", stored ", energies.strain);
@@ -148,7 +149,7 @@ TEST_CASE("integrator: the quasi-static answer depends neither on the steps nor 
       second->problem().restore(first->problem().snapshot());
       const Watch rest = run(*second);
       CHECK(rest.reports.front().step == steps / 2 + 1);
-      CHECK(second->problem().time() == 1.0);
+      CHECK(second->problem().state().time == 1.0);
       CHECK_MESSAGE(difference(displacement(*second), u) <= 1e-10 * largest(u), "a stop changes it by ", difference(displacement(*second), u));
     }
   }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 
+#include "perikit/problem/motion.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/witness_problem.hpp"
 
@@ -48,19 +49,19 @@ std::unique_ptr<Simulation> build_run(BodyOptions body, const std::string& integ
 using Bonds = std::map<std::pair<std::int32_t, std::int32_t>, double>;
 
 /// Integrity of the bonds that have failed, by their ends.
-Bonds failed(const BodyProblem& problem) {
+Bonds failed(const ModelProblem& problem) {
   Bonds bonds;
   for (const BondChange& b : problem.model().changed_bonds())
     bonds[{std::min(b.point, b.far), std::max(b.point, b.far)}] = b.integrity;
   return bonds;
 }
 
-double stretch(BodyProblem& problem, std::int32_t p, std::int32_t q) {
+double stretch(ModelProblem& problem, std::int32_t p, std::int32_t q) {
   const Point x = problem.body().position(static_cast<std::size_t>(p)), y = problem.body().position(static_cast<std::size_t>(q));
   double before = 0, now = 0;
   for (std::size_t c = 0; c < 2; ++c) {
     const int k = static_cast<int>(c);
-    const double xi = y[c] - x[c], eta = xi + problem.displacement().component(k)[q] - problem.displacement().component(k)[p];
+    const double xi = y[c] - x[c], eta = xi + problem.state().displacement().component(k)[q] - problem.state().displacement().component(k)[p];
     before += xi * xi;
     now += eta * eta;
   }
@@ -81,12 +82,12 @@ std::vector<std::pair<std::int32_t, std::int32_t>> free_bonds(const Body& body) 
 }
 
 /// Largest force on a free component, in units of the largest reaction of the whole run.
-double unbalanced(BodyProblem& problem, double& reaction) {
-  const ConstFieldView free = problem.free_mask();
-  reaction = std::max(reaction, largest(problem.body(), problem.reaction(false, problem.time())));
+double unbalanced(ModelProblem& problem, double& reaction) {
+  const ConstFieldView free = problem.constraints().free();
+  reaction = std::max(reaction, largest(problem.body(), reactions(problem, false, problem.state().time)));
   double most = 0;
-  Field force = problem.make_field(2);
-  REQUIRE(problem.evaluate_forces(problem.displacement(), force, nullptr).ok());
+  Field force = problem.body().make_field(2);
+  REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, nullptr).ok());
   for (std::size_t k = 0; k < free.size(); ++k)
     if (free.data[k] == 1.0) most = std::max(most, std::abs(force.data()[k]));
   return most / reaction;
@@ -115,7 +116,7 @@ TEST_CASE(
         if (integrator.table != first && kinematics != shapes.front()) continue;
         INFO(integrator.part, " (", integrator.table, "), ", kinematics, ", ", damage);
         const auto simulation = build_run(plate(damage), integrator_table(integrator), kinematics);
-        BodyProblem& problem = simulation->problem();
+        ModelProblem& problem = simulation->problem();
         const bool bits = damage == brittle;
         const double onset = bits ? 0.04 : 0.02, failure = bits ? 0.04 : 0.06;
         Watch watch(*simulation);
@@ -142,8 +143,8 @@ TEST_CASE(
           residual = std::max(residual, unbalanced(problem, reaction));
           CHECK(failed(problem) == known);
           // Not so where families without a penalty against zero-energy modes change: run.log counts what that adds.
-          if (problem.fracture_summary().find("raised") == std::string::npos) CHECK(problem.energies().dissipated >= dissipated);
-          dissipated = problem.energies().dissipated;
+          if (problem.fracture_summary().find("raised") == std::string::npos) CHECK(problem.state().energies.dissipated >= dissipated);
+          dissipated = problem.state().energies.dissipated;
           // What is stretched beyond the limit has failed.
           for (const auto& [p, q] : free_bonds(problem.body()))
             if (stretch(problem, p, q) > failure * (1 + 1e-5)) CHECK((known.contains({p, q}) && known.at({p, q}) == 0));
@@ -158,7 +159,7 @@ TEST_CASE(
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second == 0; }));
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second > 0; }) == !bits);
         CHECK(known.size() < problem.model().report().bonds / 4);
-        const Energies& e = problem.energies();
+        const Energies& e = problem.state().energies;
         CHECK(e.dissipated > 0);
         CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 0.01 * e.external_work, "work ", e.external_work,
                       ", stored ", e.strain, ", dissipated ", e.dissipated);
@@ -181,8 +182,8 @@ TEST_CASE("integrator: the crack of a quasi-static run is that of another integr
         const std::vector<double> u = displacement(*reference);
         CHECK_MESSAGE(difference(displacement(*simulation), u) <= 1e-6 * largest(u), "moved by ",
                       difference(displacement(*simulation), u));
-        CHECK(simulation->problem().energies().dissipated ==
-              doctest::Approx(reference->problem().energies().dissipated).epsilon(1e-6));
+        CHECK(simulation->problem().state().energies.dissipated ==
+              doctest::Approx(reference->problem().state().energies.dissipated).epsilon(1e-6));
       }
     }
 }

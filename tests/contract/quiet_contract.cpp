@@ -21,8 +21,8 @@ class Pair {
     body.skip = false;
     all_ = build(scene_text(body, kinematics));
   }
-  BodyProblem& some() { return some_->problem(); }
-  BodyProblem& all() { return all_->problem(); }
+  ModelProblem& some() { return some_->problem(); }
+  ModelProblem& all() { return all_->problem(); }
 
   /// A displacement of the points within a short way of one end of the body, at rest elsewhere.
   Field bump(bool at_upper_end) {
@@ -34,7 +34,7 @@ class Pair {
     }
     const double from = at_upper_end ? high : low;
     Noise noise(at_upper_end ? 61 : 62);
-    Field u = some().make_field(some().dimension());
+    Field u = some().make_field();
     set_field(body, u, [&](const Point& x) {
       const double size = std::abs(x[0] - from) < 4 * body.spacing() ? 0.03 * body.spacing() : 0.0;
       return Point{size * noise(), size * noise(), size * noise()};
@@ -46,9 +46,9 @@ class Pair {
   void compare(const Field& u, const char* when) {
     double energy[2] = {};
     Field force[2];
-    BodyProblem* const problems[2] = {&some(), &all()};
+    ModelProblem* const problems[2] = {&some(), &all()};
     for (int k = 0; k < 2; ++k) {
-      force[k] = problems[k]->make_field(problems[k]->dimension());
+      force[k] = problems[k]->make_field();
       force[k].fill(std::numeric_limits<double>::quiet_NaN());
       const EvaluationStatus status = problems[k]->evaluate_forces(u, force[k], &energy[k]);
       REQUIRE_MESSAGE(status.ok(), status.description);
@@ -73,17 +73,17 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     if (body.dimension == 2) body.cells = 96;
     if (body.dimension == 3) body.cells = 12;
     Pair pair(body, kinematics_table(c.example));
-    const Field rest = pair.some().make_field(body.dimension), left = pair.bump(false), right = pair.bump(true);
+    const Field rest = pair.some().make_field(), left = pair.bump(false), right = pair.bump(true);
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");
     const QuietCounts before = pair.some().model().quiet_counts();
-    for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
-      Field Kw = problem->make_field(body.dimension);
+    for (ModelProblem* problem : {&pair.some(), &pair.all()}) {
+      Field Kw = problem->make_field();
       REQUIRE(problem->tangent_action(right, left, Kw).ok());
     }
     pair.compare(left, "after a tangent action");
-    for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
+    for (ModelProblem* problem : {&pair.some(), &pair.all()}) {
       PointSamples samples;
       REQUIRE(problem->model().sample(right, samples).ok());
     }

@@ -19,10 +19,10 @@ struct Result {
 };
 
 /// Forces, energy and tangent action of the problem's displacement.
-Result evaluate(BodyProblem& problem, ConstFieldView w) {
-  Result r{problem.make_field(problem.dimension()), problem.make_field(problem.dimension())};
-  REQUIRE(problem.evaluate_forces(problem.displacement(), r.force, &r.energy).ok());
-  REQUIRE(problem.tangent_action(problem.displacement(), w, r.stiffness).ok());
+Result evaluate(ModelProblem& problem, ConstFieldView w) {
+  Result r{problem.make_field(), problem.make_field()};
+  REQUIRE(problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy).ok());
+  REQUIRE(problem.tangent_action(problem.state().displacement(), w, r.stiffness).ok());
   return r;
 }
 
@@ -53,11 +53,11 @@ TEST_CASE("stabilization: what it adds agrees with the dense reference") {
             const Body& body = with->problem().body();
             Field w = body.make_field(d);
             deform(body, w, 72, 0.5);
-            for (Simulation* simulation : {plain.get(), with.get()}) deform(body, simulation->problem().displacement(), 71, 0.02);
+            for (Simulation* simulation : {plain.get(), with.get()}) deform(body, simulation->problem().state().displacement(), 71, 0.02);
             const Result base = evaluate(plain->problem(), w), sum = evaluate(with->problem(), w);
             const auto influence = subject().registry.influence(*with->scene().influence);
             const reference::Matrix S = reference::stabilization(cloud_of(body, *influence), example.part, elasticity(body), coefficient, order, 1e-8);
-            const reference::Vector u = dense(body, with->problem().displacement());
+            const reference::Vector u = dense(body, with->problem().state().displacement());
             const reference::Vector force = dense(body, sum.force) - dense(body, base.force), stiffness = dense(body, sum.stiffness) - dense(body, base.stiffness);
             CHECK((force + S * u).cwiseAbs().maxCoeff() <= tolerance * dense(body, sum.force).cwiseAbs().maxCoeff());
             CHECK((stiffness - S * dense(body, w)).cwiseAbs().maxCoeff() <= tolerance * dense(body, sum.stiffness).cwiseAbs().maxCoeff());
@@ -78,13 +78,13 @@ TEST_CASE("stabilization: a sawtooth, which the point gradient does not see, sto
         options.cloud = cloud;
         const auto energy = [&](const std::string& kinematics) {
           const auto simulation = build(scene_text(options, kinematics));
-          BodyProblem& problem = simulation->problem();
-          set_field(problem.body(), problem.displacement(), [](const Point& x) {
+          ModelProblem& problem = simulation->problem();
+          set_field(problem.body(), problem.state().displacement(), [](const Point& x) {
             return Point{(static_cast<int>(std::floor(x[0]) + std::floor(x[1]) + std::floor(x[2])) % 2 == 0 ? 0.05 : -0.05), 0, 0};
           });
-          Field f = problem.make_field(d);
+          Field f = problem.body().make_field(d);
           double sum = 0;
-          REQUIRE(problem.evaluate_forces(problem.displacement(), f, &sum).ok());
+          REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &sum).ok());
           return sum;
         };
         // Surfaces and jitter make the plain gradient see a little of it.
@@ -110,16 +110,16 @@ TEST_CASE("stabilization: horizons of more cells than the lattice kernels buffer
       deform(body, w, 82, 0.02);
       double scale = 0;
       const auto energy = [&](double step) {
-        for (std::size_t k = 0; k < u.size(); ++k) plain->problem().displacement().data[k] = with->problem().displacement().data[k] = u.data()[k] + step * w.data()[k];
+        for (std::size_t k = 0; k < u.size(); ++k) plain->problem().state().displacement().data[k] = with->problem().state().displacement().data[k] = u.data()[k] + step * w.data()[k];
         double base = 0, sum = 0;
-        REQUIRE(plain->problem().evaluate_forces(plain->problem().displacement(), plain->problem().internal_force(), &base).ok());
-        REQUIRE(with->problem().evaluate_forces(with->problem().displacement(), with->problem().internal_force(), &sum).ok());
+        REQUIRE(plain->problem().evaluate_forces(plain->problem().state().displacement(), plain->problem().state().internal_force(), &base).ok());
+        REQUIRE(with->problem().evaluate_forces(with->problem().state().displacement(), with->problem().state().internal_force(), &sum).ok());
         scale = std::max(scale, sum);
         return sum - base;
       };
       const double difference = energy(1) - energy(-1);
       energy(0);
-      for (std::size_t k = 0; k < f.size(); ++k) f.data()[k] = with->problem().internal_force().data[k] - plain->problem().internal_force().data[k];
+      for (std::size_t k = 0; k < f.size(); ++k) f.data()[k] = with->problem().state().internal_force().data[k] - plain->problem().state().internal_force().data[k];
       CHECK(std::abs(difference + 2 * dot(body, f, w)) <= 1e-11 * scale);
       CHECK(std::abs(difference) > 1e-7 * scale);
     }

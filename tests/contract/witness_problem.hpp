@@ -10,11 +10,11 @@ namespace perikit::contract {
 class WitnessProblem final : public ForwardingProblem {
  public:
   using ForwardingProblem::ForwardingProblem;
-  std::function<void()> before, after;  ///< of advance_history
+  std::function<void()> before, after;  ///< of advance
 
-  bool advance_history(double time_step, ConstFieldView velocity) override {
+  bool advance(double time_step, ConstFieldView velocity) override {
     if (before) before();
-    const bool changed = of_.advance_history(time_step, velocity);
+    const bool changed = of_.advance(time_step, velocity);
     if (after) after();
     return changed;
   }

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "perikit/problem/motion.hpp"
+#include "perikit/sdk/stable_step.hpp"
 #include "tests/stability/measures.hpp"
 
 namespace perikit::stability {
@@ -11,13 +13,13 @@ namespace {
 /// The total energy of every so many steps, and the sign changes of the displacement of one point.
 class EnergyWatcher final : public Observer {
  public:
-  EnergyWatcher(BodyProblem& problem, std::int64_t every)
+  EnergyWatcher(ModelProblem& problem, std::int64_t every)
       : problem_(problem), every_(every), end_(problem.body().internal().back()) {}
   bool wants_sample(std::int64_t step, double) override { return step % every_ == 0; }
   void step_done(const StepReport& report) override {
     if (report.step % every_ != 0) return;
-    energies_.push_back(problem_.energies().strain + problem_.kinetic_energy(problem_.velocity()));
-    const double u = problem_.displacement().component(0)[end_];
+    energies_.push_back(problem_.state().energies.strain + kinetic_energy(problem_, problem_.state().velocity()));
+    const double u = problem_.state().displacement().component(0)[end_];
     signs_ += u * last_ < 0;
     last_ = u;
   }
@@ -40,7 +42,7 @@ class EnergyWatcher final : public Observer {
   }
 
  private:
-  BodyProblem& problem_;
+  ModelProblem& problem_;
   std::int64_t every_;
   std::int32_t end_;
   std::vector<double> energies_;
@@ -86,7 +88,7 @@ Vibration vibrate(Registry& registry, const std::string& kinematics, std::int64_
     return std::make_unique<Simulation>(parse_scene(scene(integrator), "vibration.toml", registry), registry);
   };
   const auto first = build("type = \"verlet\"\nend_time = 1.0");
-  const double step = 0.9 * 2 / std::sqrt(first->problem().largest_eigenvalue(first->problem().displacement()));
+  const double step = 0.9 * 2 / std::sqrt(largest_eigenvalue(first->problem(), first->problem().state().displacement()));
   const auto simulation =
       build(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
 

@@ -1,3 +1,5 @@
+#include "perikit/problem/motion.hpp"
+#include "perikit/sdk/stable_step.hpp"
 #include "tests/stability/measures.hpp"
 
 #include <fmt/format.h>
@@ -68,12 +70,12 @@ Eigen::MatrixXd rigid_motions(const Eigen::MatrixXd& x, int d) {
 }
 
 /// Assembled tangent over the mass, point by point.
-Eigen::MatrixXd dense_tangent(BodyProblem& problem) {
+Eigen::MatrixXd dense_tangent(ModelProblem& problem) {
   BlockMatrix K;
-  Field rest = problem.make_field(problem.dimension());
+  Field rest = problem.make_field();
   if (!problem.assemble_tangent(rest, K).ok()) throw RunError("no tangent at rest");
   const auto d = static_cast<Eigen::Index>(K.dimension);
-  const auto mass = problem.mass();
+  const auto mass = problem.masses().by_point();
   // Block rows are in the order of field indices; positions in input order.
   std::vector<Eigen::Index> row(K.rows());
   for (std::size_t r = 0; r < K.rows(); ++r) row[r] = problem.body().input_of(static_cast<std::size_t>(K.point[r]));
@@ -107,10 +109,10 @@ Eigen::VectorXd roughness(const Eigen::MatrixXd& modes, const Eigen::MatrixXd& x
 /// Watches the kinetic energy.
 class Watcher final : public Observer {
  public:
-  explicit Watcher(BodyProblem& problem) : problem_(problem) {}
+  explicit Watcher(ModelProblem& problem) : problem_(problem) {}
   bool wants_sample(std::int64_t, double) override { return true; }
   void step_done(const StepReport& report) override {
-    const double kinetic = problem_.kinetic_energy(problem_.velocity());
+    const double kinetic = kinetic_energy(problem_, problem_.state().velocity());
     if (report.step == 0) start_ = kinetic;
     most_ = std::isfinite(kinetic) ? std::max(most_, kinetic) : std::numeric_limits<double>::infinity();
   }
@@ -119,7 +121,7 @@ class Watcher final : public Observer {
   double growth() const { return most_ / start_; }
 
  private:
-  BodyProblem& problem_;
+  ModelProblem& problem_;
   double start_ = 0, most_ = 0;
 };
 
@@ -153,7 +155,7 @@ std::unique_ptr<Simulation> Specimen::make(const std::string& integrator) const 
 }
 
 Spectrum Specimen::spectrum() {
-  BodyProblem& problem = simulation_->problem();
+  ModelProblem& problem = simulation_->problem();
   const int d = problem.dimension();
   const Eigen::MatrixXd x = positions(problem.body()), K = dense_tangent(problem), rigid = rigid_motions(x, d);
   Spectrum result;
@@ -171,14 +173,14 @@ Spectrum Specimen::spectrum() {
     if (rough_modes(k) >= rough) result.lowest_rough = std::min(result.lowest_rough, values(k) / result.largest);
     result.zero_modes += std::abs(values(k)) < 1e-10 * result.largest;
   }
-  Field rest = problem.make_field(d);
-  result.estimate = problem.largest_eigenvalue(rest) / result.largest;
+  Field rest = problem.body().make_field(d);
+  result.estimate = largest_eigenvalue(problem, rest) / result.largest;
   result.poor_points = problem.model().report().singular_families;
   return result;
 }
 
 Accuracy Specimen::accuracy() {
-  BodyProblem& problem = simulation_->problem();
+  ModelProblem& problem = simulation_->problem();
   if (!problem.model().has_gradients()) return {};
   const Body& body = problem.body();
   const int d = problem.dimension(), n = d * d;
@@ -206,7 +208,7 @@ Accuracy Specimen::accuracy() {
   Accuracy result;
   const double middle = 0.5 * points_along(setting_) * spacing;
   for (const bool quadratic : {false, true}) {
-    Field u = problem.make_field(d);
+    Field u = problem.body().make_field(d);
     contract::set_field(body, u, [&](const Point& x) {
       Point v{};
       for (int a = 0; a < d; ++a)
@@ -238,9 +240,9 @@ std::unique_ptr<Simulation> Specimen::shaken(double largest, double share, std::
   const double step = share * 2 / std::sqrt(largest);
   auto simulation =
       make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   contract::Noise random(5);
-  contract::set_field(problem.body(), problem.velocity(), [&](const Point&) {
+  contract::set_field(problem.body(), problem.state().velocity(), [&](const Point&) {
     Point v{};
     for (int c = 0; c < problem.dimension(); ++c) v[static_cast<std::size_t>(c)] = 1e-8 * random();
     return v;

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "perikit/body/body.hpp"
+#include "perikit/build/body.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -38,7 +38,7 @@ type = "newton"
   FakeCatalogue parts;
   const Scene scene = parse_scene(text, "plate.toml", parts);
   try {
-    Body body(scene);
+    build_body(scene);
   } catch (const InputError& error) {
     return error.what();
   }

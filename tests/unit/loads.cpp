@@ -27,12 +27,12 @@ struct Resultant {
 };
 
 Resultant resultant(Simulation& simulation) {
-  BodyProblem& problem = simulation.problem();
-  problem.evaluate_loads(0.0, problem.external_force());
+  ModelProblem& problem = simulation.problem();
+  problem.loads().evaluate(0.0, problem.state().external_force());
   Resultant r;
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
-    const double fx = problem.external_force().component(0)[p], fy = problem.external_force().component(1)[p];
+    const double fx = problem.state().external_force().component(0)[p], fy = problem.state().external_force().component(1)[p];
     r.fx += fx;
     r.fy += fy;
     r.moment += x[0] * fy - x[1] * fx;

@@ -45,7 +45,7 @@ double distance(Simulation& a, Simulation& b) {
   double most = 0;
   for (const std::int32_t p : a.problem().body().internal())
     for (int c = 0; c < a.problem().dimension(); ++c)
-      most = std::max(most, std::abs(a.problem().displacement().component(c)[p] - b.problem().displacement().component(c)[p]));
+      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] - b.problem().state().displacement().component(c)[p]));
   return most;
 }
 

@@ -19,14 +19,14 @@ constexpr double reference_x = -5.840, reference_y = 6.941;  // of the corner (4
 /// Displacement of the corner (48, 60), where no point lies: the affine fit to the points within four spacings of it. (At L/120
 /// radii of 2.5 to 6 spacings give errors of 0.955 to 1.002 %.)
 Eigen::Vector2d corner(Simulation& simulation, double spacing) {
-  BodyProblem& problem = simulation.problem();
+  ModelProblem& problem = simulation.problem();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
     const Eigen::Vector3d basis(1, (x[0] - 48) / spacing, (x[1] - 60) / spacing);
     if (basis.tail<2>().norm() > 4) continue;
-    const FieldView u = problem.displacement();
+    const FieldView u = problem.state().displacement();
     normal += basis * basis.transpose();
     right += basis * Eigen::RowVector2d(u.component(0)[p], u.component(1)[p]);
   }

@@ -19,7 +19,7 @@ double roughness(const std::string& kinematics, double ratio, int points) {
       "chowdhury/diamond_hole.toml",
       {"kinematics.type=" + kinematics, fmt::format("family.horizon_ratio={}", ratio), fmt::format("constants.n={}", points)});
   CHECK(run(*simulation).reports.back().residual <= 1e-8);
-  const double* u = simulation->problem().displacement().component(0);
+  const double* u = simulation->problem().state().displacement().component(0);
   const std::vector<std::int32_t>& line = simulation->problem().body().set("AB");
   double sum = 0;
   for (std::size_t k = 1; k + 1 < line.size(); ++k) {

@@ -56,7 +56,7 @@ std::string rubber(double bulk) {
 double volume_change(Simulation& simulation) {
   const auto points = build(block("type = \"conventional\"", rubber(1.0), "[0, 0]", "[0, 0]", 1));
   PointSamples samples;
-  REQUIRE(points->problem().model().sample(simulation.problem().displacement(), samples).ok());
+  REQUIRE(points->problem().model().sample(simulation.problem().state().displacement(), samples).ok());
   double most = 0;
   for (const std::int32_t p : points->problem().body().internal()) {
     const auto H = [&](int c) { return samples.H.component(c)[p]; };
@@ -110,9 +110,9 @@ TEST_CASE("extremes: a block stretched to five times its length, sheared by thre
         CHECK(protocol.reports.back().time == 1.0);
         double most = 0;
         for (const std::int32_t p : simulation->problem().body().internal())
-          for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(simulation->problem().displacement().component(c)[p]));
+          for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(simulation->problem().state().displacement().component(c)[p]));
         CHECK(most <= 1e-6);
-        CHECK(std::abs(simulation->problem().energies().strain) <= 1e-10);
+        CHECK(std::abs(simulation->problem().state().energies.strain) <= 1e-10);
       }
     }
   }
@@ -134,9 +134,9 @@ TEST_CASE("extremes: five turns leave a body as it was") {
     CHECK(protocol.reports.back().time == 1.0);
     double most = 0;
     for (const std::int32_t p : simulation->problem().body().internal())
-      for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(simulation->problem().displacement().component(c)[p]));
+      for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(simulation->problem().state().displacement().component(c)[p]));
     CHECK(most <= 1e-7);
-    CHECK(std::abs(simulation->problem().energies().strain) <= 1e-14);
+    CHECK(std::abs(simulation->problem().state().energies.strain) <= 1e-14);
   }
 }
 
@@ -186,9 +186,9 @@ TEST_CASE("extremes: millimetres, newtons and tonnes give what metres, newtons a
         double most = 0, difference = 0;
         for (const std::int32_t p : a->problem().body().internal())
           for (int c = 0; c < 2; ++c) {
-            most = std::max(most, std::abs(a->problem().displacement().component(c)[p]));
-            difference = std::max(difference, std::abs(b->problem().displacement().component(c)[p] / mm.length -
-                                                       a->problem().displacement().component(c)[p]));
+            most = std::max(most, std::abs(a->problem().state().displacement().component(c)[p]));
+            difference = std::max(difference, std::abs(b->problem().state().displacement().component(c)[p] / mm.length -
+                                                       a->problem().state().displacement().component(c)[p]));
           }
         worst = std::max(worst, difference / most);
         CHECK(most > 0);
@@ -239,7 +239,7 @@ TEST_CASE("extremes: bodies of one, two and three points in every space run or s
               run(*simulation);
               ++ran;
               for (const std::int32_t p : simulation->problem().body().internal())
-                for (int c = 0; c < d; ++c) CHECK(std::isfinite(simulation->problem().displacement().component(c)[p]));
+                for (int c = 0; c < d; ++c) CHECK(std::isfinite(simulation->problem().state().displacement().component(c)[p]));
               CHECK_NOTHROW(simulation->summary());
             } catch (const InputError& error) {
               ++refused;

@@ -27,7 +27,7 @@ Balance run(Simulation& simulation) {
 
 /// Largest damage of the points where `inside` holds.
 template <class Inside>
-double most_damage(BodyProblem& problem, Inside&& inside) {
+double most_damage(ModelProblem& problem, Inside&& inside) {
   const Field damage = problem.model().damage();
   double most = 0;
   for (const std::int32_t p : problem.body().internal())
@@ -60,7 +60,7 @@ TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
     const auto simulation = load("partmann/mode_I.toml", {fmt::format("kinematics={}", kinematics), fmt::format("family.influence={}", influence),
                                                           fmt::format("damage.consistent={}", consistent), "body.lattice.spacing=4e-5", "constants.dx=4e-5", "integrator.end_time=1.6e-5",
                                                           "boundary=[{set=\"top\", velocity=[\"free\", 0.5, \"free\"]}, {set=\"bottom\", velocity=[\"free\", -0.5, \"free\"]}]"});
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const double before = most_damage(problem, [](const Point& x) { return x[0] > 0.2e-3; });
     const Balance balance = run(*simulation);
     CHECK(before == 0);
@@ -105,7 +105,7 @@ TEST_CASE("boundary tension: on clouds the forces of pair laws say which bonds a
     CHECK(5 * some.checked < some.groups);   // 95 of 100 by margins alone
     CHECK(some.failed > 0);
     CHECK(some.failed == every.failed);
-    const FieldView u = skipping->problem().displacement(), v = all->problem().displacement();
+    const FieldView u = skipping->problem().state().displacement(), v = all->problem().state().displacement();
     CHECK(std::equal(u.data, u.data + u.size(), v.data));
   }
 }
@@ -114,11 +114,11 @@ TEST_CASE("boundary tension: baqp with the cubic kernel branches, and no update 
   // On 100 x 40 x 4 points. Without fragments the same run raises it by 14 times what it dissipates.
   const auto simulation = load("partmann/boundary_tension.toml", {"kinematics=baqp", "family.influence=cubic_spline", "damage.consistent=true", "body.lattice.spacing=1e-3",
                                                                   "constants.dx=1e-3", "integrator.end_time=6e-5"});
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   double tip = 0.05, start = 0, off = 0;
   contract::Watch watch(*simulation);
   watch.each = [&](const StepReport& report) {
-    const Energies& e = problem.energies();
+    const Energies& e = problem.state().energies;
     if (report.time > 1e-5) off = std::max(off, std::abs(e.external_work - e.strain - e.kinetic - e.dissipated) / e.external_work);
     if (report.step % 10 != 0) return;
     const Field damage = problem.model().damage();
@@ -144,7 +144,7 @@ TEST_CASE("boundary tension: baqp with the cubic kernel branches, and no update 
   double most = 0;
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
-    for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(problem.displacement().component(c)[p]));
+    for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(problem.state().displacement().component(c)[p]));
     if (std::abs(x[0] - 0.0895) > 1e-5 || x[2] > -1e-3) continue;
     const bool broken = damage.data()[p] > 0.25;
     if (broken && !inside) ++arms;
@@ -161,11 +161,11 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     const auto simulation = load("partmann/boundary_tension.toml", {fmt::format("kinematics={}", kinematics), "family.influence=cubic_spline", "body.lattice.spacing=2e-3", "constants.dx=2e-3",
                                                                     "integrator.end_time=4e-6", "damage.no_fail=[]", "load=[]",
                                                                     "initial={velocity=[\"300 + 2e4*(x - 0.05)\", \"2e4*y\", \"2e4*z\"]}"});
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
     const auto momentum = [&](int c) {
       double sum = 0;
-      for (const std::int32_t p : body.internal()) sum += problem.mass()[static_cast<std::size_t>(p)] * problem.velocity().component(c)[p];
+      for (const std::int32_t p : body.internal()) sum += problem.masses().by_point()[static_cast<std::size_t>(p)] * problem.state().velocity().component(c)[p];
       return sum;
     };
     const Balance balance = run(*simulation);
@@ -177,7 +177,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     std::size_t fragments = 0;
     for (const std::int32_t p : body.internal()) {
       fragments += damage.data()[p] == 1;
-      for (int c = 0; c < 3; ++c) CHECK(std::isfinite(problem.displacement().component(c)[p]));
+      for (int c = 0; c < 3; ++c) CHECK(std::isfinite(problem.state().displacement().component(c)[p]));
     }
     CHECK(fragments > body.points() / 2);
     CHECK(balance.dissipated > 0);
@@ -186,7 +186,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
 
 TEST_CASE("rubber sheet: the crack of a stretched, nearly incompressible sheet runs on along its middle") {
   const auto simulation = load("fracture/rubber_sheet.toml", {"integrator.end_time=1.6e-3", "damage.gradual=false", "run.threads=1"});
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   const contract::Watch watch = contract::run(*simulation);
   const Energies first = watch.energies.front(), last = watch.energies.back();
   const double before = first.strain + first.kinetic;

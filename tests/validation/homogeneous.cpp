@@ -43,9 +43,9 @@ double component(ConstFieldView field, int dimension, int i, int j, std::int32_t
 
 void check_state(const std::string& scene, std::vector<std::string> overrides, const State& expected, double tolerance) {
   const auto simulation = load(scene, overrides);
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   PointSamples samples;
-  const EvaluationStatus status = problem.model().sample(problem.displacement(), samples);
+  const EvaluationStatus status = problem.model().sample(problem.state().displacement(), samples);
   REQUIRE_MESSAGE(status.ok(), status.description);
   double worst_P = 0, worst_sigma = 0, worst_psi = 0;
   for (const std::int32_t p : problem.body().internal()) {

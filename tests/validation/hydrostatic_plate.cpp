@@ -21,7 +21,7 @@ Errors errors(double ratio, double coefficient) {
   const auto simulation = load("hashim/hydrostatic_plate.toml",
                                {fmt::format("family.horizon_ratio={}", ratio), fmt::format("constants.G={}", coefficient)});
   CHECK(run(*simulation).reports.back().residual <= 1e-10);
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   constexpr double strain = 0.61334;
   double sum = 0;
   std::size_t points = 0;
@@ -29,7 +29,7 @@ Errors errors(double ratio, double coefficient) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
     const double size = strain * std::hypot(x[0], x[1]);
     if (size < 1e-9) continue;
-    const FieldView u = problem.displacement();
+    const FieldView u = problem.state().displacement();
     sum += std::hypot(u.component(0)[p] - strain * x[0], u.component(1)[p] - strain * x[1]) / size;
     ++points;
   }

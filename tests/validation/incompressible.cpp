@@ -33,11 +33,11 @@ std::vector<double> opening(const std::string& kinematics, const std::string& in
   const auto simulation = load("scabbia/crack_tip.toml", {kinematics, fmt::format("constants.n={}", parts), "integrator.steps=4",
                                                           "family.influence=\"" + influence + "\""});
   CHECK(run(*simulation).reports.back().residual <= 1e-9);
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   std::vector<double> profile;
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
-    if (x[0] < 1 && x[1] > 0 && x[1] < 1.0 / parts) profile.push_back(problem.displacement().component(1)[p]);
+    if (x[0] < 1 && x[1] > 0 && x[1] < 1.0 / parts) profile.push_back(problem.state().displacement().component(1)[p]);
   }
   return profile;
 }
@@ -82,8 +82,8 @@ TEST_CASE("convex tangents: no negative curvature, and the exact one where there
   for (const char* kinematics : {"{ type = \"selective\", base = { type = \"bond_associated\" } }", "{ type = \"baqp\" }"}) {
     INFO(kinematics);
     const auto simulation = load("scabbia/square.toml", {std::string("kinematics=") + kinematics, "constants.n=6"});
-    BodyProblem& problem = simulation->problem();
-    Field u = problem.make_field(2);
+    ModelProblem& problem = simulation->problem();
+    Field u = problem.body().make_field(2);
     // Spectrum of the assembled tangent over its largest eigenvalue: least one, and the matrix itself.
     const auto assembled = [&](bool convex) {
       BlockMatrix K;

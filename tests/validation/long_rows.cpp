@@ -33,13 +33,13 @@ Forces forces_of(int dimension, int length, int width, double jitter, const std:
       dimension, plane, lower[dimension - 1], upper, jitter, more, kinematics, zeros);
   const Scene scene = parse_scene(text, "long_rows.toml", registry());
   Simulation simulation(scene, registry());
-  BodyProblem& problem = simulation.problem();
+  ModelProblem& problem = simulation.problem();
   Forces result;
-  Field f = problem.make_field(dimension), Kw = problem.make_field(dimension);
-  REQUIRE(problem.evaluate_forces(problem.displacement(), f, &result.energy).ok());
-  REQUIRE(problem.tangent_action(problem.displacement(), problem.displacement(), Kw).ok());
+  Field f = problem.body().make_field(dimension), Kw = problem.body().make_field(dimension);
+  REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &result.energy).ok());
+  REQUIRE(problem.tangent_action(problem.state().displacement(), problem.state().displacement(), Kw).ok());
   const auto in_input_order = [&](const Field& field, std::vector<double>& out) {
-    for (std::size_t i = 0; i < problem.points(); ++i)
+    for (std::size_t i = 0; i < problem.body().points(); ++i)
       for (int c = 0; c < dimension; ++c) out.push_back(field.component(c)[static_cast<std::size_t>(problem.body().internal()[i])]);
   };
   in_input_order(f, result.force);

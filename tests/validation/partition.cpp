@@ -73,18 +73,18 @@ struct Result {
 
 /// The state of this rank's owned points, at the places of the points of the whole body that lie where they do.
 void collect(Simulation& simulation, const Body& whole, Result& result) {
-  BodyProblem& problem = simulation.problem();
+  ModelProblem& problem = simulation.problem();
   result.displacement.resize(3 * whole.points());
   for (std::size_t n = 0, p = 0; n < whole.points(); ++n) {
     // Owned points keep the order of the input.
     if (p == problem.body().owned().size()) break;
     const auto mine = static_cast<std::size_t>(problem.body().owned()[p]);
     if (problem.body().position(mine) != whole.position(static_cast<std::size_t>(whole.internal()[n]))) continue;
-    for (int c = 0; c < problem.dimension(); ++c) result.displacement[3 * n + static_cast<std::size_t>(c)] = problem.displacement().component(c)[mine];
+    for (int c = 0; c < problem.dimension(); ++c) result.displacement[3 * n + static_cast<std::size_t>(c)] = problem.state().displacement().component(c)[mine];
     ++p;
   }
-  result.energies = problem.energies();
-  result.steps = problem.step();
+  result.energies = problem.state().energies;
+  result.steps = problem.state().step;
 }
 
 /// Runs the scene on so many ranks.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "perikit/problem/motion.hpp"
 #include "tests/validation/scenes.hpp"
 
 namespace perikit::validation {
@@ -40,14 +41,14 @@ inline Protocol run(Simulation& simulation) {
 inline double mean(Simulation& simulation, const std::string& set, int component) {
   double sum = 0;
   const auto& members = simulation.problem().body().set(set);
-  for (const std::int32_t p : members) sum += simulation.problem().displacement().component(component)[p];
+  for (const std::int32_t p : members) sum += simulation.problem().state().displacement().component(component)[p];
   return sum / static_cast<double>(members.size());
 }
 
 /// Sum of the forces that hold a set.
 inline double pull(Simulation& simulation, const std::string& set, int component) {
   double sum = 0;
-  const Field reaction = simulation.problem().reaction(false, 1.0);
+  const Field reaction = reactions(simulation.problem(), false, 1.0);
   for (const std::int32_t p : simulation.problem().body().set(set)) sum += reaction.component(component)[p];
   return sum;
 }

@@ -37,7 +37,7 @@ class Refusing final : public EquilibriumSolver {
       solution.failure = "it was told to";
       return solution;
     }
-    Field r = equilibrium.problem().make_field(equilibrium.problem().dimension());
+    Field r = equilibrium.problem().make_field();
     for (; solution.iterations < 100; ++solution.iterations) {
       if (!predict_by_tangent(equilibrium, extrapolated) || !equilibrium.residual(equilibrium.displacement(), r)) return solution;
       extrapolated = false;
@@ -55,7 +55,7 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
                              "{type=\"critical_stretch\",stretch=0.002,no_fail=[\"left\",\"right\"]}"}) {
     INFO(std::string(damage));
     const auto simulation = plate_with_hole({fmt::format("damage={}", damage)}, 2.5e-3);
-    BodyProblem& problem = simulation->problem();
+    ModelProblem& problem = simulation->problem();
     const Body& body = problem.body();
     contract::Watch watch(*simulation);
     contract::WitnessProblem witness(problem);
@@ -94,7 +94,7 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
     for (const std::int32_t p : body.internal())
       if (std::abs(body.position(static_cast<std::size_t>(p))[0]) > 0.025) CHECK(lost.data()[p] < 0.05);
     CHECK(std::abs(validation::pull(*simulation, "right", 0)) <= 1e-6 * peak);
-    const Energies& e = problem.energies();
+    const Energies& e = problem.state().energies;
     CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 1e-3 * e.external_work, "work ", e.external_work,
                   ", dissipated ", e.dissipated);
   }
@@ -109,7 +109,7 @@ TEST_CASE("plate with a hole: the paper's second solver, dynamic relaxation, fin
   double worst = 0;
   for (const std::int32_t p : newton->problem().body().internal()) worst = std::max(worst, std::abs(a.data()[p] - b.data()[p]));
   CHECK_MESSAGE(worst <= 1e-3, "damage differs by ", worst);
-  CHECK(relaxed->problem().energies().dissipated == doctest::Approx(newton->problem().energies().dissipated).epsilon(1e-3));
+  CHECK(relaxed->problem().state().energies.dissipated == doctest::Approx(newton->problem().state().energies.dissipated).epsilon(1e-3));
 }
 
 TEST_CASE("the companion preconditioner loses its springs with the bonds: fewer iterations where the plate has cracked") {
@@ -133,7 +133,7 @@ TEST_CASE("the companion preconditioner loses its springs with the bonds: fewer 
 
 TEST_CASE("a step that is given up between two equilibria gives its bonds back") {
   const auto simulation = plate_with_hole({"integrator.steps=4"});
-  BodyProblem& problem = simulation->problem();
+  ModelProblem& problem = simulation->problem();
   Refusing solver;
   std::size_t refusals = 0;
   std::vector<std::byte> bonds = problem.bonds();
@@ -151,15 +151,15 @@ TEST_CASE("a step that is given up between two equilibria gives its bonds back")
     if (!check || refusals != 1) return;
     CHECK(problem.bonds() == bonds);
     CHECK(contract::displacement(*simulation) == u);
-    CHECK(problem.energies().dissipated == energies.dissipated);
-    CHECK(problem.energies().external_work == energies.external_work);
+    CHECK(problem.state().energies.dissipated == energies.dissipated);
+    CHECK(problem.state().energies.external_work == energies.external_work);
     check = false;
   };
   contract::Watch watch(*simulation, 4);
   watch.each = [&](const StepReport&) {
     bonds = problem.bonds();
     u = contract::displacement(*simulation);
-    energies = problem.energies();
+    energies = problem.state().energies;
   };
   run_load_steps("refusing", {.steps = 4, .tolerance = 1e-8, .max_iterations = 100, .cut_backs = 5}, problem, watch, solver);
   CHECK(refusals == 1);

@@ -20,7 +20,7 @@ struct Bar {
 Bar pull(double ratio, const std::string& kinematics) {
   const auto simulation = load("chowdhury/singular_bar.toml", {fmt::format("family.horizon_ratio={}", ratio), "kinematics=" + kinematics});
   CHECK(run(*simulation).reports.back().residual <= 1e-8);
-  const FieldView u = simulation->problem().displacement();
+  const FieldView u = simulation->problem().state().displacement();
   const std::vector<std::int32_t>& points = simulation->problem().body().set("pulled");
   double sum = 0;
   for (std::size_t k = 1; k + 1 < points.size(); ++k) sum += std::abs(u.data[points[k + 1]] - 2 * u.data[points[k]] + u.data[points[k - 1]]);

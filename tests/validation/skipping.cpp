@@ -60,7 +60,7 @@ struct Run {
   Run(const std::string& text, std::vector<std::string> overrides) {
     simulation = std::make_unique<Simulation>(parse_scene(text, "skipping.toml", registry(), {.overrides = std::move(overrides)}), counting);
   }
-  BodyProblem& problem() { return simulation->problem(); }
+  ModelProblem& problem() { return simulation->problem(); }
   std::vector<double> end() {
     contract::run(*simulation);
     return contract::state(*simulation);
@@ -168,10 +168,10 @@ TEST_CASE("skipping: points held at rest have no forces beyond the reach of free
     Run some = run("true"), every = run("false");
     const std::vector<double> end = some.end(), expected = every.end();
     CHECK(end == expected);
-    CHECK(contract::largest(some.problem().body(), some.problem().displacement()) > 0);
-    const FieldView force = some.problem().internal_force(), same = every.problem().internal_force();
+    CHECK(contract::largest(some.problem().body(), some.problem().state().displacement()) > 0);
+    const FieldView force = some.problem().state().internal_force(), same = every.problem().state().internal_force();
     CHECK(std::equal(force.data, force.data + force.size(), same.data));
-    CHECK(some.problem().points_held_at_rest() == 3000);
+    CHECK(some.problem().constraints().points_held_at_rest() == 3000);
     const QuietCounts quiet = some.problem().model().quiet_counts();
     CHECK_MESSAGE(2 * quiet.quiet > quiet.blocks, quiet.quiet, " of ", quiet.blocks, " blocks left out");
     CHECK(some.simulation->explanation(registry()).find("points held at rest: no wave ever reaches them") != std::string::npos);
@@ -229,8 +229,8 @@ TEST_CASE("skipping: without damage there is no state of bonds, and lattices sto
     if (!damage.empty()) overrides.push_back("damage=" + damage);
     const Run run(bar, overrides);
     const Body& body = run.simulation->problem().body();
-    run.simulation->problem().velocity();
-    run.simulation->problem().mass();
+    run.simulation->problem().state().velocity();
+    run.simulation->problem().masses().by_point();
     per_point = static_cast<double>(run.simulation->problem().bytes()) / static_cast<double>(body.points());
     return run.simulation->problem().model().report();
   };

@@ -18,9 +18,9 @@ struct Response {
   Field force;
 };
 
-Response respond(BodyProblem& problem) {
-  Response r{0, problem.make_field(problem.dimension())};
-  const EvaluationStatus status = problem.evaluate_forces(problem.displacement(), r.force, &r.energy);
+Response respond(ModelProblem& problem) {
+  Response r{0, problem.make_field()};
+  const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
@@ -31,7 +31,7 @@ void check_same(const BodyOptions& options, const std::string& a, const std::str
   INFO(a, " against ", b, ", ", options.dimension, "D ", options.influence, options.crack ? " cracked" : "");
   const auto one = contract::build(contract::scene_text(options, a)), two = contract::build(contract::scene_text(options, b));
   for (const auto& simulation : {one.get(), two.get()}) {
-    contract::deform(simulation->problem().body(), simulation->problem().displacement(), 61, 0.02);
+    contract::deform(simulation->problem().body(), simulation->problem().state().displacement(), 61, 0.02);
   }
   const Response r = respond(one->problem()), s = respond(two->problem());
   const Body& body = one->problem().body();
@@ -81,8 +81,8 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
     const auto one = run("{ type = \"projection\", weight = \"kernel\" }"), two = run("{ type = \"baqp\" }");
     const Response r = respond(one->problem()), s = respond(two->problem());
     PointSamples a, b;
-    REQUIRE(one->problem().model().sample(one->problem().displacement(), a).ok());
-    REQUIRE(two->problem().model().sample(two->problem().displacement(), b).ok());
+    REQUIRE(one->problem().model().sample(one->problem().state().displacement(), a).ok());
+    REQUIRE(two->problem().model().sample(two->problem().state().displacement(), b).ok());
     const std::int32_t p = two->problem().body().set("inside").front();
     const double density = b.strain_energy_density.data()[p];
     CHECK(std::abs(a.strain_energy_density.data()[p] - density) <= 1e-12 * density);
@@ -105,19 +105,19 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
     text.insert(text.find(section) + section.size(), "inside = \"x < 8 || (y > 4 && y < 5)\"\n");
     if (cloud) text.replace(text.find(jitter), jitter.size(), "jitter = 1e-13");
     auto simulation = contract::build(text);
-    contract::deform(simulation->problem().body(), simulation->problem().displacement(), 61, 0.02);
+    contract::deform(simulation->problem().body(), simulation->problem().state().displacement(), 61, 0.02);
     return simulation;
   };
   for (const bool cloud : {false, true})
     for (const char* base : {"baqp", "projection"}) {
       INFO(base, cloud ? " cloud" : " lattice");
       const auto plain = spur(cloud, fmt::format("type = \"{}\"", base)), mapped = spur(cloud, fmt::format("type = \"selective\"\nbase = \"{}\"", base));
-      BodyProblem& problem = mapped->problem();
+      ModelProblem& problem = mapped->problem();
       const Body& body = problem.body();
       REQUIRE(problem.model().report().singular_families == 4);
       PointSamples a, b;
-      REQUIRE(plain->problem().model().sample(plain->problem().displacement(), a).ok());
-      REQUIRE(problem.model().sample(problem.displacement(), b).ok());
+      REQUIRE(plain->problem().model().sample(plain->problem().state().displacement(), a).ok());
+      REQUIRE(problem.model().sample(problem.state().displacement(), b).ok());
       const Field condition = problem.model().shape_tensor_condition();
       int same = 0, different = 0;
       for (const std::int32_t p : body.internal()) {
@@ -128,13 +128,13 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       CHECK(same == 4);
       CHECK(different == static_cast<int>(body.points()) - 4);
       // Still the derivative of the energy.
-      Field w = problem.make_field(2), f = problem.make_field(2), scratch = problem.make_field(2);
+      Field w = problem.body().make_field(2), f = problem.body().make_field(2), scratch = problem.body().make_field(2);
       contract::Noise random(62);
       contract::set_field(body, w, [&](const Point&) { return Point{random(), random(), 0}; });
-      REQUIRE(problem.evaluate_forces(problem.displacement(), f, nullptr).ok());
+      REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, nullptr).ok());
       const auto energy = [&](double h) {
-        Field u = problem.make_field(2);
-        for (std::size_t k = 0; k < u.size(); ++k) u.data()[k] = problem.displacement().data[k] + h * w.data()[k];
+        Field u = problem.body().make_field(2);
+        for (std::size_t k = 0; k < u.size(); ++k) u.data()[k] = problem.state().displacement().data[k] + h * w.data()[k];
         double value = 0;
         REQUIRE(problem.evaluate_forces(u, scratch, &value).ok());
         return value;
@@ -142,10 +142,10 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       const double h = 2e-3, slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
       CHECK(std::abs(slope + contract::dot(body, f, w)) <= 1e-7 * contract::largest(body, f) * static_cast<double>(body.points()));
       // The assembled tangent knows these owners too.
-      Field Kw = problem.make_field(2);
+      Field Kw = problem.body().make_field(2);
       BlockMatrix K;
-      REQUIRE(problem.tangent_action(problem.displacement(), w, Kw).ok());
-      REQUIRE(problem.assemble_tangent(problem.displacement(), K).ok());
+      REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+      REQUIRE(problem.assemble_tangent(problem.state().displacement(), K).ok());
       double worst = 0;
       for (std::size_t r = 0; r < K.rows(); ++r)
         for (int a = 0; a < 2; ++a) {

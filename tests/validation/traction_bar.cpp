@@ -44,19 +44,19 @@ TEST_CASE("traction bar: tractions on both faces leave a homogeneous stress, for
       const auto simulation = load("partmann/traction_bar_faces.toml", {fmt::format("kinematics={}", kinematics), "constants.N=3", fmt::format("constants.m={}", ratio),
                                                                         "integrator.tolerance=1e-9"});
       // Some have modes without energy on so small a body: forces and stresses are what counts, at the homogeneous state itself.
-      BodyProblem& problem = simulation->problem();
+      ModelProblem& problem = simulation->problem();
       const double strain = hyperelastic / 0.1, across = 1 - std::sqrt(1 - 0.25 * (2 * strain + strain * strain));
       for (const std::int32_t p : problem.body().internal()) {
         const Point x = problem.body().position(static_cast<std::size_t>(p));
-        for (std::size_t c = 0; c < 3; ++c) problem.displacement().component(static_cast<int>(c))[p] = (c == 0 ? strain : -across) * x[c];
+        for (std::size_t c = 0; c < 3; ++c) problem.state().displacement().component(static_cast<int>(c))[p] = (c == 0 ? strain : -across) * x[c];
       }
-      Field force = problem.make_field(3);
-      REQUIRE(problem.evaluate_forces(problem.displacement(), force, nullptr).ok());
-      problem.evaluate_loads(1.0, problem.external_force());
+      Field force = problem.body().make_field(3);
+      REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, nullptr).ok());
+      problem.loads().evaluate(1.0, problem.state().external_force());
       double most = 0, off = 0;
       for (std::size_t k = 0; k < force.size(); ++k) {
-        most = std::max(most, std::abs(problem.external_force().data[k]));
-        off = std::max(off, std::abs(force.data()[k] + problem.external_force().data[k]));
+        most = std::max(most, std::abs(problem.state().external_force().data[k]));
+        off = std::max(off, std::abs(force.data()[k] + problem.state().external_force().data[k]));
       }
       CHECK_MESSAGE(off <= 1e-7 * most, "out of balance by ", off / most);   // eight digits of the reference
     }

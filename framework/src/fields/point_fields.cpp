@@ -3,18 +3,22 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "perikit/problem/motion.hpp"
+
 namespace perikit {
 
 const std::vector<PointField>& point_fields() {
   using From = PointFields&;
   static const std::vector<PointField> all{
-      {"displacement", 3, false, "displacement", "m", [](From f) { return f.vector(f.problem_.displacement()); }},
-      {"velocity", 3, false, "velocity", "m/s", [](From f) { return f.velocity(); }},
+      {"displacement", 3, false, "displacement", "m", [](From f) { return f.vector(f.problem_.state().displacement()); }},
+      {"velocity", 3, false, "velocity", "m/s",
+       [](From f) { return f.vector(f.moves_ ? ConstFieldView(f.problem_.state().velocity()) : ConstFieldView()); }},
       {"acceleration", 3, false, "acceleration", "m/s²", [](From f) { return f.acceleration(); }},
       {"internal_force", 3, false, "internal force density", "N/m³",
-       [](From f) { return f.vector(f.problem_.internal_force(), true); }},
+       [](From f) { return f.vector(f.problem_.state().internal_force(), true); }},
       {"external_force", 3, false, "external force density", "N/m³", [](From f) { return f.external_force(); }},
-      {"reaction", 3, false, "reaction", "N", [](From f) { return f.vector(f.problem_.reaction(f.dynamic_, f.problem_.time())); }},
+      {"reaction", 3, false, "reaction", "N",
+       [](From f) { return f.vector(reactions(f.problem_, f.dynamic_, f.problem_.state().time)); }},
       {"strain_energy_density", 1, false, "strain energy density", "J/m³",
        [](From f) { return f.scalar(f.samples().strain_energy_density); }},
       {"deformation_gradient", 9, true, "deformation gradient", "", [](From f) { return f.tensor(f.samples().H, true); }},
@@ -100,7 +104,7 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
 }
 
 const PointSamples& PointFields::samples() {
-  if (!samples_) problem_.model().sample(problem_.displacement(), samples_.emplace());
+  if (!samples_) problem_.model().sample(problem_.state().displacement(), samples_.emplace());
   return *samples_;
 }
 
@@ -111,17 +115,12 @@ const OutputField& PointFields::get(const std::string& name) {
   return cache_[name] = {name, field->width, field->compute(*this)};
 }
 
-std::vector<double> PointFields::velocity() const {
-  const bool moves = dynamic_ || !problem_.scene().initial_velocity.empty();
-  return vector(moves ? ConstFieldView(problem_.velocity()) : ConstFieldView());
-}
-
 std::vector<double> PointFields::acceleration() const {
-  return vector(dynamic_ ? problem_.acceleration(problem_.time()) : problem_.make_field(problem_.dimension()));
+  return vector(dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field());
 }
 
 std::vector<double> PointFields::external_force() const {
-  return vector(problem_.any_load() ? ConstFieldView(problem_.external_force()) : ConstFieldView(), true);
+  return vector(problem_.loads().any() ? ConstFieldView(problem_.state().external_force()) : ConstFieldView(), true);
 }
 
 std::vector<double> PointFields::jacobian() {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "files/atomic_file.hpp"
+#include "perikit/problem/motion.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
 #include "run/reduction.hpp"
@@ -46,7 +47,7 @@ std::string earlier_run(const std::filesystem::path& folder) {
   return fmt::format("replaces the results of an earlier run in {}", folder.string());
 }
 
-ReferenceData reference_of(const BodyProblem& problem) {
+ReferenceData reference_of(const ModelProblem& problem) {
   const Body& body = problem.body();
   ReferenceData data;
   for (std::size_t p = 0; p < body.points(); ++p) {
@@ -82,7 +83,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
     : simulation_(simulation),
       folder_(std::move(folder)),
       show_progress_(show_progress),
-      fields_(simulation.problem(), simulation.dynamic()),
+      fields_(simulation.problem(), simulation.dynamic(), !simulation.scene().initial_velocity.empty()),
       libraries_(std::move(libraries)),
       start_(std::chrono::steady_clock::now()),
       shown_(start_) {
@@ -210,7 +211,7 @@ void RunRecorder::step_done(const StepReport& report) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
   }
-  if (report.step == 0) done_.initial_energy = simulation_.problem().energies().strain + simulation_.problem().energies().kinetic;
+  if (report.step == 0) done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   progress(report);
@@ -231,9 +232,9 @@ void RunRecorder::write_frame(const StepReport& report) {
 }
 
 void RunRecorder::write_history(const StepReport& report) {
-  BodyProblem& problem = simulation_.problem();
-  Energies& energies = problem.energies();
-  if (simulation_.dynamic()) energies.kinetic = problem.kinetic_energy(problem.velocity());
+  ModelProblem& problem = simulation_.problem();
+  Energies& energies = problem.state().energies;
+  if (simulation_.dynamic()) energies.kinetic = kinetic_energy(problem, problem.state().velocity());
   std::vector<double> row{static_cast<double>(report.step), report.time, report.time_step, energies.strain, energies.kinetic,
                           energies.external_work, energies.dissipated, static_cast<double>(report.iterations), report.residual};
   for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
@@ -250,7 +251,7 @@ void RunRecorder::progress(const StepReport& report) {
   shown_ = now;
   const double spent = std::chrono::duration<double>(now - start_).count();
   const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
-  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().points()) / std::max(spent, 1e-9);
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
   const std::string line = fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time,
                                        report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
   if (terminal) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "perikit/build/problem.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
@@ -10,8 +11,8 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   if (scene_.threads) set_thread_count(*scene_.threads);
   integrator_ = factory.integrator(*scene_.integrator);
   traits_ = integrator_->traits();
-  problem_ = std::make_unique<BodyProblem>(scene_, factory, traits_.quasi_static);
-  if (traits_.dynamic) problem_->mass();
+  problem_ = build_problem(scene_, factory, traits_);
+  if (traits_.dynamic) problem_->masses().by_point();   // refuses missing densities
   if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
     throw InputError(
         scene_.initial_velocity_position, "initial.velocity",
@@ -72,12 +73,12 @@ std::string Simulation::explanation(const Registry& registry) const {
   if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
   if (scene_.skip && traits_.dynamic && problem_->model().conservative() && !problem_->laws().history()) {
     notes.push_back({"parts of the body that no wave has reached", "blocks of points at rest whose families' families are at rest have no forces", "counted in run.log at the end"});
-    if (const std::size_t held = problem_->points_held_at_rest(); held > 0) {
+    if (const std::size_t held = problem_->constraints().points_held_at_rest(); held > 0) {
       notes.push_back({"points held at rest", "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
                        fmt::format("the blocks of {} points, less those in reach of others", held)});
     }
   }
-  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
+  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
   const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);

@@ -82,8 +82,8 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     const auto start = clock::now();
     Simulation simulation(scene, parts);
     outcome.measures["set_up_time"] = seconds(clock::now() - start);
-    BodyProblem& problem = simulation.problem();
-    outcome.measures["points"] = static_cast<double>(problem.points());
+    ModelProblem& problem = simulation.problem();
+    outcome.measures["points"] = static_cast<double>(problem.body().points_of_all_ranks());
     outcome.measures["bonds"] = static_cast<double>(problem.model().report().bonds);
     outcome.measures["memory"] = static_cast<double>(problem.bytes());
     RunRecorder recorder(simulation, folder, false);
@@ -98,7 +98,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     }
     outcome.measures["run_time"] = seconds(clock::now() - running);
     outcome.measures["cpu_time"] = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
-    outcome.measures["steps"] = static_cast<double>(problem.step());
+    outcome.measures["steps"] = static_cast<double>(problem.state().step);
     if (recorder.cancelled()) return failed("stopped by a signal");
   } catch (const InputError& error) {
     return {"refused", error.what(), {}};

@@ -13,12 +13,12 @@ namespace perikit {
 double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
-  Field q = problem.make_field(d), before = problem.make_field(d), w = problem.make_field(d), Kw = problem.make_field(d);
+  Field q = problem.make_field(), before = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
   if (!warm) {
     fill_with_noise(scale, 1, vector);
   } else {
     // A little noise: a symmetric eigenvector must not hide a growing one of another symmetry.
-    const double size = norm(vector) / std::sqrt(static_cast<double>(problem.points() * static_cast<std::size_t>(d)));
+    const double size = norm(vector) / std::sqrt(static_cast<double>(problem.body().points_of_all_ranks() * static_cast<std::size_t>(d)));
     fill_with_noise(scale, 1, w);
     combine(1, vector, 0.05 * size, w, vector);
   }

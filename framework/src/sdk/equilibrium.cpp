@@ -10,14 +10,14 @@
 namespace perikit {
 
 Equilibrium::Equilibrium(Problem& problem, double tolerance)
-    : problem_(problem), tolerance_(tolerance), u_(problem.make_field(problem.dimension())), scratch_(problem.make_field(problem.dimension())),
-      free_(problem.free_mask()), external_(problem.any_load() ? problem.external_force() : FieldView{}) {}
+    : problem_(problem), tolerance_(tolerance), u_(problem.make_field()), scratch_(problem.make_field()),
+      free_(problem.constraints().free()), external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
 
 void Equilibrium::begin(double t, ConstFieldView u) {
   t_ = t;
   copy(u, u_);
-  if (external_.data) problem_.evaluate_loads(t, external_);
-  Field noise = problem_.make_field(problem_.dimension());
+  if (external_.data) problem_.loads().evaluate(t, external_);
+  Field noise = problem_.make_field();
   fill_with_noise(free_, 1, noise);
   const double size = norm(noise);
   // Where the start itself is inadmissible there is nothing to estimate; the first residual says so.
@@ -26,14 +26,14 @@ void Equilibrium::begin(double t, ConstFieldView u) {
 
 double Equilibrium::missing(ConstFieldView u, FieldView w) {
   fill(0.0, w);
-  if (!problem_.any_constraint()) return 0.0;
-  problem_.prescribe_displacement(t_, w);
-  for (const std::int64_t dof : problem_.constrained()) w.data[dof] -= u.data[dof];
+  if (!problem_.constraints().any()) return 0.0;
+  problem_.constraints().prescribe_displacement(t_, w);
+  for (const std::int64_t dof : problem_.constraints().dofs()) w.data[dof] -= u.data[dof];
   return largest_magnitude(w);
 }
 
 bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
-  const FieldView internal = problem_.internal_force();
+  const FieldView internal = problem_.state().internal_force();
   const EvaluationStatus status = problem_.evaluate_forces(u, internal, energy);
   if (!status.ok()) {
     failure_ = status.description;
@@ -42,7 +42,7 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   copy(internal, r);
   if (external_.data) combine(1, r, 1, external_, r);
   double squares = external_.data ? dot(external_, external_) : 0.0, reactions = 0;
-  for (const std::int64_t dof : problem_.constrained()) {
+  for (const std::int64_t dof : problem_.constraints().dofs()) {
     const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
     reactions += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
   }

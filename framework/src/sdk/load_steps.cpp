@@ -43,16 +43,17 @@ class LoadSteps {
       : integrator_(integrator),
         options_(options),
         problem_(problem),
+        state_(problem.state()),
         observer_(observer),
         solver_(solver),
         equilibrium_(problem, options.tolerance),
-        u_(problem.displacement()),
-        last_increment_(problem.declare("load_step_increment", problem.dimension())),
-        residual_(problem.make_field(problem.dimension())),
-        driving_(problem.make_field(problem.dimension())),
-        old_driving_(problem.make_field(problem.dimension())),
-        start_(problem.make_field(problem.dimension())),
-        numbers_(problem.declare_numbers("load_steps", 5)) {}
+        u_(state_.displacement()),
+        last_increment_(state_.declare("load_step_increment")),
+        residual_(problem.make_field()),
+        driving_(problem.make_field()),
+        old_driving_(problem.make_field()),
+        start_(problem.make_field()),
+        numbers_(state_.declare_numbers("load_steps", 5)) {}
 
   void run() {
     if (started() == 0) begin();
@@ -72,8 +73,8 @@ class LoadSteps {
   void begin() {
     observer_.log(fmt::format("{}: {} load steps, relative tolerance {:.3g}", integrator_, options_.steps, options_.tolerance));
     equilibrium_.begin(0.0, u_);
-    const bool sample = observer_.wants_sample(problem_.step(), problem_.time());
-    if (!equilibrium_.residual(u_, residual_, sample ? &problem_.energies().strain : nullptr)) {
+    const bool sample = observer_.wants_sample(state_.step, state_.time);
+    if (!equilibrium_.residual(u_, residual_, sample ? &state_.energies.strain : nullptr)) {
       throw RunError(fmt::format("{}: the initial displacement is inadmissible: {}", integrator_, equilibrium_.failure()));
     }
     started() = 1;
@@ -103,7 +104,7 @@ class LoadSteps {
         throw RunError(fmt::format(
             "{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, failed because {}. More steps or cut_backs may "
             "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed",
-            integrator_, problem_.time(), problem_.step(), span / planned(), solution.failure));
+            integrator_, state_.time, state_.step, span / planned(), solution.failure));
       }
       span /= 2;
       increment() = span;
@@ -114,7 +115,7 @@ class LoadSteps {
     const double t = (position() + span) / planned();
     copy(u_, start_);
     if (extrapolate) combine(1, u_, span / last_span(), last_increment_, start_);
-    equilibrium_.note(fmt::format("step {}  t = {:.9g}", problem_.step() + 1, t));
+    equilibrium_.note(fmt::format("step {}  t = {:.9g}", state_.step + 1, t));
     return find(t, extrapolate);
   }
 
@@ -125,7 +126,7 @@ class LoadSteps {
     if (!solution.converged) return solution;
     // Forces and energy of exactly this state, and the judgement of this class rather than the solver's.
     equilibrium_.impose(equilibrium_.displacement());
-    solution.converged = equilibrium_.residual(equilibrium_.displacement(), residual_, &problem_.energies().strain);
+    solution.converged = equilibrium_.residual(equilibrium_.displacement(), residual_, &state_.energies.strain);
     if (!solution.converged) solution.failure = equilibrium_.failure();
     if (solution.converged && !equilibrium_.converged()) {
       solution.converged = false;
@@ -139,7 +140,7 @@ class LoadSteps {
     largest_reference() = std::max(largest_reference(), equilibrium_.reference());
     find_driving_force(driving_);
     combine(1, equilibrium_.displacement(), -1, u_, last_increment_);
-    problem_.energies().external_work += 0.5 * (dot(old_driving_, last_increment_) + dot(driving_, last_increment_));
+    state_.energies.external_work += 0.5 * (dot(old_driving_, last_increment_) + dot(driving_, last_increment_));
     copy(driving_, old_driving_);
     copy(equilibrium_.displacement(), u_);
   }
@@ -148,11 +149,11 @@ class LoadSteps {
   /// they did is negligible.
   void settle(double span, Solution& solution) {
     const double t = (position() + span) / planned();
-    Energies& energies = problem_.energies();
+    Energies& energies = state_.energies;
     take();
     continues_ = true;
     bool settled = false;
-    for (std::int64_t round = 1; !settled && problem_.advance_history(span / planned()); ++round) {
+    for (std::int64_t round = 1; !settled && problem_.advance(span / planned()); ++round) {
       continues_ = false;
       solver_.bonds_changed();
       solution.converged = equilibrium_.residual(u_, residual_, &energies.strain);
@@ -166,7 +167,7 @@ class LoadSteps {
             fmt::format("{}: bonds go on failing at load parameter {:.9g} (after step {}): {} times, each followed by a new "
                         "equilibrium, as many as bond_rounds allows. "
                         "The body may be about to break apart; a crack that has far to run at one load needs more rounds",
-                        integrator_, t, problem_.step(), options_.bond_rounds));
+                        integrator_, t, state_.step, options_.bond_rounds));
       }
       const double held = energies.strain - energies.external_work;
       copy(u_, start_);
@@ -185,11 +186,11 @@ class LoadSteps {
     position() += span;
     last_span() = continues_ ? span : 0;  // the path has a kink where bonds have failed
     increment() = std::min(1.0, 2 * span);
-    problem_.time() = position() / planned();
-    ++problem_.step();
+    state_.time = position() / planned();
+    ++state_.step;
     solver_.accepted(problem_, u_);
     observer_.log(equilibrium_.take_notes());
-    observer_.wants_sample(problem_.step(), problem_.time());
+    observer_.wants_sample(state_.step, state_.time);
     report(span / planned(), solution.iterations);
   }
 
@@ -197,9 +198,9 @@ class LoadSteps {
   void remember() {
     bonds_ = problem_.bonds();
     if (bonds_.empty()) return;
-    first_ = problem_.energies();
+    first_ = state_.energies;
     for (Field* field : {&first_u_, &first_driving_, &first_increment_})
-      if (field->size() == 0) *field = problem_.make_field(problem_.dimension());
+      if (field->size() == 0) *field = problem_.make_field();
     copy(u_, first_u_);
     copy(old_driving_, first_driving_);
     copy(last_increment_, first_increment_);
@@ -207,7 +208,7 @@ class LoadSteps {
 
   void give_up() {
     if (bonds_.empty()) return;
-    problem_.energies() = first_;
+    state_.energies = first_;
     copy(first_u_, u_);
     copy(first_driving_, old_driving_);
     copy(first_increment_, last_increment_);
@@ -218,27 +219,28 @@ class LoadSteps {
 
   /// What moves the body from outside: the loads, and on prescribed components load and reaction, -internal force [N].
   void find_driving_force(FieldView force) {
-    if (problem_.any_load()) copy(problem_.external_force(), force);
+    if (problem_.loads().any()) copy(state_.external_force(), force);
     else fill(0.0, force);
-    const FieldView internal = problem_.internal_force();
-    for (const std::int64_t dof : problem_.constrained()) force.data[dof] = -internal.data[dof];
+    const FieldView internal = state_.internal_force();
+    for (const std::int64_t dof : problem_.constraints().dofs()) force.data[dof] = -internal.data[dof];
   }
 
   void report(double time_step, int iterations) {
     StepReport r;
-    r.step = problem_.step();
-    r.time = problem_.time();
+    r.step = state_.step;
+    r.time = state_.time;
     r.time_step = time_step;
     r.iterations = iterations;
     r.residual = equilibrium_.relative_residual();
     r.end_time = 1.0;
-    r.steps_expected = problem_.step() + static_cast<std::int64_t>(std::ceil(planned() - position()));
+    r.steps_expected = state_.step + static_cast<std::int64_t>(std::ceil(planned() - position()));
     observer_.step_done(r);
   }
 
   std::string integrator_;
   LoadStepOptions options_;
   Problem& problem_;
+  State& state_;
   Observer& observer_;
   EquilibriumSolver& solver_;
   Equilibrium equilibrium_;

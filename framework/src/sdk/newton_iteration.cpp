@@ -76,7 +76,7 @@ class Iteration {
   }
 
   ConstFieldView displacement() const noexcept { return u_; }
-  Field make() const { return equilibrium_.problem().make_field(equilibrium_.problem().dimension()); }
+  Field make() const { return equilibrium_.problem().make_field(); }
 
  private:
   void impose(FieldView u) {

@@ -12,7 +12,7 @@ bool predict_by_tangent(Equilibrium& equilibrium, bool extrapolated, const Preco
   constexpr int most = 300;
   constexpr double accuracy = 1e-2;
   Problem& problem = equilibrium.problem();
-  const auto make = [&] { return problem.make_field(problem.dimension()); };
+  const auto make = [&] { return problem.make_field(); };
   const FieldView u = equilibrium.displacement();
   Field start = make(), r = make(), w = make(), Kw = make(), du = make();
   copy(u, start);

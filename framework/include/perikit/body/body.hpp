@@ -1,5 +1,5 @@
 #pragma once
-/// The points of a scene: positions, volumes, sets, materials by point, in the internal order that the kernels want.
+/// The points of a body: positions, volumes, sets, materials by point, in the internal order that the kernels want.
 
 #include <array>
 #include <cstdint>
@@ -14,7 +14,6 @@
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/core/space.hpp"
-#include "perikit/scene/scene.hpp"
 
 namespace perikit {
 
@@ -34,23 +33,40 @@ class Crack {
   Point lower_{}, upper_{}, normal_{};
 };
 
+/// What a body is beside its points.
+struct BodyFrame {
+  Space space = Space::solid;
+  double section = 1;          ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
+  double spacing = 0;          ///< of the lattice, or the mean one of a cloud [m]
+  double horizon = 0;          ///< delta [m]
+  std::vector<Crack> cracks;
+};
+
 /// Internal indices run over [0, stride); only `points` of them are alive, the rest is padding of zero volume.
 class Body {
  public:
-  /// Throws InputError for an empty body, an empty set, a horizon smaller than the spacing of all points, too many points.
-  /// lists: a lattice is treated as a cloud, since every bond has a number of its own.
-  explicit Body(const Scene& scene, bool lists = false);
+  /// The given cells of a lattice, by their indices in it, in input order; not empty.
+  Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells);
+  /// A cloud: positions and volumes [m^3] in input order; not empty.
+  Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes);
   /// The kept points of another body, by input number; those that are not owned are ghosts, with a material of their own. Sets keep
   /// owned points.
   Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material);
 
-  int dimension() const noexcept { return dimension_; }
-  Space space() const noexcept { return space_; }
-  double section() const noexcept { return section_; }
+  /// members: internal indices, each once, in the order that the set shall have. "all" exists from the beginning.
+  void add_set(const std::string& name, std::vector<std::int32_t> members) { sets_[name] = std::move(members); }
+  /// By internal index; see material_ids().
+  void set_materials(std::vector<std::uint16_t> ids) { material_ids_ = std::move(ids); }
+
+  int dimension() const noexcept { return perikit::dimension(frame_.space); }
+  Space space() const noexcept { return frame_.space; }
+  double section() const noexcept { return frame_.section; }
   std::size_t points() const noexcept { return internal_.size(); }   ///< with ghosts
+  /// Of the body on all ranks, each once.
+  std::size_t points_of_all_ranks() const noexcept { return points_of_all_ranks_; }
   std::size_t stride() const noexcept { return stride_; }
-  double spacing() const noexcept { return spacing_; }   ///< of the lattice, or the mean one of a cloud [m]
-  double horizon() const noexcept { return horizon_; }   ///< delta [m]
+  double spacing() const noexcept { return frame_.spacing; }
+  double horizon() const noexcept { return frame_.horizon; }
   /// Null for clouds.
   const Lattice* lattice() const noexcept { return lattice_ ? &*lattice_ : nullptr; }
   /// A field with the margins that the kernels need.
@@ -74,22 +90,17 @@ class Body {
   /// Internal indices in input order. "all" exists.
   const std::vector<std::int32_t>& set(const std::string& name) const { return sets_.at(name); }
   const std::map<std::string, std::vector<std::int32_t>>& sets() const noexcept { return sets_; }
-  /// Index into the materials of the scene (0: [material], 1 ...: [[region]] in order); empty when all are 0.
+  /// Which of the materials of the body each point has; empty when all are 0.
   std::span<const std::uint16_t> material_ids() const noexcept { return material_ids_; }
-  const std::vector<Crack>& cracks() const noexcept { return cracks_; }
+  const std::vector<Crack>& cracks() const noexcept { return frame_.cracks; }
   bool cut(const Point& a, const Point& b) const noexcept;
   std::size_t bytes() const noexcept;
 
  private:
-  void place_lattice(const Scene& scene, bool lists);
   void number_lattice(const Lattice& lattice, double volume);
-  void place_cloud(std::vector<Point> positions, std::vector<double> volumes);
-  void collect_sets(const Scene& scene);
+  void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
 
-  int dimension_;
-  Space space_;
-  double section_;
-  double spacing_ = 0, horizon_ = 0;
+  BodyFrame frame_;
   std::size_t stride_ = 0, margin_ = 0;
   std::optional<Lattice> lattice_;
   std::vector<std::int32_t> internal_;
@@ -99,7 +110,7 @@ class Body {
   std::vector<std::uint8_t> alive_;
   std::map<std::string, std::vector<std::int32_t>> sets_;
   std::vector<std::uint16_t> material_ids_;
-  std::vector<Crack> cracks_;
+  std::size_t points_of_all_ranks_ = 0;
 };
 
 /// Neighbour lists of a cloud in compressed rows: the family of p is neighbour[first[p] ... first[p + 1]), ascending.

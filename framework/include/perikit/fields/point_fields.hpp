@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "perikit/fields/point_field.hpp"
-#include "perikit/problem/body_problem.hpp"
+#include "perikit/problem/model_problem.hpp"
 
 namespace perikit {
 
 class PointFields {
  public:
-  PointFields(BodyProblem& problem, bool dynamic) : problem_(problem), dynamic_(dynamic) {}
+  /// moves: the state has a velocity, which dynamic runs always have.
+  PointFields(ModelProblem& problem, bool dynamic, bool moves) : problem_(problem), dynamic_(dynamic), moves_(dynamic || moves) {}
 
   /// Column of a row by component name ("x", "xy"); -1 for "magnitude". Throws std::out_of_range for an unknown one.
   static int column(const std::string& name, const std::string& component);
@@ -29,14 +30,13 @@ class PointFields {
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;
-  std::vector<double> velocity() const;
   std::vector<double> acceleration() const;
   std::vector<double> external_force() const;
   std::vector<double> jacobian();
   std::vector<double> material_id() const;
 
-  BodyProblem& problem_;
-  bool dynamic_;
+  ModelProblem& problem_;
+  bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
 };

@@ -1,7 +1,7 @@
 #pragma once
 /// Largest eigenvalues of tangents.
 
-#include "perikit/problem/integrator.hpp"
+#include "perikit/problem/problem.hpp"
 
 namespace perikit {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "perikit/problem/integrator.hpp"
+#include "perikit/problem/problem.hpp"
 
 namespace perikit {
 
@@ -31,7 +31,7 @@ class Equilibrium {
   ConstFieldView free() const noexcept { return free_; }
 
   /// Overwrites the prescribed components of u.
-  void impose(FieldView u) { problem_.prescribe_displacement(t_, u); }
+  void impose(FieldView u) { problem_.constraints().prescribe_displacement(t_, u); }
   /// w <- U(t) - u on prescribed components, 0 elsewhere; returns its largest magnitude [m].
   double missing(ConstFieldView u, FieldView w);
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "perikit/plugin/parameters.hpp"
+#include "perikit/problem/integrator.hpp"
 #include "perikit/sdk/equilibrium.hpp"
 
 namespace perikit {

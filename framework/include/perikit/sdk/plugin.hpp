@@ -7,3 +7,4 @@
 #include "perikit/model/stabilization.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/problem/integrator.hpp"
+#include "perikit/problem/problem.hpp"

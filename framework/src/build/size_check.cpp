@@ -1,4 +1,4 @@
-#include "size_check.hpp"
+#include "build/size_check.hpp"
 
 #include <fmt/format.h>
 
@@ -25,7 +25,9 @@ double ball(int dimension, double ratio) {
   return dimension == 2 ? std::numbers::pi * ratio * ratio : 4.0 / 3.0 * std::numbers::pi * ratio * ratio * ratio;
 }
 
-const char* key_of(const Scene& scene) { return scene.body.lattice ? "body.lattice" : "body.points"; }
+const char* key_of(const Scene& scene) {
+  return scene.body.lattice ? "body.lattice" : "body.points";
+}
 
 }  // namespace
 
@@ -40,8 +42,8 @@ void check_horizon(const Scene& scene, double ratio) {
   const double cells = ball(scene.body.dimension, ratio);
   if (cells <= largest_ball) return;
   throw InputError(scene.body.position, "family",
-                   fmt::format("found a horizon of {:.4g} spacings, about {:.3g} points within it; allowed: at most {:.3g}", ratio,
-                               cells, largest_ball));
+                   fmt::format("found a horizon of {:.4g} spacings, about {:.3g} points within it; allowed: at most {:.3g}",
+                               ratio, cells, largest_ball));
 }
 
 void check_memory(const Scene& scene, double cells, double ratio, bool cloud) {
@@ -53,7 +55,8 @@ void check_memory(const Scene& scene, double cells, double ratio, bool cloud) {
                                  "most {:.0f} on a lattice",
                                  ratio, whole, most_bonds));
   }
-  const double bytes = cells * (cloud ? bytes_a_cloud_point + family * bytes_a_cloud_bond : bytes_a_lattice_point), limit = memory_limit();
+  const double bytes = cells * (cloud ? bytes_a_cloud_point + family * bytes_a_cloud_bond : bytes_a_lattice_point),
+               limit = memory_limit();
   if (bytes > limit) {
     throw InputError(scene.body.position, key_of(scene),
                      fmt::format("found about {:.3g} points with a horizon of {:.4g} spacings, which need {:.3g} GB or more; "

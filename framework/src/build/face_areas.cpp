@@ -1,6 +1,6 @@
-#include "face_loads.hpp"
+#include <algorithm>
 
-#include "perikit/terms/model.hpp"
+#include "build/face_shares.hpp"
 
 namespace perikit {
 
@@ -18,10 +18,13 @@ class UnitMaterial final : public Material {
       for (int a = 0; a < d; ++a)
         for (int b = 0; b < d; ++b)
           for (int p = 0; p < batch.n; ++p) {
-            const auto at = [&](int r, int c) { return static_cast<std::size_t>(r * d + c) * batch.stride + static_cast<std::size_t>(p); };
+            const auto at = [&](int r, int c) {
+              return static_cast<std::size_t>(r * d + c) * batch.stride + static_cast<std::size_t>(p);
+            };
             P[at(a, b)] = 0.5 * (H[at(a, b)] + H[at(b, a)]);
           }
-      for (int c = d * d; c < tensor_components(space); ++c) std::fill_n(P + static_cast<std::size_t>(c) * batch.stride, batch.n, 0.0);
+      for (int c = d * d; c < tensor_components(space); ++c)
+        std::fill_n(P + static_cast<std::size_t>(c) * batch.stride, batch.n, 0.0);
     };
     if (batch.P) stress(batch.H, batch.P);
     if (batch.dP) stress(batch.dH, batch.dP);
@@ -31,7 +34,8 @@ class UnitMaterial final : public Material {
 
 }  // namespace
 
-Field face_areas(const Body& body, const Formulation& formulation, std::shared_ptr<const InfluenceFunction> influence, int axis) {
+Field face_areas(ModelParts parts, int axis) {
+  const Body& body = *parts.body;
   MaterialRecord record;
   record.material = std::make_shared<UnitMaterial>();
   record.traits = record.material->traits();
@@ -39,11 +43,15 @@ Field face_areas(const Body& body, const Formulation& formulation, std::shared_p
   std::vector<MaterialRecord> records;
   records.push_back(std::move(record));
   const Laws laws(body.space(), std::move(records), {}, body.stride());
-  const std::unique_ptr<Model> model =
-      make_model({.body = &body, .formulation = formulation, .influence = std::move(influence), .laws = &laws});
+  parts.laws = &laws;
+  parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
+  parts.damage = nullptr;
+  parts.skip = parts.share = true;
+  const std::unique_ptr<Model> model = make_model(parts);
   const Field rest = body.make_field(body.dimension());
   Field stretch = body.make_field(body.dimension()), areas = body.make_field(body.dimension()), area = body.make_field(1);
-  for (const std::int32_t p : body.internal()) stretch.component(axis)[p] = body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)];
+  for (const std::int32_t p : body.internal())
+    stretch.component(axis)[p] = body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)];
   if (model->tangent(rest, stretch, areas).ok()) std::copy_n(areas.component(axis), body.stride(), area.data());
   return area;
 }

@@ -1,0 +1,34 @@
+#pragma once
+/// The bonds of a problem and their account: which fail, and what that does to the energies.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "perikit/problem/state.hpp"
+#include "perikit/terms/model.hpp"
+
+namespace perikit {
+
+class FractureRecord {
+ public:
+  /// Null: bonds never fail.
+  explicit FractureRecord(std::unique_ptr<const BodyDamage> damage = nullptr) : damage_(std::move(damage)) {}
+
+  /// Null where bonds never fail.
+  const BodyDamage* damage() const noexcept { return damage_.get(); }
+  /// Lets bonds of `model` fail at the displacement of the state, whose energies follow; true where any changed. motion: see Model.
+  bool update(Model& model, State& state, double time_step, const Motion& motion);
+  /// How bonds failed so far, in words; empty where they never fail.
+  std::string summary(const BondChecks& checks, double dissipated) const;
+
+  void write(const Model& model, ByteWriter& out) const;
+  void read(Model& model, ByteReader& in);
+
+ private:
+  std::unique_ptr<const BodyDamage> damage_;
+  std::int64_t gains_ = 0;   ///< updates that raised the strain energy
+  double gained_ = 0;        ///< what they added [J]
+};
+
+}  // namespace perikit

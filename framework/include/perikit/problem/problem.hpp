@@ -1,0 +1,74 @@
+#pragma once
+/// What an integrator runs: values, which it may read and change, and operations, which the terms of the problem do for it.
+
+#include <cstddef>
+#include <vector>
+
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/evaluation_status.hpp"
+#include "perikit/problem/constraints.hpp"
+#include "perikit/problem/loads.hpp"
+#include "perikit/problem/masses.hpp"
+#include "perikit/problem/state.hpp"
+
+namespace perikit {
+
+struct ProblemValues {
+  const Body& body;
+  const Laws& laws;
+  State state;
+  Masses masses;
+  Constraints constraints;
+  Loads loads;
+};
+
+/// Values are the same for all who look at a problem; operations may be wrapped by those who look on or interfere.
+class Problem {
+ public:
+  /// `values` must outlive the problem.
+  explicit Problem(ProblemValues& values) noexcept : values_(values) {}
+  virtual ~Problem() = default;
+
+  const Body& body() const noexcept { return values_.body; }
+  const Laws& laws() const noexcept { return values_.laws; }
+  State& state() noexcept { return values_.state; }
+  const Masses& masses() const noexcept { return values_.masses; }
+  Constraints& constraints() noexcept { return values_.constraints; }
+  const Loads& loads() const noexcept { return values_.loads; }
+  int dimension() const noexcept { return body().dimension(); }
+  /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
+  Field make_field() const { return body().make_field(dimension()); }
+
+  /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and
+  /// laws with history put theirs aside for `advance`; 0: nothing is kept.
+  virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
+  /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
+  virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K
+  /// has must come from this problem. Values are overwritten; undefined after a failure. Points at bonds that have failed are
+  /// held by 1e-9 of the mean stiffness of a point: pieces that nothing else holds then stay where they are, and K is not
+  /// singular.
+  virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
+  /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
+  virtual AssembledSize assembled_size() = 0;
+  /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap, spectrally
+  /// close to the tangent. For preconditioners. Pattern and values as with assemble_tangent.
+  virtual void assemble_companion(ConstFieldView u, BlockMatrix& K) = 0;
+  /// False where the stiffness can change during the run (nonlinear laws, failing bonds): estimates of it do not last.
+  virtual bool constant_stiffness() const noexcept = 0;
+
+  /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
+  /// velocity: of explicit schemes, of the last half step. Their forces of this step come from the bonds as they were, so that
+  /// bonds that fail now act for another half step, and what they dissipate is taken there. Quasi-static runs call it at every
+  /// equilibrium: as long as bonds change, the step is not over.
+  virtual bool advance(double time_step, ConstFieldView velocity = {}) = 0;
+  /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
+  virtual std::vector<std::byte> bonds() const = 0;
+  /// Bonds of `bonds`, not empty.
+  virtual void restore_bonds(std::span<const std::byte> bonds) = 0;
+
+ private:
+  ProblemValues& values_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,29 @@
+#pragma once
+/// From [[boundary]], [[load]] and [initial] to the values of a problem.
+
+#include <vector>
+
+#include "perikit/body/partition.hpp"
+#include "perikit/problem/constraints.hpp"
+#include "perikit/problem/loads.hpp"
+#include "perikit/problem/state.hpp"
+#include "perikit/scene/scene.hpp"
+#include "perikit/terms/model.hpp"
+
+namespace perikit {
+
+/// The value of one key; ramps: where it is a plain number.
+SpaceTimeFunction function_of(const Expression& expression, bool ramps);
+
+/// Throws InputError for prescribed velocities in quasi-static runs.
+Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_static);
+
+/// On the owned points of parts.body, which is a part of partition->whole() where there are several ranks: totals are those of
+/// all ranks. parts: of the model, whose kinematics say what area a point has of a face. Throws InputError for faces without
+/// points.
+Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* partition, bool quasi_static);
+
+/// Displacements and velocities at the start. Throws InputError where an earlier run does not hold them.
+void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, State& state);
+
+}  // namespace perikit

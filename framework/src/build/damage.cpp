@@ -1,0 +1,111 @@
+#include "build/damage.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "families/gradual_failure.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// <xi> = int omega xi^d / int omega xi^(d-1) over (0, delta), by the midpoint rule.
+double mean_bond_length(const InfluenceFunction& influence, int dimension, double horizon) {
+  constexpr std::size_t steps = 20000;
+  std::vector<double> r(steps), omega(steps);
+  for (std::size_t k = 0; k < steps; ++k) r[k] = (static_cast<double>(k) + 0.5) / steps;
+  influence.evaluate(r, omega);
+  double above = 0, below = 0;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double weight = omega[k] * std::pow(r[k], dimension - 1);
+    above += weight * r[k];
+    below += weight;
+  }
+  return above / below * horizon;
+}
+
+/// Of Rayleigh waves, by Viktorov's approximation [m/s]; 0 without a density, which is asked for with the masses.
+double rayleigh_speed(const Moduli& moduli, double density) {
+  const double nu = moduli.poisson();
+  return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
+}
+
+void refuse_unsuited(const Scene& scene, const ModelParts& parts, bool ranks) {
+  const Formulation& formulation = parts.formulation;
+  const auto refuse = [&](const std::string& found, const std::string& allowed) {
+    throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
+  };
+  if (ranks) refuse("a body on several ranks", "one rank");
+  if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
+  if (parts.laws->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
+  if (scene.stabilization && formulation.order > 1)
+    refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
+  if (formulation.bond && formulation.order > 1) {
+    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene.kinematics->type,
+                       formulation.order),
+           "order 1");
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<const Damage> build_criterion(const Scene& scene, const PartFactory& factory, bool quasi_static) {
+  if (!scene.damage) return nullptr;
+  std::shared_ptr<const Damage> criterion = factory.damage(*scene.damage);
+  const ParameterValues& values = scene.damage->values;
+  if (!values.has("gradual") || !values.boolean("gradual")) return criterion;
+  const auto refuse = [&](const std::string& found, const char* allowed) {
+    throw InputError(values.position("gradual"), "damage.gradual",
+                     fmt::format("found true with {}; allowed: {}", found, allowed));
+  };
+  if (!criterion->traits().bits)
+    refuse(fmt::format("\"{}\", whose bonds weaken of themselves", scene.damage->type), "criteria that break bonds at once");
+  if (quasi_static) refuse(fmt::format("integrator \"{}\", which knows no time", scene.integrator->type), "explicit integrators");
+  return std::make_shared<GradualFailure>(criterion);
+}
+
+std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_ptr<const Damage> criterion,
+                                               const ModelParts& parts, bool ranks) {
+  if (!criterion) return nullptr;
+  refuse_unsuited(scene, parts, ranks);
+  const Body& body = *parts.body;
+  const Laws& laws = *parts.laws;
+  auto damage = std::make_unique<BodyDamage>();
+  damage->law = std::move(criterion);
+  damage->onset = body.make_field(1);
+  damage->failure = body.make_field(1);
+  GradualFailure* const gradual = gradual_failure(damage->law);
+  Field crack_speed = gradual ? body.make_field(1) : Field();
+  DamagePoint at{{body.space(), body.section(), body.horizon(), {}},
+                 mean_bond_length(*parts.influence, body.dimension(), body.horizon())};
+  const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
+  StretchLimits limits;
+  bool equal = true;
+  for (std::size_t k = 0; k < body.points(); ++k) {
+    const auto p = static_cast<std::size_t>(body.internal()[k]);
+    if (k == 0 || !uniform) {
+      at.moduli = laws.moduli(p);
+      try {
+        limits = damage->law->limits(at);
+      } catch (const std::domain_error& error) {
+        throw InputError(scene.damage->values.position(""), "damage", error.what());
+      }
+    }
+    damage->onset.data()[p] = limits.onset;
+    damage->failure.data()[p] = limits.failure;
+    if (gradual) crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
+    equal = equal && limits.onset == limits.failure;
+  }
+  for (const std::string& set : scene.no_fail)
+    for (const std::int32_t p : body.set(set))
+      damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
+  if (equal) damage->failure = Field();
+  if (gradual) gradual->prepare(body, std::move(crack_speed));
+  return damage;
+}
+
+}  // namespace perikit

@@ -1,0 +1,60 @@
+#include "build/conditions.hpp"
+#include "build/face_shares.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Points and shares of a load without its values, on the points of parts.body.
+Load distributed(const LoadDescription& description, const ModelParts& parts) {
+  Load load;
+  if (description.type == LoadDescription::Type::traction) {
+    for (const auto& [p, share] : face_shares(description, parts)) {
+      load.points.push_back(p);
+      load.share.push_back(share);
+    }
+    return load;
+  }
+  load.points = parts.body->set(description.set);
+  double total = 0;
+  for (const std::int32_t p : load.points) total += parts.body->volume(static_cast<std::size_t>(p));
+  for (const std::int32_t p : load.points) {
+    const double volume = parts.body->volume(static_cast<std::size_t>(p));
+    load.share.push_back(description.type == LoadDescription::Type::force ? volume / total : volume);
+  }
+  return load;
+}
+
+/// What of a load on the whole body falls on the points that `part` owns.
+void keep_owned(const Partition& partition, const Body& part, Load& load) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < load.points.size(); ++k) {
+    const std::int32_t input = partition.whole().input_of(static_cast<std::size_t>(load.points[k]));
+    if (!partition.owns(input)) continue;
+    load.points[kept] = part.internal()[static_cast<std::size_t>(partition.place(input))];
+    load.share[kept++] = load.share[k];
+  }
+  load.points.resize(kept);
+  load.share.resize(kept);
+}
+
+}  // namespace
+
+Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* partition, bool quasi_static) {
+  ModelParts whole = parts;
+  if (partition) whole.body = &partition->whole();
+  std::vector<Load> loads;
+  for (const LoadDescription& description : scene.loads) {
+    Load load = distributed(description, whole);
+    if (partition) keep_owned(*partition, *parts.body, load);
+    for (std::size_t c = 0; c < description.components.size(); ++c) {
+      const Expression& value = description.components[c];
+      if (value.is_number() && value({}) == 0.0) continue;
+      load.components.push_back({static_cast<int>(c), function_of(value, quasi_static)});
+    }
+    if (!load.components.empty()) loads.push_back(std::move(load));
+  }
+  return Loads(*parts.body, std::move(loads));
+}
+
+}  // namespace perikit

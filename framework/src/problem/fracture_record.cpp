@@ -1,0 +1,69 @@
+#include "perikit/problem/fracture_record.hpp"
+
+#include <fmt/format.h>
+
+#include "families/gradual_failure.hpp"
+#include "problem/snapshot.hpp"
+
+namespace perikit {
+
+bool FractureRecord::update(Model& model, State& state, double time_step, const Motion& motion) {
+  if (!damage_) return false;
+  if (GradualFailure* const gradual = gradual_failure(damage_->law)) gradual->set_time_step(time_step);
+  const BondUpdate update = model.update_bonds(state.displacement(), motion);
+  state.energies.dissipated += update.dissipated;
+  state.energies.strain -= update.released;
+  if (update.dissipated < 0) {
+    ++gains_;
+    gained_ -= update.dissipated;
+  }
+  return update.changed > 0;
+}
+
+std::string FractureRecord::summary(const BondChecks& checks, double dissipated) const {
+  if (!damage_) return {};
+  std::string text =
+      fmt::format("failed bonds  {}, weakened {}, dissipated {:.6g} J\n", checks.failed, checks.weakened, dissipated);
+  if (checks.groups > 0) {
+    text += fmt::format(
+        "bond checks   {} of {} groups of eight points in {} updates ({:.2f} %); the others were too far from failing\n",
+        checks.checked, checks.groups, checks.updates,
+        100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
+  }
+  if (gains_ > 0) {
+    text +=
+        fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n",
+                    gains_, gained_, dissipated + gained_);
+  }
+  return text;
+}
+
+void FractureRecord::write(const Model& model, ByteWriter& out) const {
+  out.value(gains_);
+  out.value(gained_);
+  const std::vector<BondChange> bonds = model.changed_bonds();
+  out.value(static_cast<std::uint64_t>(bonds.size()));
+  for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
+    out.value(b.point);
+    out.value(b.far);
+    out.value(b.bond);
+    out.value(b.integrity);
+  }
+}
+
+void FractureRecord::read(Model& model, ByteReader& in) {
+  gains_ = in.value<std::int64_t>();
+  gained_ = in.value<double>();
+  std::vector<BondChange> bonds;
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    BondChange b;
+    b.point = in.value<std::int32_t>();
+    b.far = in.value<std::int32_t>();
+    b.bond = in.value<std::int64_t>();
+    b.integrity = in.value<double>();
+    bonds.push_back(b);
+  }
+  model.restore_bonds(bonds);
+}
+
+}  // namespace perikit

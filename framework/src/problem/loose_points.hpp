@@ -1,0 +1,13 @@
+#pragma once
+#include <span>
+
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/families/fracture.hpp"
+
+namespace perikit {
+
+/// Holds the ends of bonds that are no longer whole by 1e-9 of the mean stiffness of a point, so that pieces that nothing else
+/// holds stay where they are. K: [N/m], with all points at the ends of `changed` among its rows.
+void hold_loose_points(std::span<const BondChange> changed, BlockMatrix& K);
+
+}  // namespace perikit

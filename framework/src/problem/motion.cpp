@@ -1,0 +1,93 @@
+#include "perikit/problem/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/communicator.hpp"
+#include "perikit/core/parallel.hpp"
+
+namespace perikit {
+
+double kinetic_energy(const Problem& problem, ConstFieldView velocity) {
+  const std::span<const double> masses = problem.masses().by_point();
+  constexpr std::size_t block = 8192;
+  return communicator().sum(ordered_sum((masses.size() + block - 1) / block, [&](std::size_t b) {
+    double sum = 0;
+    for (std::size_t p = b * block; p < std::min(masses.size(), (b + 1) * block); ++p) {
+      double v2 = 0;
+      for (int c = 0; c < velocity.components; ++c) v2 += velocity.component(c)[p] * velocity.component(c)[p];
+      sum += 0.5 * masses[p] * v2;
+    }
+    return sum;
+  }));
+}
+
+Field accelerations(Problem& problem, double t) {
+  Field a = problem.make_field();
+  const std::span<const double> masses = problem.masses().by_point();
+  const ConstFieldView internal = problem.state().internal_force();
+  const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
+  for (int c = 0; c < problem.dimension(); ++c)
+    for (const std::int32_t index : problem.body().owned()) {
+      const auto p = static_cast<std::size_t>(index);
+      a.component(c)[p] = (internal.component(c)[p] + (external.data ? external.component(c)[p] : 0.0)) / masses[p];
+    }
+  problem.constraints().prescribe_acceleration(t, a);
+  return a;
+}
+
+Field reactions(Problem& problem, bool dynamic, double t) {
+  Field r = problem.make_field();
+  if (!problem.constraints().any()) return r;
+  const ConstFieldView internal = problem.state().internal_force();
+  const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
+  const Field a = dynamic ? accelerations(problem, t) : Field();
+  for (const std::int64_t dof : problem.constraints().dofs()) {
+    r.data()[dof] = -internal.data[dof] - (external.data ? external.data[dof] : 0.0);
+    if (dynamic) r.data()[dof] += problem.masses().by_point()[static_cast<std::size_t>(dof) % r.stride()] * a.data()[dof];
+  }
+  return r;
+}
+
+void middle_of_next_step(Problem& problem, double time_step, ConstFieldView velocity, FieldView end) {
+  const std::span<const double> masses = problem.masses().by_point();
+  const ConstFieldView free = problem.constraints().free(), u = problem.state().displacement(),
+                       internal = problem.state().internal_force(),
+                       external = problem.loads().any() ? ConstFieldView(problem.state().external_force()) : ConstFieldView();
+  for (std::size_t k = 0; k < end.size(); ++k) {
+    const double m = masses[k % end.stride], force = internal.data[k] + (external.data ? external.data[k] : 0.0);
+    const double next = velocity.data[k] + (m > 0 ? free.data[k] * time_step * force / m : 0.0);
+    end.data[k] = u.data[k] + 0.5 * time_step * next;
+  }
+}
+
+std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
+  const int d = body.dimension();
+  Point middle{};
+  for (const std::int32_t p : body.internal())
+    for (std::size_t c = 0; c < 3; ++c)
+      middle[c] += body.position(static_cast<std::size_t>(p))[c] / static_cast<double>(body.points());
+  double size = body.spacing();
+  for (const std::int32_t p : body.internal())
+    for (std::size_t c = 0; c < 3; ++c)
+      size = std::max(size, std::abs(body.position(static_cast<std::size_t>(p))[c] - middle[c]));
+  std::vector<Field> motions;
+  for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(body.make_field(d));
+  for (const std::int32_t index : body.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    Point y = body.position(p);
+    for (int c = 0; c < d; ++c) {
+      y[static_cast<std::size_t>(c)] += u.component(c)[p] - middle[static_cast<std::size_t>(c)];
+      motions[static_cast<std::size_t>(c)].component(c)[p] = 1;
+    }
+    std::size_t k = static_cast<std::size_t>(d);
+    for (int a = 0; a < d; ++a)
+      for (int b = a + 1; b < d; ++b, ++k) {
+        motions[k].component(a)[p] = -y[static_cast<std::size_t>(b)] / size;
+        motions[k].component(b)[p] = y[static_cast<std::size_t>(a)] / size;
+      }
+  }
+  return motions;
+}
+
+}  // namespace perikit

@@ -1,0 +1,47 @@
+#include "perikit/sdk/stable_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perikit/core/communicator.hpp"
+#include "perikit/core/field_operations.hpp"
+#include "perikit/model/family_point.hpp"
+#include "perikit/sdk/eigenvalue.hpp"
+
+namespace perikit {
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u) {
+  const std::span<const double> masses = problem.masses().by_point();
+  const ConstFieldView free = problem.constraints().free();
+  // M^-1/2 K M^-1/2 restricted to the free components.
+  Field scale = problem.make_field();
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    const double m = masses[k % free.stride];
+    scale.data()[k] = m > 0 ? free.data[k] / std::sqrt(m) : 0.0;
+  }
+  const FieldView eigenvector = problem.state().declare("eigenvector");
+  return largest_eigenvalue(problem, u, scale, eigenvector, norm(eigenvector) > 0);
+}
+
+double bond_based_time_step(const Body& body, const Laws& laws) {
+  const int d = body.dimension();
+  const double delta = body.horizon(), dx = body.spacing();
+  const double reach = 2 * std::ceil(delta / dx) * dx;
+  const Lattice lattice = make_lattice(d, dx, {}, {reach + dx, reach + dx, reach + dx}, delta);
+  double sum = 0;  // of V_j/|xi|
+  for (const auto& offset : family_offsets(lattice, delta)) {
+    sum += std::pow(dx, d) * body.section() /
+           (dx * std::sqrt(double(offset[0]) * offset[0] + double(offset[1]) * offset[1] + double(offset[2]) * offset[2]));
+  }
+  double least = 0;
+  for (const std::int32_t index : body.owned()) {
+    const auto p = static_cast<std::size_t>(index);
+    const FamilyPoint point{body.space(), body.section(), delta, laws.moduli(p)};
+    const double dt = std::sqrt(2 * laws.density(p) / (point.micromodulus() * sum));
+    least = least > 0 ? std::min(least, dt) : dt;
+    if (laws.single() && laws.record_of(p).densities.empty()) break;
+  }
+  return -communicator().largest(-least);
+}
+
+}  // namespace perikit
