@@ -52,7 +52,7 @@ using Bonds = std::map<std::pair<std::int32_t, std::int32_t>, double>;
 Bonds failed(const BodyProblem& problem) {
   Bonds bonds;
   for (const BondChange& b : problem.terms().changed_bonds())
-    bonds[{std::min(b.point, b.far), std::max(b.point, b.far)}] = b.integrity;
+    bonds[{b.bond.point, b.bond.far}] = b.integrity;
   return bonds;
 }
 

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/problem/motion.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"

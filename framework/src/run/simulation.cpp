@@ -24,10 +24,10 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
 
 void Simulation::refuse_gradients() const {
   const auto check = [&](const std::string& field, const SourcePosition& position, const std::string& key) {
-    if (!PointFields::needs_gradients(field)) return;
+    if (!find_point_field(field)->of_gradients) return;
     std::vector<std::string> others;
-    for (const std::string& name : PointFields::names())
-      if (!PointFields::needs_gradients(name)) others.push_back(name);
+    for (const PointField& other : point_fields())
+      if (!other.of_gradients) others.push_back(other.name);
     throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
                                                 field, scene_.kinematics->type, fmt::join(others, ", ")));
   };
@@ -81,7 +81,9 @@ std::string Simulation::explanation(const Registry& registry) const {
   if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
-  notes.push_back({"fields that nobody asked for", "computed when written", fmt::format("{} of {} point fields", PointFields::names().size() - std::min(PointFields::names().size(), std::max<std::size_t>(scene_.output.fields.size(), 3)), PointFields::names().size())});
+  const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
+  notes.push_back({"fields that nobody asked for", "computed when written",
+                   fmt::format("{} of {} point fields", fields - std::min(fields, written), fields)});
   std::string text = "skipped:\n";
   for (const SkipNote& note : notes) text += fmt::format("  {}: {} - saves {}\n", note.what, note.why, note.saves);
   return text;

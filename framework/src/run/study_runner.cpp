@@ -14,7 +14,7 @@
 #include <span>
 #include <sstream>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
 

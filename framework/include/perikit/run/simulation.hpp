@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
 #include "perikit/problem/integrator.hpp"
 #include "perikit/problem/body_problem.hpp"
-#include "perikit/run/point_fields.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {

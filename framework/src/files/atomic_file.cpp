@@ -1,4 +1,4 @@
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 namespace perikit {
 
@@ -74,10 +73,6 @@ void store_atomically(const std::filesystem::path& file, std::span<const std::by
   if (::close(descriptor.release()) != 0) give_up(errno);
   if (::rename(temporary.c_str(), file.c_str()) != 0) give_up(errno);
   sync_folder(file);
-}
-
-void write_file_atomically(const std::filesystem::path& file, const std::string& text) {
-  store_atomically(file, std::as_bytes(std::span(text)));
 }
 
 void make_folder(const std::filesystem::path& folder) {

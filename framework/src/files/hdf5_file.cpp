@@ -1,4 +1,4 @@
-#include "output/hdf5_file.hpp"
+#include "files/hdf5_file.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
