@@ -33,41 +33,56 @@ void add_commands(CLI::App& app, Options& options) {
   run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
-  CLI::App* study_command = add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
+  CLI::App* study_command =
+      add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
   study_command->add_option("study", options.scene, "Study file (TOML)")->required();
   study_command->add_option("-o,--output", options.output, "Folder for table, plot and runs; default: out/<study>");
   study_command->add_option("--set", options.overrides, "key=value: overrides a value of the scene in every run");
   study_command->add_option("--threads", options.threads, "Threads of each run; default: all cores")->check(CLI::Range(1, 1024));
-  study_command->add_option("--jobs", options.jobs, "Runs side by side; the default, 1, is for run times that are to be compared")->default_val(1)->check(CLI::Range(1, 1024));
+  study_command->add_option("--jobs", options.jobs, "Runs side by side; the default, 1, is for run times that are to be compared")
+      ->default_val(1)
+      ->check(CLI::Range(1, 1024));
   study_command->add_flag("--resume", options.resume, "Keep the runs of the folder that are done already");
   study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");
   study_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", plot);
   plot_command->add_option("results", options.plot.results, "Folder of a run, or its results.h5")->required();
-  plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")->capture_default_str();
+  plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")
+      ->capture_default_str();
   plot_command->add_option("--component", options.plot.component, "x, y, z, magnitude; xx ... zz, von_mises, trace, determinant");
   plot_command->add_option("--frame", options.frame, "Frame index; default: the last one");
   plot_command->add_option("--deformed", options.plot.deformed, "Factor of the displacement that is added to the positions");
   plot_command->add_option("--view", options.view, "3D: direction from the body to the eye")->expected(3);
   plot_command->add_option("--range", options.range, "Ends of the colour scale")->expected(2);
   plot_command->add_option("--unit", options.unit, "Unit to show, where the scene is not in SI");
-  plot_command->add_option("-o,--output", options.output, "Picture: .png, .svg or .pdf; default: <field>_<frame>.png in the folder of the run");
+  plot_command->add_option("-o,--output", options.output,
+                           "Picture: .png, .svg or .pdf; default: <field>_<frame>.png in the folder of the run");
   CLI::App* bench_command = add("bench", "Speed of the kernels beside the limits of this machine", bench);
-  bench_command->add_option("--kinematics", options.bench.kinematics, "Which; with a penalty: conventional+silling; default: all known ones");
+  bench_command->add_option("--kinematics", options.bench.kinematics,
+                            "Which; with a penalty: conventional+silling; default: all known ones");
   bench_command->add_option("--material", options.bench.materials, "Which")->capture_default_str();
-  bench_command->add_option("--dimension", options.bench.dimensions, "1, 2 or 3, or several of them")->check(CLI::Range(1, 3))->allow_extra_args()->capture_default_str();
-  bench_command->add_option("--cells", options.bench.cells, "Points along each side")->check(CLI::Range(2, 100000000))->capture_default_str();
-  bench_command->add_flag("--assembly", options.bench.assembly, "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");
+  bench_command->add_option("--dimension", options.bench.dimensions, "1, 2 or 3, or several of them")
+      ->check(CLI::Range(1, 3))
+      ->allow_extra_args()
+      ->capture_default_str();
+  bench_command->add_option("--cells", options.bench.cells, "Points along each side")
+      ->check(CLI::Range(2, 100000000))
+      ->capture_default_str();
+  bench_command->add_flag("--assembly", options.bench.assembly,
+                          "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");
   bench_command->add_option("--json", options.bench.json, "Write the figures to this file as well");
-  bench_command->add_option("--operations", options.bench.operations, "CSV of operations a point and step; default: the one that comes with perikit");
+  bench_command->add_option("--operations", options.bench.operations,
+                            "CSV of operations a point and step; default: the one that comes with perikit");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
   new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   add("contract", "Run the contract suites on every part of a library", contract)
       ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
-  add("list", "List the known parts", list)->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
-  CLI::App* describe_command = add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
+  add("list", "List the known parts", list)
+      ->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
+  CLI::App* describe_command =
+      add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
   describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
   describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }

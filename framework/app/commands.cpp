@@ -61,26 +61,31 @@ void run(const Options& options) {
                        library_fingerprints(*registry));
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
-    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().state().time)
+    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
+                                                                        recorder.resumed_step(), simulation.problem().state().time)
                                                           : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
     if (!options.quiet) fmt::print("{}\n", from);
   }
   recorder.log(simulation.explanation(*registry));
-  for (const RefusedLibrary& refused : registry->refused()) recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
+  for (const RefusedLibrary& refused : registry->refused())
+    recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
   try {
     simulation.run(recorder);
   } catch (const RunError& error) {
-    const std::string reason = fmt::format("{}; last good frame: {}", error.what(), recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");
+    const std::string reason = fmt::format("{}; last good frame: {}", error.what(),
+                                           recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
   const std::string closing = recorder.closing(set_up);
   log_end(recorder, closing);
-  if (!options.quiet) fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
+  if (!options.quiet)
+    fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
-    const std::string stopped = fmt::format("stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
-                                            simulation.problem().state().step, simulation.problem().state().time, recorder.frames() - 1, folder.string());
+    const std::string stopped = fmt::format(
+        "stopped by a signal after step {}, time {:.6g} s; frame {} and a checkpoint were kept: go on with --resume -o {}",
+        simulation.problem().state().step, simulation.problem().state().time, recorder.frames() - 1, folder.string());
     log_end(recorder, stopped);
     throw RunError(stopped);
   }
@@ -101,7 +106,9 @@ void check(const Options& options) {
 void study(const Options& options) {
   const auto registry = open_registry(options);
   // Runs side by side share the cores.
-  if (const int threads = options.threads > 0 ? options.threads : std::max(1, thread_count() / options.jobs); threads != thread_count()) set_thread_count(threads);
+  if (const int threads = options.threads > 0 ? options.threads : std::max(1, thread_count() / options.jobs);
+      threads != thread_count())
+    set_thread_count(threads);
   const Study study = read_study(options.scene, *registry);
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / study.file.stem() : options.output;
   const auto runner = [&](const Scene& scene, const std::filesystem::path& own) { return run_in_child(scene, *registry, own); };
@@ -109,9 +116,12 @@ void study(const Options& options) {
     if (!options.quiet) fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress, {options.jobs, options.resume});
+  const StudyTable table =
+      run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress, {options.jobs, options.resume});
   const auto done = std::ranges::count(table.rows, "done", &StudyRow::status);
-  if (!options.quiet) fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(), study.plot ? " and plot" : "", folder.string());
+  if (!options.quiet)
+    fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(),
+               study.plot ? " and plot" : "", folder.string());
   if (done == 0) throw RunError(fmt::format("no run of the study came to its end; the first: {}", table.rows.front().reason));
 }
 
@@ -122,7 +132,8 @@ void list(const Options& options) {
 
 void describe(const Options& options) {
   const auto registry = open_registry(options);
-  if (!options.markdown && options.part.empty()) throw InputError("name what to describe: KIND/NAME, scene, scene/SECTION or study; --markdown describes everything");
+  if (!options.markdown && options.part.empty())
+    throw InputError("name what to describe: KIND/NAME, scene, scene/SECTION or study; --markdown describes everything");
   if (options.markdown && !options.part.empty()) throw InputError("--markdown describes everything: name no part");
   fmt::print("{}", options.markdown ? reference_page(*registry) : describe_part(*registry, options.part));
 }

@@ -69,10 +69,12 @@ std::string new_project(const Registry& registry, const std::string& kind, const
   if (std::ranges::find(kinds, kind) == kinds.end()) {
     throw InputError(fmt::format("no template for kind '{}'{}; allowed: {}", kind, did_you_mean(kind, kinds), fmt::join(kinds, ", ")));
   }
-  if (!is_name(part)) throw InputError(fmt::format("'{}' is no name of a part; allowed: a-z, 0-9 and single _ between them, a letter first", part));
+  if (!is_name(part))
+    throw InputError(fmt::format("'{}' is no name of a part; allowed: a-z, 0-9 and single _ between them, a letter first", part));
   const Kind known = *kind_from_name(kind);
   if (registry.known(known, part)) {
-    throw InputError(fmt::format("there is a {} '{}' already ({}): take another name", kind, part, registry.library_of(known, part).string()));
+    throw InputError(
+        fmt::format("there is a {} '{}' already ({}): take another name", kind, part, registry.library_of(known, part).string()));
   }
   const fs::path folder = part;
   if (fs::exists(fs::symlink_status(folder))) throw InputError({folder.string()}, "", "exists already: nothing is written");
@@ -80,10 +82,14 @@ std::string new_project(const Registry& registry, const std::string& kind, const
   if (fs::create_directory(folder, failed); failed) throw RunError(fmt::format("{}: cannot create the folder: {}", part, failed.message()));
   const std::string target = fmt::format("{}_{}", kind, part);
   // In this order: the longer words hold the shorter ones.
-  const std::vector<std::pair<std::string, std::string>> words{
-      {"kind_part_name", target}, {"kind/part_name", kind + "/" + part}, {"perikit_prefix", prefix().string()}, {"part_name", part}, {"PartName", pascal_case(part)}};
+  const std::vector<std::pair<std::string, std::string>> words{{"kind_part_name", target},
+                                                               {"kind/part_name", kind + "/" + part},
+                                                               {"perikit_prefix", prefix().string()},
+                                                               {"part_name", part},
+                                                               {"PartName", pascal_case(part)}};
   for (const fs::path& source : {templates / "common", templates / kind}) {
-    for (const auto& entry : fs::directory_iterator(source)) write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
+    for (const auto& entry : fs::directory_iterator(source))
+      write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
   }
   const std::string first = fs::exists(contract_program()) ? "" : fmt::format("  {}\n", how_to_build_contract());   // its ctest runs them
   return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n{1}"

@@ -36,4 +36,4 @@
 #include "perikit/core/tensor.hpp"
 #include "perikit/plugin/registry.hpp"
 #include "perikit/problem/integrator.hpp"
-#include "perikit/terms/model.hpp"
+#include "perikit/terms/terms.hpp"

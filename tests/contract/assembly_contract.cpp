@@ -29,14 +29,14 @@ std::vector<std::string> materials() {
   return all;
 }
 
-BlockMatrix assembled(ModelProblem& problem, ConstFieldView u) {
+BlockMatrix assembled(BodyProblem& problem, ConstFieldView u) {
   BlockMatrix K;
   const EvaluationStatus status = problem.assemble_tangent(u, K);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return K;
 }
 
-Field product(const ModelProblem& problem, const BlockMatrix& K, ConstFieldView w) {
+Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w) {
   Field out = problem.body().make_field(K.dimension);
   const auto d = static_cast<std::size_t>(K.dimension);
   for (std::size_t r = 0; r < K.rows(); ++r)
@@ -90,7 +90,7 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
       c.body.material = material;
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();
       deform(body, problem.state().displacement(), 71, 0.02);
       Field w = problem.make_field(), expected = problem.make_field();
@@ -124,7 +124,7 @@ TEST_CASE("kinematics: the assembled tangent is bitwise the same for one and two
     if (options.dimension == 1) options.cells = 2000;
     if (options.dimension == 2) options.cells = 36;
     const auto simulation = build(scene_text(options, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     deform(problem.body(), problem.state().displacement(), 81, 0.02);
     const int threads = thread_count();
     set_thread_count(1);
@@ -150,7 +150,7 @@ TEST_CASE("kinematics: the size of an assembled tangent is known before") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const AssembledSize size = problem.assembled_size();
     const BlockMatrix K = assembled(problem, problem.state().displacement());
     const double ratio = static_cast<double>(size.blocks) / static_cast<double>(K.blocks());
@@ -166,12 +166,12 @@ TEST_CASE("kinematics: assembling reports an inadmissible deformation") {
     if (options.crack || options.plane == "stress") continue;
     INFO(c.label());
     const auto simulation = build(scene_text(options, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     // Inside out, or (pair laws) all on one point.
-    const double factor = problem.model().has_gradients() ? -1.5 : -1.0;
+    const double factor = problem.terms().has_gradients() ? -1.5 : -1.0;
     set_field(body, problem.state().displacement(), [&](const Point& x) { return Point{factor * x[0], 0, 0}; });
-    if (!problem.model().has_gradients())
+    if (!problem.terms().has_gradients())
       set_field(body, problem.state().displacement(), [&](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
     Field f = problem.make_field();
     const EvaluationStatus expected = problem.evaluate_forces(problem.state().displacement(), f, nullptr);

@@ -57,7 +57,7 @@ struct Response {
   Field force;
 };
 
-Response respond(ModelProblem& problem, std::uint64_t seed) {
+Response respond(BodyProblem& problem, std::uint64_t seed) {
   stretch_at_random(problem.body(), problem.state().displacement(), seed);
   Response r{0, problem.make_field()};
   const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
@@ -73,7 +73,7 @@ double difference(const Body& body, const Field& a, const Field& b) {
 }
 
 /// |K w - Kw| of the assembled tangent and the tangent action along noise, relative to Kw.
-double tangent_difference(ModelProblem& problem) {
+double tangent_difference(BodyProblem& problem) {
   const Body& body = problem.body();
   Field w = problem.make_field(), Kw = problem.make_field();
   Noise random(21);
@@ -81,7 +81,7 @@ double tangent_difference(ModelProblem& problem) {
   REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
   const double scale = largest(body, Kw);
   BlockMatrix K;
-  REQUIRE(problem.model().assemble(problem.state().displacement(), K).ok());
+  REQUIRE(problem.terms().assemble(problem.state().displacement(), K).ok());
   const auto d = static_cast<std::size_t>(K.dimension);
   for (std::size_t r = 0; r < K.rows(); ++r)
     for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
@@ -93,7 +93,7 @@ double tangent_difference(ModelProblem& problem) {
 }
 
 /// How far the slope of the energy along a random direction is from -force, relative to it.
-double slope_error(ModelProblem& problem, const Response& r) {
+double slope_error(BodyProblem& problem, const Response& r) {
   const int d = problem.dimension();
   Field w = problem.body().make_field(d), kept = problem.body().make_field(d), scratch = problem.body().make_field(d);
   Noise random(3);
@@ -112,14 +112,14 @@ double slope_error(ModelProblem& problem, const Response& r) {
 }
 
 /// Largest difference of sampled gradients of an affine motion from its own, fragments apart.
-double affine_error(ModelProblem& problem) {
+double affine_error(BodyProblem& problem) {
   const int d = problem.dimension();
   set_field(problem.body(), problem.state().displacement(), [&](const Point& x) {
     return d == 1 ? Point{0.1 * x[0]} : Point{0.1 * x[0] - 0.07 * x[1], 0.03 * x[0] - 0.06 * x[1], d == 3 ? 0.05 * x[2] : 0.0};
   });
   PointSamples samples;
-  REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
-  const Field damage = problem.model().damage();
+  REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+  const Field damage = problem.terms().damage();
   const double G[3][3] = {{0.1, -0.07, 0}, {0.03, -0.06, 0}, {0, 0, 0.05}};
   double worst = 0;
   for (const std::int32_t p : problem.body().internal())
@@ -158,12 +158,9 @@ double quantile(std::vector<Stretched> all, double share) {
   return 0.5 * (all[k].stretch + all[k - 1].stretch);
 }
 
-/// Whether the kinematics runs in this dimension and its stencils follow broken bonds; scenes with the others are refused.
+/// Whether forces are -dE/du, so that bonds may fail; scenes with the others are refused.
 bool suits(const Example& example, int dimension) {
-  const Formulation formulation = formulation_of(example);
-  if (formulation.force_state == ForceState::variational &&
-      (formulation.order == 1 || (formulation.point && example.stabilization.empty())))
-    return true;
+  if (formulation_of(example).force_state == ForceState::variational) return true;
   CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
   return false;
 }
@@ -171,7 +168,7 @@ bool suits(const Example& example, int dimension) {
 /// `selective` knows of bonds that fail in the course of a run: what the dense reference says of this body as it is, the bonds across the
 /// plane failed. Nothing where the reference does not know the kinematics.
 std::optional<Response> dense_response(Simulation& simulation, double height) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   const Body& body = problem.body();
   const auto influence = subject().registry.influence(*simulation.scene().influence);
   reference::Cloud cloud = cloud_of(body, *influence);
@@ -206,16 +203,16 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         const auto failing = build(scene_text(options, kinematics_table(example)));
         options.conditions = crack_text(whole->problem().body());
         const auto cut = build(scene_text(options, kinematics_table(example)));
-        ModelProblem& problem = failing->problem();
+        BodyProblem& problem = failing->problem();
         const Body& body = problem.body();
         // Before anything fails the criterion changes nothing.
         const Response before = respond(problem, 5), plain = respond(whole->problem(), 5);
         CHECK(difference(body, before.force, plain.force) == 0);
         CHECK(before.energy == plain.energy);
         part_at(body, problem.state().displacement(), height);
-        const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
-        CHECK(2 * update.changed == cut->problem().model().report().broken_bonds);
-        CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
+        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+        CHECK(2 * update.changed == cut->problem().terms().report().broken_bonds);
+        CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
         const Response after = respond(problem, 6);
         const bool selective = formulation_of(example).selective();
         const std::optional<Response> expected = selective ? dense_response(*failing, height) : respond(cut->problem(), 6);
@@ -225,12 +222,12 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         } else {
           MESSAGE("no dense reference of kinematics '" << example.part << "'");
         }
-        const Field damage = problem.model().damage(), cut_damage = cut->problem().model().damage();
+        const Field damage = problem.terms().damage(), cut_damage = cut->problem().terms().damage();
         for (const std::int32_t p : body.internal()) CHECK(std::abs(damage.data()[p] - cut_damage.data()[p]) <= 1e-12);
         // At rest again, and closed: nothing heals.
         set_field(body, problem.state().displacement(), [](const Point&) { return Point{}; });
-        CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
-        CHECK(problem.model().changed_bonds().size() == update.changed);
+        CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
+        CHECK(problem.terms().changed_bonds().size() == update.changed);
       }
 }
 
@@ -247,10 +244,10 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\nno_fail = [\"part\"]\n", most);
         const std::string text = scene_text(options, kinematics_table(example));
         const auto simulation = build(text);
-        ModelProblem& problem = simulation->problem();
+        BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         const auto intact = respond(problem, 11);
-        const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
+        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
         CHECK(update.changed > 0);
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.released) <= 1e-11 * intact.energy);
@@ -263,10 +260,11 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         // No bond of a protected point failed, and every failed one is named once.
         const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
         std::set<std::pair<std::int32_t, std::int32_t>> named;
-        for (const BondChange& b : problem.model().changed_bonds()) {
-          CHECK((!safe.contains(b.point) && !safe.contains(b.far)));
+        for (const BondChange& b : problem.terms().changed_bonds()) {
+          CHECK((!safe.contains(b.bond.point) && !safe.contains(b.bond.far)));
           CHECK(b.integrity == 0);
-          CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
+          CHECK(b.bond.point < b.bond.far);
+          CHECK(named.emplace(b.bond.point, b.bond.far).second);
         }
         std::size_t expected = 0;
         for (const Stretched& b : stretches(body, problem.state().displacement())) {
@@ -292,38 +290,40 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
 
 TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine motion, momentum") {
   for (const Example& example : kinematics_examples())
-    for (const int d : {1, 2, 3}) {
-      INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D");
-      if (!suits(example, d)) continue;
-      BodyOptions options{.dimension = d, .cloud = true};
-      const auto plain = build(scene_text(options, kinematics_table(example)));
-      stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 17);
-      const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().state().displacement());
-      options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n",
-                                       quantile(all, 0.5), quantile(all, 0.97));
-      const std::string text = scene_text(options, kinematics_table(example));
-      const auto simulation = build(text);
-      ModelProblem& problem = simulation->problem();
-      const Body& body = problem.body();
-      const Response intact = respond(problem, 17);
-      const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
-      const BondChecks checks = problem.model().bond_checks();
-      CHECK(checks.weakened > 0);
-      CHECK(checks.failed > 0);
-      const Response left = respond(problem, 17);
-      CHECK(std::abs(intact.energy - left.energy - update.released) <= 1e-11 * intact.energy);
-      CHECK(left.energy < intact.energy);
-      CHECK(slope_error(problem, left) <= 1e-6);
-      CHECK(tangent_difference(problem) <= 1e-12);
-      for (int c = 0; c < d; ++c)
-        CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
-      const auto other = build(text);
-      other->problem().restore(problem.snapshot());
-      const Response same = respond(other->problem(), 17);
-      CHECK(same.energy == left.energy);
-      CHECK(difference(body, same.force, left.force) == 0);
-      if (problem.model().has_gradients()) CHECK(affine_error(problem) <= 1e-12);
-    }
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d)) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const auto plain = build(scene_text(options, kinematics_table(example)));
+        stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 17);
+        const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().state().displacement());
+        options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nstretch_min = {:.17g}\nstretch = {:.17g}\n",
+                                         quantile(all, 0.5), quantile(all, 0.97));
+        const std::string text = scene_text(options, kinematics_table(example));
+        const auto simulation = build(text);
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        CHECK((body.lattice() != nullptr) == !cloud);   // lattices stay what they are
+        const Response intact = respond(problem, 17);
+        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+        const BondChecks checks = problem.terms().bond_checks();
+        CHECK(checks.weakened > 0);
+        CHECK(checks.failed > 0);
+        const Response left = respond(problem, 17);
+        CHECK(std::abs(intact.energy - left.energy - update.released) <= 1e-11 * intact.energy);
+        CHECK(left.energy < intact.energy);
+        CHECK(slope_error(problem, left) <= 1e-6);
+        CHECK(tangent_difference(problem) <= 1e-12);
+        for (int c = 0; c < d; ++c)
+          CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
+        const auto other = build(text);
+        other->problem().restore(problem.snapshot());
+        const Response same = respond(other->problem(), 17);
+        CHECK(same.energy == left.energy);
+        CHECK(difference(body, same.force, left.force) == 0);
+        if (problem.terms().has_gradients()) CHECK(affine_error(problem) <= 1e-12);
+      }
 }
 
 TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a fragment") {
@@ -336,25 +336,25 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
           if (!suits(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));
-          if (!plain->problem().model().has_gradients()) continue;
+          if (!plain->problem().terms().has_gradients()) continue;
           stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 13);
           options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\n",
                                            quantile(stretches(plain->problem().body(), plain->problem().state().displacement()), share));
           const auto simulation = build(scene_text(options, kinematics_table(example)));
-          ModelProblem& problem = simulation->problem();
+          BodyProblem& problem = simulation->problem();
           const Body& body = problem.body();
           const Response intact = respond(problem, 13);
-          const BondUpdate update = problem.model().update_bonds(problem.state().displacement());
+          const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
           const Response left = respond(problem, 13);
           // Bonds of fragments are accounted for like the others, and named once.
           CHECK(std::abs(intact.energy - left.energy - update.released) <= 1e-11 * intact.energy);
           std::set<std::pair<std::int32_t, std::int32_t>> named;
-          for (const BondChange& b : problem.model().changed_bonds()) CHECK(named.emplace(std::min(b.point, b.far), std::max(b.point, b.far)).second);
+          for (const BondChange& b : problem.terms().changed_bonds()) CHECK(named.emplace(b.bond.point, b.bond.far).second);
           CHECK(named.size() == update.changed);
-          CHECK(problem.model().update_bonds(problem.state().displacement()).changed == 0);
+          CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
           for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
           // No family is left near singular: 0.1 of an intact one, whose condition is below 20, in its weakest direction.
-          const Field condition = problem.model().shape_tensor_condition(), damage = problem.model().damage();
+          const Field condition = problem.terms().shape_tensor_condition(), damage = problem.terms().damage();
           std::size_t fragments = 0;
           for (const std::int32_t p : body.internal()) {
             if (damage.data()[p] == 1) ++fragments;
@@ -374,10 +374,10 @@ TEST_CASE("kinematics: points without bonds are free masses") {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
         const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
-        ModelProblem& problem = simulation->problem();
+        BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
-        CHECK(problem.model().update_bonds(problem.state().displacement()).released > 0);
+        CHECK(problem.terms().update_bonds(problem.state().displacement()).released > 0);
         // Wherever they fly, even onto each other.
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
         Field force = problem.body().make_field(d);
@@ -385,7 +385,7 @@ TEST_CASE("kinematics: points without bonds are free masses") {
         REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
         CHECK(energy == 0);
         CHECK(largest(body, force) == 0);
-        const Field damage = problem.model().damage();
+        const Field damage = problem.terms().damage();
         for (const std::int32_t p : body.internal()) CHECK(damage.data()[p] == 1);
       }
 }
@@ -399,9 +399,9 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
       const auto plain = build(scene_text(options, kinematics_table(example)));
       options.conditions = limit;
       const auto failing = build(scene_text(options, kinematics_table(example)));
-      CHECK(plain->problem().model().report().bytes < failing->problem().model().report().bytes);
-      CHECK(plain->problem().model().update_bonds(plain->problem().state().displacement()).changed == 0);
-      CHECK(plain->problem().model().bond_checks().updates == 0);
+      CHECK(plain->problem().terms().report().bytes < failing->problem().terms().report().bytes);
+      CHECK(plain->problem().terms().update_bonds(plain->problem().state().displacement()).changed == 0);
+      CHECK(plain->problem().terms().bond_checks().updates == 0);
       CHECK(plain->problem().fracture_summary().empty());
     }
 }

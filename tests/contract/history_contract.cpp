@@ -31,7 +31,7 @@ std::string rate_scene(const Example& kinematics, int dimension, bool cloud, boo
 
 /// check(problem) for every kinematics with gradients in every dimension, on lattices and clouds; half of them with a second
 /// material without history, cracked in 2D (small bodies in 3D would fall apart).
-void for_every_model(const std::function<void(ModelProblem&)>& check) {
+void for_every_model(const std::function<void(BodyProblem&)>& check) {
   for (const Example& example : examples(Kind::kinematics))
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
@@ -43,12 +43,12 @@ void for_every_model(const std::function<void(ModelProblem&)>& check) {
             continue;
           }
           const auto simulation = build(rate_scene(example, d, cloud, mixed));
-          if (simulation->problem().model().has_gradients()) check(simulation->problem());
+          if (simulation->problem().terms().has_gradients()) check(simulation->problem());
         }
 }
 
-std::vector<double> kept(const ModelProblem& problem) {
-  const std::span<const double> values = std::as_const(*problem.laws().history()).values();
+std::vector<double> kept(const BodyProblem& problem) {
+  const std::span<const double> values = std::as_const(*problem.terms().history()).values();
   return {values.begin(), values.end()};
 }
 
@@ -58,14 +58,14 @@ struct Response {
 };
 
 /// Energies and forces on all points agree to the bit.
-bool same(const ModelProblem& problem, const Response& a, const Response& b) {
+bool same(const BodyProblem& problem, const Response& a, const Response& b) {
   bool equal = a.energy == b.energy;
   for (const std::int32_t p : problem.body().internal())
     for (int c = 0; c < problem.dimension(); ++c) equal = equal && a.force.component(c)[p] == b.force.component(c)[p];
   return equal;
 }
 
-Response respond(ModelProblem& problem, ConstFieldView u, double time_step) {
+Response respond(BodyProblem& problem, ConstFieldView u, double time_step) {
   Response r{0, problem.make_field()};
   r.force.fill(std::numeric_limits<double>::quiet_NaN());
   const EvaluationStatus status = problem.evaluate_forces(u, r.force, &r.energy, time_step);
@@ -73,14 +73,14 @@ Response respond(ModelProblem& problem, ConstFieldView u, double time_step) {
   return r;
 }
 
-Field deformed(const ModelProblem& problem, std::uint64_t seed, double noise) {
+Field deformed(const BodyProblem& problem, std::uint64_t seed, double noise) {
   Field u = problem.make_field();
   deform(problem.body(), u, seed, noise);
   return u;
 }
 
 /// Three steps of a path; the last response.
-Response walk(ModelProblem& problem) {
+Response walk(BodyProblem& problem) {
   Response r;
   for (const std::uint64_t seed : {31, 32, 33}) {
     r = respond(problem, deformed(problem, seed, 0.01), step);
@@ -90,7 +90,7 @@ Response walk(ModelProblem& problem) {
 }
 
 /// x + u turned by an angle about the third axis, as a displacement.
-Field turned(const ModelProblem& problem, ConstFieldView u, double angle) {
+Field turned(const BodyProblem& problem, ConstFieldView u, double angle) {
   const Body& body = problem.body();
   Field v = problem.make_field();
   const double c = std::cos(angle), s = std::sin(angle);
@@ -107,7 +107,7 @@ Field turned(const ModelProblem& problem, ConstFieldView u, double angle) {
 }  // namespace
 
 TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
-  for_every_model([](ModelProblem& problem) {
+  for_every_model([](BodyProblem& problem) {
     walk(problem);
     const std::vector<double> before = kept(problem);
     CHECK_MESSAGE(std::any_of(before.begin(), before.end(), [](double x) { return x != 0; }), "no history is kept");
@@ -117,7 +117,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     const Response one = respond(problem, u, step), two = respond(problem, u, 0.0), three = respond(problem, u, step);
     CHECK_MESSAGE((same(problem, one, two) && same(problem, one, three)), "an evaluation depends on the one before");
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
-    REQUIRE(problem.model().sample(u, samples).ok());
+    REQUIRE(problem.terms().sample(u, samples).ok());
     CHECK_MESSAGE(kept(problem) == before, "an evaluation advanced the history");
     problem.advance(step);
     CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
@@ -125,7 +125,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one),
                   "the state at the end of the step is not the one that was put aside");
     PointSamples after;
-    REQUIRE(problem.model().sample(u, after).ok());
+    REQUIRE(problem.terms().sample(u, after).ok());
     double total = 0, scale = 0;
     for (const std::int32_t p : problem.body().internal()) {
       total += after.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
@@ -136,7 +136,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
 }
 
 TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does no work") {
-  for_every_model([](ModelProblem& problem) {
+  for_every_model([](BodyProblem& problem) {
     if (problem.dimension() == 1) return;
     const Response r = walk(problem);
     constexpr double angle = 1.1;
@@ -155,7 +155,7 @@ TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does n
 }
 
 TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's forces") {
-  for_every_model([](ModelProblem& problem) {
+  for_every_model([](BodyProblem& problem) {
     walk(problem);
     const Field u = deformed(problem, 34, 0.01);
     Field w = problem.make_field(), Kw = w;
@@ -181,7 +181,7 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
 
 TEST_CASE("kinematics: rate laws are the same for any number of threads, and restored runs go on bitwise") {
   const int threads = thread_count();
-  for_every_model([&](ModelProblem& problem) {
+  for_every_model([&](BodyProblem& problem) {
     const std::vector<std::byte> fresh = problem.snapshot();
     set_thread_count(1);
     const Response one = walk(problem);

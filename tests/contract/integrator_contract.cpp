@@ -141,7 +141,7 @@ TEST_CASE("integrator: prescribed motions are exact") {
   for (const Example& integrator : dynamic_integrators(end, h)) {
     INFO(integrator.part);
     const auto simulation = build_run(body, integrator);
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& state_of = problem.body();
     Watch watch(*simulation);
     double displaced = 0, moved = 0, speed = 0;
@@ -173,7 +173,7 @@ TEST_CASE("integrator: a constant load gives a free body its momentum, and work 
     for (const Example& integrator : dynamic_integrators(end, h)) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const auto momentum = [&](int c) {
         double sum = 0;
         for (const std::int32_t p : problem.body().internal()) sum += problem.masses().by_point()[static_cast<std::size_t>(p)] * problem.state().velocity().component(c)[p];
@@ -202,7 +202,7 @@ TEST_CASE("integrator: reactions carry loads and inertia") {
     INFO(integrator.part);
     const auto simulation = build_run(body, integrator);
     run(*simulation, 1000);
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& b = problem.body();
     const Field reaction = reactions(problem, true, problem.state().time);
     const double scale = largest(b, reaction);
@@ -309,7 +309,7 @@ TEST_CASE("integrator: an evaluation leaves the initial displacement alone and s
     for (const Example& integrator : integrators(only_evaluates, {})) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const std::vector<double> before = displacement(*simulation);
       const Watch watch = run(*simulation);
       REQUIRE(watch.reports.size() == 1);
@@ -322,7 +322,7 @@ TEST_CASE("integrator: an evaluation leaves the initial displacement alone and s
       CHECK(energy > 0);
       CHECK(std::equal(force.data(), force.data() + force.size(), problem.state().internal_force().data));
       PointSamples samples;
-      REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
+      REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
       double sum = 0;
       for (const std::int32_t p : problem.body().internal()) sum += samples.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
       CHECK(std::abs(sum - energy) <= 1e-13 * energy);

@@ -10,7 +10,7 @@
 namespace perikit::contract {
 
 void Watch::step_done(const StepReport& report) {
-  ModelProblem& problem = simulation_.problem();
+  BodyProblem& problem = simulation_.problem();
   if (simulation_.dynamic()) problem.state().energies.kinetic = kinetic_energy(problem, problem.state().velocity());
   reports.push_back(report);
   energies.push_back(problem.state().energies);
@@ -78,7 +78,7 @@ std::vector<double> displacement(Simulation& simulation) {
 }
 
 std::vector<double> state(Simulation& simulation) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   const Energies& e = problem.state().energies;
   std::vector<double> values{problem.state().time, static_cast<double>(problem.state().step), e.strain, e.kinetic, e.external_work, e.dissipated};
   std::vector<FieldView> fields{problem.state().displacement(), problem.state().internal_force()};

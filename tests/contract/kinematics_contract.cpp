@@ -40,33 +40,33 @@ class Exceptions {
 };
 
 /// Poisoned output: whatever a kernel forgets to write shows.
-Field poisoned(const ModelProblem& problem) {
+Field poisoned(const BodyProblem& problem) {
   Field f = problem.make_field();
   f.fill(std::numeric_limits<double>::quiet_NaN());
   return f;
 }
 
-double energy_of(ModelProblem& problem, ConstFieldView u) {
+double energy_of(BodyProblem& problem, ConstFieldView u) {
   Field f = poisoned(problem);
   double energy = 0;
   REQUIRE(problem.evaluate_forces(u, f, &energy).ok());
   return energy;
 }
 
-Field force_of(ModelProblem& problem, ConstFieldView u) {
+Field force_of(BodyProblem& problem, ConstFieldView u) {
   Field f = poisoned(problem);
   const EvaluationStatus status = problem.evaluate_forces(u, f, nullptr);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return f;
 }
 
-Field shifted(const ModelProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
+Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
   Field v = problem.body().make_field(u.components);
   for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
   return v;
 }
 
-Field random_direction(const ModelProblem& problem, std::uint64_t seed) {
+Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
   Field w = problem.make_field();
   Noise random(seed);
   set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
@@ -79,12 +79,12 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     deform(body, problem.state().displacement(), 11, 0.02);
     const ConstFieldView u = problem.state().displacement();
     const bool conservative = c.conservative();
-    CHECK(problem.model().conservative() == conservative);
+    CHECK(problem.terms().conservative() == conservative);
     const Field w = random_direction(problem, 12), v = random_direction(problem, 13);
     const Field f = force_of(problem, u);
     const double scale = largest(body, f) * static_cast<double>(body.points());
@@ -112,7 +112,7 @@ TEST_CASE("kinematics: linear and angular momentum") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     deform(body, problem.state().displacement(), 21, 0.02);
     const Field f = force_of(problem, problem.state().displacement());
@@ -143,7 +143,7 @@ TEST_CASE("kinematics: linear and angular momentum") {
     if (!c.conservative() && body.dimension() > 1) {
       // The part declares it, the log of a run warns of it, and it is so.
       MESSAGE(c.label(), ": angular momentum is broken by ", broken, " of the largest force times the extent");
-      CHECK(!problem.model().report().warnings.empty());
+      CHECK(!problem.terms().report().warnings.empty());
       CHECK_MESSAGE(broken > 1e-6, "declared as not conservative, but its moments balance");
     }
   }
@@ -154,7 +154,7 @@ TEST_CASE("kinematics: affine motion is exact") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     const double G[3][3] = {{0.1, -0.07, 0.05}, {0.03, -0.06, 0.02}, {-0.04, 0.08, 0.09}};
     const auto d = static_cast<std::size_t>(body.dimension());
@@ -165,9 +165,9 @@ TEST_CASE("kinematics: affine motion is exact") {
       return v;
     });
     PointSamples samples;
-    REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
-    const bool gradients = problem.model().has_gradients();   // a pair law has none, only energies
-    const Field condition = problem.model().shape_tensor_condition();
+    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+    const bool gradients = problem.terms().has_gradients();   // a pair law has none, only energies
+    const Field condition = problem.terms().shape_tensor_condition();
     double worst = 0, densities = 0, energy = energy_of(problem, problem.state().displacement());
     for (const std::int32_t p : body.internal()) {
       densities += samples.strain_energy_density.data()[p] * body.volume(static_cast<std::size_t>(p));
@@ -195,8 +195,8 @@ TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores t
     if (c.body.dimension == 1) continue;
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
-    if (problem.model().has_gradients() && !problem.laws().objective()) continue;
+    BodyProblem& problem = simulation->problem();
+    if (problem.terms().has_gradients() && !problem.laws().objective()) continue;
     const Body& body = problem.body();
     // Rotation about (1, 2, 3)/sqrt(14) in 3D, about z in 2D.
     double R[3][3];
@@ -245,7 +245,7 @@ TEST_CASE("kinematics: a body at rest is bitwise at rest") {
   for (const Case& c : cases()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     CHECK(energy_of(problem, problem.state().displacement()) == 0.0);
     CHECK(largest(problem.body(), force_of(problem, problem.state().displacement())) == 0.0);
   }
@@ -296,7 +296,7 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     if (body.dimension == 2) body.cells = 60;
     if (body.dimension == 3) body.cells = c.body.cloud ? 12 : 16;
     const auto simulation = build(scene_text(body, kinematics_table(c.example)));
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     deform(problem.body(), problem.state().displacement(), 51, 0.02);
     const int threads = thread_count();
     set_thread_count(1);

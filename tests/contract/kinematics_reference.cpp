@@ -44,7 +44,7 @@ TEST_CASE("kinematics: agrees with the dense reference") {
     for (const BodyOptions& options : bodies()) {
       INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice", options.crack ? " cracked" : ""));
       const auto simulation = build(scene_text(options, kinematics_table(example)));
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();
       deform(body, problem.state().displacement(), 61, 0.02);
       const auto d = static_cast<Eigen::Index>(body.dimension()), n = static_cast<Eigen::Index>(body.points());

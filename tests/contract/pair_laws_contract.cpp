@@ -21,7 +21,7 @@ std::vector<Example> pair_laws() {
   for (const Example& example : examples(Kind::kinematics)) {
     BodyOptions body;
     body.dimension = 1;
-    if (!build(scene_text(body, kinematics_table(example)))->problem().model().has_gradients()) laws.push_back(example);
+    if (!build(scene_text(body, kinematics_table(example)))->problem().terms().has_gradients()) laws.push_back(example);
   }
   return laws;
 }
@@ -41,10 +41,10 @@ double distance_to_surface(const Body& body, const Point& x) {
 
 /// Energy densities under u = H x, H diagonal.
 Field densities(Simulation& simulation, const Point& H) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   set_field(problem.body(), problem.state().displacement(), [&](const Point& x) { return Point{H[0] * x[0], H[1] * x[1], H[2] * x[2]}; });
   PointSamples samples;
-  REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
+  REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
   return samples.strain_energy_density;
 }
 
@@ -65,7 +65,7 @@ TEST_CASE("kinematics: pair laws agree with the dense reference") {
             options.crack = crack;
             options.plane = plane;
             const auto simulation = build(scene_text(options, kinematics_table(law)));
-            ModelProblem& problem = simulation->problem();
+            BodyProblem& problem = simulation->problem();
             const Body& body = problem.body();
             Noise random(61);
             set_field(body, problem.state().displacement(), [&](const Point& x) {
@@ -198,7 +198,7 @@ TEST_CASE("kinematics: a pair law reports points on top of each other") {
       options.dimension = 2;
       options.cloud = cloud;
       const auto simulation = build(scene_text(options, kinematics_table(law)));
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();
       const auto p = static_cast<std::size_t>(body.internal()[40]), q = static_cast<std::size_t>(body.internal()[41]);
       const Point x = body.position(p), y = body.position(q);

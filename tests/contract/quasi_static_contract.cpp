@@ -40,7 +40,7 @@ std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrato
 }
 
 /// Largest |internal + external| over free components, in units of the largest reaction.
-double residual(ModelProblem& problem) {
+double residual(BodyProblem& problem) {
   const ConstFieldView free = problem.constraints().free();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
   double most = 0;
@@ -61,7 +61,7 @@ TEST_CASE("integrator: quasi-static steps are in equilibrium, meet what is presc
     for (const Example& integrator : quasi_static_integrators(5)) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
       const auto simulation = build_run(body, integrator);
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const Body& b = problem.body();
       Watch watch(*simulation);
       double missed = 0, unbalanced = 0, load = 0;

@@ -49,14 +49,14 @@ std::unique_ptr<Simulation> build_run(BodyOptions body, const std::string& integ
 using Bonds = std::map<std::pair<std::int32_t, std::int32_t>, double>;
 
 /// Integrity of the bonds that have failed, by their ends.
-Bonds failed(const ModelProblem& problem) {
+Bonds failed(const BodyProblem& problem) {
   Bonds bonds;
-  for (const BondChange& b : problem.model().changed_bonds())
-    bonds[{std::min(b.point, b.far), std::max(b.point, b.far)}] = b.integrity;
+  for (const BondChange& b : problem.terms().changed_bonds())
+    bonds[{b.bond.point, b.bond.far}] = b.integrity;
   return bonds;
 }
 
-double stretch(ModelProblem& problem, std::int32_t p, std::int32_t q) {
+double stretch(BodyProblem& problem, std::int32_t p, std::int32_t q) {
   const Point x = problem.body().position(static_cast<std::size_t>(p)), y = problem.body().position(static_cast<std::size_t>(q));
   double before = 0, now = 0;
   for (std::size_t c = 0; c < 2; ++c) {
@@ -82,7 +82,7 @@ std::vector<std::pair<std::int32_t, std::int32_t>> free_bonds(const Body& body) 
 }
 
 /// Largest force on a free component, in units of the largest reaction of the whole run.
-double unbalanced(ModelProblem& problem, double& reaction) {
+double unbalanced(BodyProblem& problem, double& reaction) {
   const ConstFieldView free = problem.constraints().free();
   reaction = std::max(reaction, largest(problem.body(), reactions(problem, false, problem.state().time)));
   double most = 0;
@@ -116,7 +116,7 @@ TEST_CASE(
         if (integrator.table != first && kinematics != shapes.front()) continue;
         INFO(integrator.part, " (", integrator.table, "), ", kinematics, ", ", damage);
         const auto simulation = build_run(plate(damage), integrator_table(integrator), kinematics);
-        ModelProblem& problem = simulation->problem();
+        BodyProblem& problem = simulation->problem();
         const bool bits = damage == brittle;
         const double onset = bits ? 0.04 : 0.02, failure = bits ? 0.04 : 0.06;
         Watch watch(*simulation);
@@ -127,13 +127,13 @@ TEST_CASE(
         witness.before = [&] { at_failure = std::max(at_failure, unbalanced(problem, reaction)); };
         witness.after = [&] {
           const Bonds now = failed(problem);
-          const Field lost = problem.model().damage();
+          const Field lost = problem.terms().damage();
           for (const auto& [bond, b] : known) CHECK((now.contains(bond) && now.at(bond) <= b));
           for (const auto& [bond, b] : now) {
             CHECK((b >= 0 && b < 1));
             // Points that are left with too few bonds for a gradient lose the others too.
             const bool fragment =
-                problem.model().has_gradients() && (lost.data()[bond.first] == 1 || lost.data()[bond.second] == 1);
+                problem.terms().has_gradients() && (lost.data()[bond.first] == 1 || lost.data()[bond.second] == 1);
             if (!known.contains(bond) && !fragment) CHECK(stretch(problem, bond.first, bond.second) > onset * (1 - 1e-9));
           }
           failing += now != known;
@@ -158,7 +158,7 @@ TEST_CASE(
         CHECK(failing > 3);
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second == 0; }));
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second > 0; }) == !bits);
-        CHECK(known.size() < problem.model().report().bonds / 4);
+        CHECK(known.size() < problem.terms().report().bonds / 4);
         const Energies& e = problem.state().energies;
         CHECK(e.dissipated > 0);
         CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 0.01 * e.external_work, "work ", e.external_work,
@@ -198,7 +198,7 @@ TEST_CASE("integrator: a quasi-static run with failing bonds that is stopped goe
       Watch watch(*whole);
       std::size_t before = 0;
       watch.each = [&](const StepReport& report) {
-        const std::size_t now = whole->problem().model().changed_bonds().size();
+        const std::size_t now = whole->problem().terms().changed_bonds().size();
         if (now > before) breaking.push_back(report.step);
         before = now;
       };

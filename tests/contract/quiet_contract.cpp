@@ -21,8 +21,8 @@ class Pair {
     body.skip = false;
     all_ = build(scene_text(body, kinematics));
   }
-  ModelProblem& some() { return some_->problem(); }
-  ModelProblem& all() { return all_->problem(); }
+  BodyProblem& some() { return some_->problem(); }
+  BodyProblem& all() { return all_->problem(); }
 
   /// A displacement of the points within a short way of one end of the body, at rest elsewhere.
   Field bump(bool at_upper_end) {
@@ -46,7 +46,7 @@ class Pair {
   void compare(const Field& u, const char* when) {
     double energy[2] = {};
     Field force[2];
-    ModelProblem* const problems[2] = {&some(), &all()};
+    BodyProblem* const problems[2] = {&some(), &all()};
     for (int k = 0; k < 2; ++k) {
       force[k] = problems[k]->make_field();
       force[k].fill(std::numeric_limits<double>::quiet_NaN());
@@ -77,20 +77,20 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");
-    const QuietCounts before = pair.some().model().quiet_counts();
-    for (ModelProblem* problem : {&pair.some(), &pair.all()}) {
+    const QuietCounts before = pair.some().terms().quiet_counts();
+    for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       Field Kw = problem->make_field();
       REQUIRE(problem->tangent_action(right, left, Kw).ok());
     }
     pair.compare(left, "after a tangent action");
-    for (ModelProblem* problem : {&pair.some(), &pair.all()}) {
+    for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       PointSamples samples;
-      REQUIRE(problem->model().sample(right, samples).ok());
+      REQUIRE(problem->terms().sample(right, samples).ok());
     }
     pair.compare(right, "after a sample");
     pair.compare(rest, "back at rest");
-    const QuietCounts after = pair.some().model().quiet_counts();
-    CHECK(pair.all().model().quiet_counts().blocks == 0);
+    const QuietCounts after = pair.some().terms().quiet_counts();
+    CHECK(pair.all().terms().quiet_counts().blocks == 0);
     if (!c.conservative()) continue;
     const std::int64_t blocks = after.blocks - before.blocks, quiet = after.quiet - before.quiet;
     CHECK(blocks > 0);

@@ -19,7 +19,7 @@ struct Result {
 };
 
 /// Forces, energy and tangent action of the problem's displacement.
-Result evaluate(ModelProblem& problem, ConstFieldView w) {
+Result evaluate(BodyProblem& problem, ConstFieldView w) {
   Result r{problem.make_field(), problem.make_field()};
   REQUIRE(problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy).ok());
   REQUIRE(problem.tangent_action(problem.state().displacement(), w, r.stiffness).ok());
@@ -78,7 +78,7 @@ TEST_CASE("stabilization: a sawtooth, which the point gradient does not see, sto
         options.cloud = cloud;
         const auto energy = [&](const std::string& kinematics) {
           const auto simulation = build(scene_text(options, kinematics));
-          ModelProblem& problem = simulation->problem();
+          BodyProblem& problem = simulation->problem();
           set_field(problem.body(), problem.state().displacement(), [](const Point& x) {
             return Point{(static_cast<int>(std::floor(x[0]) + std::floor(x[1]) + std::floor(x[2])) % 2 == 0 ? 0.05 : -0.05), 0, 0};
           });

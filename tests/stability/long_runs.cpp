@@ -13,7 +13,7 @@ namespace {
 /// The total energy of every so many steps, and the sign changes of the displacement of one point.
 class EnergyWatcher final : public Observer {
  public:
-  EnergyWatcher(ModelProblem& problem, std::int64_t every)
+  EnergyWatcher(BodyProblem& problem, std::int64_t every)
       : problem_(problem), every_(every), end_(problem.body().internal().back()) {}
   bool wants_sample(std::int64_t step, double) override { return step % every_ == 0; }
   void step_done(const StepReport& report) override {
@@ -42,7 +42,7 @@ class EnergyWatcher final : public Observer {
   }
 
  private:
-  ModelProblem& problem_;
+  BodyProblem& problem_;
   std::int64_t every_;
   std::int32_t end_;
   std::vector<double> energies_;

@@ -70,7 +70,7 @@ Eigen::MatrixXd rigid_motions(const Eigen::MatrixXd& x, int d) {
 }
 
 /// Assembled tangent over the mass, point by point.
-Eigen::MatrixXd dense_tangent(ModelProblem& problem) {
+Eigen::MatrixXd dense_tangent(BodyProblem& problem) {
   BlockMatrix K;
   Field rest = problem.make_field();
   if (!problem.assemble_tangent(rest, K).ok()) throw RunError("no tangent at rest");
@@ -109,7 +109,7 @@ Eigen::VectorXd roughness(const Eigen::MatrixXd& modes, const Eigen::MatrixXd& x
 /// Watches the kinetic energy.
 class Watcher final : public Observer {
  public:
-  explicit Watcher(ModelProblem& problem) : problem_(problem) {}
+  explicit Watcher(BodyProblem& problem) : problem_(problem) {}
   bool wants_sample(std::int64_t, double) override { return true; }
   void step_done(const StepReport& report) override {
     const double kinetic = kinetic_energy(problem_, problem_.state().velocity());
@@ -121,7 +121,7 @@ class Watcher final : public Observer {
   double growth() const { return most_ / start_; }
 
  private:
-  ModelProblem& problem_;
+  BodyProblem& problem_;
   double start_ = 0, most_ = 0;
 };
 
@@ -155,7 +155,7 @@ std::unique_ptr<Simulation> Specimen::make(const std::string& integrator) const 
 }
 
 Spectrum Specimen::spectrum() {
-  ModelProblem& problem = simulation_->problem();
+  BodyProblem& problem = simulation_->problem();
   const int d = problem.dimension();
   const Eigen::MatrixXd x = positions(problem.body()), K = dense_tangent(problem), rigid = rigid_motions(x, d);
   Spectrum result;
@@ -175,13 +175,13 @@ Spectrum Specimen::spectrum() {
   }
   Field rest = problem.body().make_field(d);
   result.estimate = largest_eigenvalue(problem, rest) / result.largest;
-  result.poor_points = problem.model().report().singular_families;
+  result.poor_points = problem.terms().report().singular_families;
   return result;
 }
 
 Accuracy Specimen::accuracy() {
-  ModelProblem& problem = simulation_->problem();
-  if (!problem.model().has_gradients()) return {};
+  BodyProblem& problem = simulation_->problem();
+  if (!problem.terms().has_gradients()) return {};
   const Body& body = problem.body();
   const int d = problem.dimension(), n = d * d;
   contract::Noise random(11);
@@ -218,7 +218,7 @@ Accuracy Specimen::accuracy() {
       return v;
     });
     PointSamples samples;
-    if (!problem.model().sample(u, samples).ok()) throw RunError("inadmissible test field");
+    if (!problem.terms().sample(u, samples).ok()) throw RunError("inadmissible test field");
     double most = 0, centre = 0, nearest = std::numeric_limits<double>::infinity();
     for (const std::int32_t index : body.internal()) {
       const Point x = body.position(static_cast<std::size_t>(index));
@@ -240,7 +240,7 @@ std::unique_ptr<Simulation> Specimen::shaken(double largest, double share, std::
   const double step = share * 2 / std::sqrt(largest);
   auto simulation =
       make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   contract::Noise random(5);
   contract::set_field(problem.body(), problem.state().velocity(), [&](const Point&) {
     Point v{};

@@ -27,7 +27,7 @@ struct Resultant {
 };
 
 Resultant resultant(Simulation& simulation) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   problem.loads().evaluate(0.0, problem.state().external_force());
   Resultant r;
   for (const std::int32_t p : problem.body().internal()) {

@@ -5,7 +5,7 @@
 #include <ctime>
 #include <fstream>
 
-#include "framework/src/output/hdf5_file.hpp"
+#include "framework/src/files/hdf5_file.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"

@@ -32,7 +32,7 @@ std::unique_ptr<Simulation> plate(const std::string& set, const std::string& rec
 /// What the record gives for u_x = value(x, y) at t.
 template <class Value>
 double recorded(Simulation& simulation, Value&& value, double t = 0) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
     problem.state().displacement().component(0)[p] = value(x[0], x[1]);

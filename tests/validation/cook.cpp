@@ -19,7 +19,7 @@ constexpr double reference_x = -5.840, reference_y = 6.941;  // of the corner (4
 /// Displacement of the corner (48, 60), where no point lies: the affine fit to the points within four spacings of it. (At L/120
 /// radii of 2.5 to 6 spacings give errors of 0.955 to 1.002 %.)
 Eigen::Vector2d corner(Simulation& simulation, double spacing) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
   for (const std::int32_t p : problem.body().internal()) {

@@ -56,7 +56,7 @@ std::string rubber(double bulk) {
 double volume_change(Simulation& simulation) {
   const auto points = build(block("type = \"conventional\"", rubber(1.0), "[0, 0]", "[0, 0]", 1));
   PointSamples samples;
-  REQUIRE(points->problem().model().sample(simulation.problem().state().displacement(), samples).ok());
+  REQUIRE(points->problem().terms().sample(simulation.problem().state().displacement(), samples).ok());
   double most = 0;
   for (const std::int32_t p : points->problem().body().internal()) {
     const auto H = [&](int c) { return samples.H.component(c)[p]; };
@@ -194,7 +194,7 @@ TEST_CASE("extremes: millimetres, newtons and tonnes give what metres, newtons a
         CHECK(most > 0);
         CHECK_MESSAGE(difference <= 1e-10 * most, "relative difference ", difference / most);
         if (damage) {
-          const auto broken = [](Simulation& s) { return s.problem().model().changed_bonds().size(); };
+          const auto broken = [](Simulation& s) { return s.problem().terms().changed_bonds().size(); };
           CHECK(broken(*a) > 0);
           CHECK(broken(*a) == broken(*b));
         }

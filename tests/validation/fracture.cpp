@@ -27,8 +27,8 @@ Balance run(Simulation& simulation) {
 
 /// Largest damage of the points where `inside` holds.
 template <class Inside>
-double most_damage(ModelProblem& problem, Inside&& inside) {
-  const Field damage = problem.model().damage();
+double most_damage(BodyProblem& problem, Inside&& inside) {
+  const Field damage = problem.terms().damage();
   double most = 0;
   for (const std::int32_t p : problem.body().internal())
     if (inside(problem.body().position(static_cast<std::size_t>(p)))) most = std::max(most, damage.data()[p]);
@@ -60,7 +60,7 @@ TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
     const auto simulation = load("partmann/mode_I.toml", {fmt::format("kinematics={}", kinematics), fmt::format("family.influence={}", influence),
                                                           fmt::format("damage.consistent={}", consistent), "body.lattice.spacing=4e-5", "constants.dx=4e-5", "integrator.end_time=1.6e-5",
                                                           "boundary=[{set=\"top\", velocity=[\"free\", 0.5, \"free\"]}, {set=\"bottom\", velocity=[\"free\", -0.5, \"free\"]}]"});
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const double before = most_damage(problem, [](const Point& x) { return x[0] > 0.2e-3; });
     const Balance balance = run(*simulation);
     CHECK(before == 0);
@@ -84,7 +84,7 @@ TEST_CASE("boundary tension: the energy balance holds to the end, whatever the n
   // The same bonds fail at the same steps when every bond is looked at in every step.
   const auto all = scene({"run.skip=false"});
   run(*all);
-  const BondChecks some = simulation->problem().model().bond_checks(), every = all->problem().model().bond_checks();
+  const BondChecks some = simulation->problem().terms().bond_checks(), every = all->problem().terms().bond_checks();
   CHECK(every.checked == every.groups);
   CHECK(some.checked < some.groups);
   CHECK(some.failed == every.failed);
@@ -99,7 +99,7 @@ TEST_CASE("boundary tension: on clouds the forces of pair laws say which bonds a
     const auto skipping = scene("true"), all = scene("false");
     run(*skipping);
     run(*all);
-    const BondChecks some = skipping->problem().model().bond_checks(), every = all->problem().model().bond_checks();
+    const BondChecks some = skipping->problem().terms().bond_checks(), every = all->problem().terms().bond_checks();
     INFO(kinematics);
     CHECK(every.checked == every.groups);
     CHECK(5 * some.checked < some.groups);   // 95 of 100 by margins alone
@@ -114,14 +114,14 @@ TEST_CASE("boundary tension: baqp with the cubic kernel branches, and no update 
   // On 100 x 40 x 4 points. Without fragments the same run raises it by 14 times what it dissipates.
   const auto simulation = load("partmann/boundary_tension.toml", {"kinematics=baqp", "family.influence=cubic_spline", "damage.consistent=true", "body.lattice.spacing=1e-3",
                                                                   "constants.dx=1e-3", "integrator.end_time=6e-5"});
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   double tip = 0.05, start = 0, off = 0;
   contract::Watch watch(*simulation);
   watch.each = [&](const StepReport& report) {
     const Energies& e = problem.state().energies;
     if (report.time > 1e-5) off = std::max(off, std::abs(e.external_work - e.strain - e.kinetic - e.dissipated) / e.external_work);
     if (report.step % 10 != 0) return;
-    const Field damage = problem.model().damage();
+    const Field damage = problem.terms().damage();
     double now = 0.05;
     for (const std::int32_t p : problem.body().internal())
       if (damage.data()[p] > 0.35) now = std::max(now, problem.body().position(static_cast<std::size_t>(p))[0]);
@@ -138,7 +138,7 @@ TEST_CASE("boundary tension: baqp with the cubic kernel branches, and no update 
   CHECK_MESSAGE(off <= 0.005, "balance off by ", off, " of the work");
   CHECK(problem.fracture_summary().find("raised") == std::string::npos);
   // Two arms at x = 0.09 in the lowest layer, with whole material between them; displacements stay far below the plate's size.
-  const Field damage = problem.model().damage();
+  const Field damage = problem.terms().damage();
   int arms = 0;
   bool inside = false;
   double most = 0;
@@ -161,7 +161,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     const auto simulation = load("partmann/boundary_tension.toml", {fmt::format("kinematics={}", kinematics), "family.influence=cubic_spline", "body.lattice.spacing=2e-3", "constants.dx=2e-3",
                                                                     "integrator.end_time=4e-6", "damage.no_fail=[]", "load=[]",
                                                                     "initial={velocity=[\"300 + 2e4*(x - 0.05)\", \"2e4*y\", \"2e4*z\"]}"});
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     const auto momentum = [&](int c) {
       double sum = 0;
@@ -173,7 +173,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     CHECK(momentum(0) == doctest::Approx(scale).epsilon(1e-10));
     CHECK(std::abs(momentum(1)) <= 1e-10 * scale);
     CHECK(std::abs(momentum(2)) <= 1e-10 * scale);
-    const Field damage = problem.model().damage();
+    const Field damage = problem.terms().damage();
     std::size_t fragments = 0;
     for (const std::int32_t p : body.internal()) {
       fragments += damage.data()[p] == 1;
@@ -186,7 +186,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
 
 TEST_CASE("rubber sheet: the crack of a stretched, nearly incompressible sheet runs on along its middle") {
   const auto simulation = load("fracture/rubber_sheet.toml", {"integrator.end_time=1.6e-3", "damage.gradual=false", "run.threads=1"});
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   const contract::Watch watch = contract::run(*simulation);
   const Energies first = watch.energies.front(), last = watch.energies.back();
   const double before = first.strain + first.kinetic;
@@ -217,7 +217,7 @@ TEST_CASE("rubber sheet with selective: bonds that let go gradually dissipate, a
   CHECK(most_damage(whole->problem(), [](const Point& x) { return x[0] > 0.0165; }) > 0.25);
   CHECK(most_damage(whole->problem(), [](const Point& x) { return std::abs(x[1]) > 0.01; }) < 0.1);
   contract::run(*first, 3 * watch.reports.back().step / 4);
-  const BondChecks checks = first->problem().model().bond_checks();
+  const BondChecks checks = first->problem().terms().bond_checks();
   CHECK(checks.failed > 0);
   CHECK(checks.weakened > 0);
   second->problem().restore(first->problem().snapshot());

@@ -29,7 +29,7 @@ std::vector<std::string> kinematics_overrides(int dimension, bool selective) {
 }
 
 /// What must hold at every point; P and sigma by rows, names as in the paper.
-struct State {
+struct HomogeneousState {
   double psi;
   std::array<double, 9> P, sigma;
 };
@@ -41,11 +41,11 @@ double component(ConstFieldView field, int dimension, int i, int j, std::int32_t
   return i == j ? field.component(dimension * dimension + i - dimension)[p] : 0.0;
 }
 
-void check_state(const std::string& scene, std::vector<std::string> overrides, const State& expected, double tolerance) {
+void check_state(const std::string& scene, std::vector<std::string> overrides, const HomogeneousState& expected, double tolerance) {
   const auto simulation = load(scene, overrides);
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   PointSamples samples;
-  const EvaluationStatus status = problem.model().sample(problem.state().displacement(), samples);
+  const EvaluationStatus status = problem.terms().sample(problem.state().displacement(), samples);
   REQUIRE_MESSAGE(status.ok(), status.description);
   double worst_P = 0, worst_sigma = 0, worst_psi = 0;
   for (const std::int32_t p : problem.body().internal()) {
@@ -78,7 +78,7 @@ struct Rubber {
     return 0.5 * (low + high);
   }
   /// Simple tension or compression in plane strain.
-  State tension(double l1) const {
+  HomogeneousState tension(double l1) const {
     const double l2 = lateral(l1), J = l1 * l2, tau1 = std::pow(J, -2.0 / 3) * (l1 * l1 - l2 * l2), tau3 = tau(1.0, l1, l2);
     const double psi = 0.5 * (std::pow(J, -2.0 / 3) * (l1 * l1 + l2 * l2 + 1) - 3) + 0.5 * kappa * (J - 1) * (J - 1);
     return {psi, {tau1 / l1, 0, 0, 0, 0, 0, 0, 0, tau3}, {tau1 / J, 0, 0, 0, 0, 0, 0, 0, tau3 / J}};
@@ -92,7 +92,7 @@ TEST_CASE("Scabbia et al. 4.1: simple tension and compression in plane strain") 
     for (const double l1 : {0.6, 1.5}) {
       const Rubber rubber{kappa};
       const double l2 = rubber.lateral(l1);
-      const State state = rubber.tension(l1);
+      const HomogeneousState state = rubber.tension(l1);
       for (const std::string& kinematics : kinematics_overrides(2, true))
         check_state("scabbia/homogeneous.toml",
                     {kinematics, fmt::format("material.bulk_modulus={:.17g}", kappa), fmt::format("constants.l1={:.17g}", l1),
@@ -106,7 +106,7 @@ TEST_CASE("Scabbia et al. 4.1: simple shear") {
     for (const double g : {0.1, 1.0}) {
       // tau = mu dev b, b = F F^T, P = tau F^-T
       const double x = 2 * g * g / 3, y = -g * g / 3;
-      const State state{0.5 * g * g, {x - g * g, g, 0, g - g * y, y, 0, 0, 0, y}, {x, g, 0, g, y, 0, 0, 0, y}};
+      const HomogeneousState state{0.5 * g * g, {x - g * g, g, 0, g - g * y, y, 0, 0, 0, y}, {x, g, 0, g, y, 0, 0, 0, y}};
       for (const std::string& kinematics : kinematics_overrides(2, true))
         check_state("scabbia/homogeneous.toml",
                     {kinematics, fmt::format("material.bulk_modulus={:.17g}", kappa), "constants.l1=1.0", "constants.l2=1.0",
@@ -116,7 +116,7 @@ TEST_CASE("Scabbia et al. 4.1: simple shear") {
 }
 
 TEST_CASE("Scabbia et al. 4.1: the scene as it stands") {
-  const State state = Rubber{1e4}.tension(1.5);
+  const HomogeneousState state = Rubber{1e4}.tension(1.5);
   CHECK(state.P[0] == doctest::Approx(1.20359393).epsilon(1e-8));
   check_state("scabbia/homogeneous.toml", {}, state, 1e-8);
 }
@@ -126,7 +126,7 @@ TEST_CASE("Hashim et al. 4.1: the hydrostatic state has a nominal traction of 49
                h = std::log(a);
   const double tau = 2 * (lambda + mu) * h, tau3 = 2 * lambda * h, J = a * a;
   CHECK(tau / a == doctest::Approx(494.1e3).epsilon(1e-4));
-  const State state{
+  const HomogeneousState state{
       2 * (lambda + mu) * h * h, {tau / a, 0, 0, 0, tau / a, 0, 0, 0, tau3}, {tau / J, 0, 0, 0, tau / J, 0, 0, 0, tau3 / J}};
   for (const std::string& kinematics : kinematics_overrides(2, true))
     check_state("hashim/hydrostatic_state.toml", {kinematics, "body.lattice.spacing=0.1"}, state, 1e-8 * mu);
@@ -137,7 +137,7 @@ TEST_CASE("Partmann et al. 5.2-5.3: uniaxial stress of the Saint Venant-Kirchhof
   for (const double l : {1.0093911060988523, 0.8, 1.3}) {
     const double sigma_0 = 0.5 * E * (l * l * l - l), green = 0.5 * (l * l - 1), J = l * (1 - nu * (l * l - 1));
     if (l < 1.1 && l > 1) CHECK(sigma_0 == doctest::Approx(2000).epsilon(1e-10));
-    const State state{0.5 * E * green * green, {sigma_0}, {sigma_0 * l / J}};
+    const HomogeneousState state{0.5 * E * green * green, {sigma_0}, {sigma_0 * l / J}};
     for (const std::string& kinematics : kinematics_overrides(3, false))
       check_state("partmann/uniaxial_stress.toml", {kinematics, fmt::format("constants.l={:.17g}", l)}, state, 1e-8 * E);
   }

@@ -21,7 +21,7 @@ Errors errors(double ratio, double coefficient) {
   const auto simulation = load("hashim/hydrostatic_plate.toml",
                                {fmt::format("family.horizon_ratio={}", ratio), fmt::format("constants.G={}", coefficient)});
   CHECK(run(*simulation).reports.back().residual <= 1e-10);
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   constexpr double strain = 0.61334;
   double sum = 0;
   std::size_t points = 0;

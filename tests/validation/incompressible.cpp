@@ -33,7 +33,7 @@ std::vector<double> opening(const std::string& kinematics, const std::string& in
   const auto simulation = load("scabbia/crack_tip.toml", {kinematics, fmt::format("constants.n={}", parts), "integrator.steps=4",
                                                           "family.influence=\"" + influence + "\""});
   CHECK(run(*simulation).reports.back().residual <= 1e-9);
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   std::vector<double> profile;
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
@@ -82,7 +82,7 @@ TEST_CASE("convex tangents: no negative curvature, and the exact one where there
   for (const char* kinematics : {"{ type = \"selective\", base = { type = \"bond_associated\" } }", "{ type = \"baqp\" }"}) {
     INFO(kinematics);
     const auto simulation = load("scabbia/square.toml", {std::string("kinematics=") + kinematics, "constants.n=6"});
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     Field u = problem.body().make_field(2);
     // Spectrum of the assembled tangent over its largest eigenvalue: least one, and the matrix itself.
     const auto assembled = [&](bool convex) {

@@ -33,7 +33,7 @@ Forces forces_of(int dimension, int length, int width, double jitter, const std:
       dimension, plane, lower[dimension - 1], upper, jitter, more, kinematics, zeros);
   const Scene scene = parse_scene(text, "long_rows.toml", registry());
   Simulation simulation(scene, registry());
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   Forces result;
   Field f = problem.body().make_field(dimension), Kw = problem.body().make_field(dimension);
   REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &result.energy).ok());

@@ -73,7 +73,7 @@ struct Result {
 
 /// The state of this rank's owned points, at the places of the points of the whole body that lie where they do.
 void collect(Simulation& simulation, const Body& whole, Result& result) {
-  ModelProblem& problem = simulation.problem();
+  BodyProblem& problem = simulation.problem();
   result.displacement.resize(3 * whole.points());
   for (std::size_t n = 0, p = 0; n < whole.points(); ++n) {
     // Owned points keep the order of the input.

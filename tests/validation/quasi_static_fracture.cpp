@@ -55,14 +55,14 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
                              "{type=\"critical_stretch\",stretch=0.002,no_fail=[\"left\",\"right\"]}"}) {
     INFO(std::string(damage));
     const auto simulation = plate_with_hole({fmt::format("damage={}", damage)}, 2.5e-3);
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     const Body& body = problem.body();
     contract::Watch watch(*simulation);
     contract::WitnessProblem witness(problem);
     double first_at = 0, first_x = 0, first_radius = 0, peak = 0;
     witness.after = [&] {
-      if (first_radius > 0 || problem.model().changed_bonds().empty()) return;
-      const Field lost = problem.model().damage();
+      if (first_radius > 0 || problem.terms().changed_bonds().empty()) return;
+      const Field lost = problem.terms().damage();
       const std::int32_t worst =
           *std::max_element(body.internal().begin(), body.internal().end(),
                             [&](std::int32_t a, std::int32_t b) { return lost.data()[a] < lost.data()[b]; });
@@ -81,7 +81,7 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
     CHECK(first_radius < 0.014);
     CHECK(peak > 0);
     // At the end the plate is in two: damage on both sides of the hole from edge to edge, and nowhere else.
-    const Field lost = problem.model().damage();
+    const Field lost = problem.terms().damage();
     for (const double side : {-1.0, 1.0})
       for (double y = 0.011; y < 0.025; y += 2.5e-3) {
         double most = 0;
@@ -105,7 +105,7 @@ TEST_CASE("plate with a hole: the paper's second solver, dynamic relaxation, fin
              relaxed = plate_with_hole({"integrator={type=\"dynamic_relaxation\",steps=15,tolerance=1e-8}"});
   run(*newton);
   run(*relaxed);
-  const Field a = newton->problem().model().damage(), b = relaxed->problem().model().damage();
+  const Field a = newton->problem().terms().damage(), b = relaxed->problem().terms().damage();
   double worst = 0;
   for (const std::int32_t p : newton->problem().body().internal()) worst = std::max(worst, std::abs(a.data()[p] - b.data()[p]));
   CHECK_MESSAGE(worst <= 1e-3, "damage differs by ", worst);
@@ -118,7 +118,7 @@ TEST_CASE("the companion preconditioner loses its springs with the bonds: fewer 
                        "integrator={type=\"jfnk\",steps=15,tolerance=1e-8,preconditioner=\"companion\"}"},
                       2.5e-3);
   const Protocol protocol = run(*simulation);
-  CHECK(simulation->problem().model().bond_checks().failed > 100);
+  CHECK(simulation->problem().terms().bond_checks().failed > 100);
   int all = 0, most = 0;
   for (std::size_t at = protocol.text.find("gmres "); at != std::string::npos; at = protocol.text.find("gmres ", at + 1)) {
     const int iterations = std::atoi(&protocol.text[at + 6]);
@@ -133,7 +133,7 @@ TEST_CASE("the companion preconditioner loses its springs with the bonds: fewer 
 
 TEST_CASE("a step that is given up between two equilibria gives its bonds back") {
   const auto simulation = plate_with_hole({"integrator.steps=4"});
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   Refusing solver;
   std::size_t refusals = 0;
   std::vector<std::byte> bonds = problem.bonds();

@@ -35,9 +35,9 @@ TEST_CASE("simple shear of a rate law: stress and work of the closed form, under
   const auto run = [&](std::vector<std::string> overrides) {
     const auto simulation = load("partmann/rate_shear.toml", std::move(overrides));
     contract::run(*simulation);
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     PointSamples samples;
-    REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
+    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
     double worst = 0;
     for (const std::int32_t p : problem.body().internal()) {
       worst = std::max({worst, std::abs(samples.cauchy.component(0)[p] - expected.xx),

@@ -60,7 +60,7 @@ struct Run {
   Run(const std::string& text, std::vector<std::string> overrides) {
     simulation = std::make_unique<Simulation>(parse_scene(text, "skipping.toml", registry(), {.overrides = std::move(overrides)}), counting);
   }
-  ModelProblem& problem() { return simulation->problem(); }
+  BodyProblem& problem() { return simulation->problem(); }
   std::vector<double> end() {
     contract::run(*simulation);
     return contract::state(*simulation);
@@ -144,9 +144,9 @@ TEST_CASE("skipping: points that no wave has reached are not evaluated, and the 
       Run some = run("true"), every = run("false");
       const std::vector<double> end = some.end(), expected = every.end();
       CHECK(end == expected);
-      const QuietCounts quiet = some.problem().model().quiet_counts();
+      const QuietCounts quiet = some.problem().terms().quiet_counts();
       CHECK_MESSAGE(quiet.quiet > quiet.blocks / 4, quiet.quiet, " of ", quiet.blocks, " blocks left out");
-      CHECK(every.problem().model().quiet_counts().blocks == 0);
+      CHECK(every.problem().terms().quiet_counts().blocks == 0);
       if (kinematics != "ordinary")
         CHECK_MESSAGE(some.counting.work.stresses < 0.75 * static_cast<double>(every.counting.work.stresses), some.counting.work.stresses.load(), " of ",
                       every.counting.work.stresses.load(), " evaluation points");
@@ -172,7 +172,7 @@ TEST_CASE("skipping: points held at rest have no forces beyond the reach of free
     const FieldView force = some.problem().state().internal_force(), same = every.problem().state().internal_force();
     CHECK(std::equal(force.data, force.data + force.size(), same.data));
     CHECK(some.problem().constraints().points_held_at_rest() == 3000);
-    const QuietCounts quiet = some.problem().model().quiet_counts();
+    const QuietCounts quiet = some.problem().terms().quiet_counts();
     CHECK_MESSAGE(2 * quiet.quiet > quiet.blocks, quiet.quiet, " of ", quiet.blocks, " blocks left out");
     CHECK(some.simulation->explanation(registry()).find("points held at rest: no wave ever reaches them") != std::string::npos);
   }
@@ -204,7 +204,7 @@ TEST_CASE("skipping: a bond of a symmetric kinematics is evaluated once for both
 
 TEST_CASE("skipping: a constant stiffness is assembled and factorised once") {
   Run linear(strip, {}), curved(strip, {"material.type=\"saint_venant_kirchhoff\""});
-  const std::size_t points = linear.problem().model().report().evaluation_points;
+  const std::size_t points = linear.problem().terms().report().evaluation_points;
   linear.end();
   curved.end();
   // `projection` gives W A of each evaluation point once; batches are padded.
@@ -232,7 +232,7 @@ TEST_CASE("skipping: without damage there is no state of bonds, and lattices sto
     run.simulation->problem().state().velocity();
     run.simulation->problem().masses().by_point();
     per_point = static_cast<double>(run.simulation->problem().bytes()) / static_cast<double>(body.points());
-    return run.simulation->problem().model().report();
+    return run.simulation->problem().terms().report();
   };
   double intact = 0, failing = 0;
   const ModelReport report = bytes("conventional", "", intact);

@@ -18,7 +18,7 @@ struct Response {
   Field force;
 };
 
-Response respond(ModelProblem& problem) {
+Response respond(BodyProblem& problem) {
   Response r{0, problem.make_field()};
   const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
@@ -81,8 +81,8 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
     const auto one = run("{ type = \"projection\", weight = \"kernel\" }"), two = run("{ type = \"baqp\" }");
     const Response r = respond(one->problem()), s = respond(two->problem());
     PointSamples a, b;
-    REQUIRE(one->problem().model().sample(one->problem().state().displacement(), a).ok());
-    REQUIRE(two->problem().model().sample(two->problem().state().displacement(), b).ok());
+    REQUIRE(one->problem().terms().sample(one->problem().state().displacement(), a).ok());
+    REQUIRE(two->problem().terms().sample(two->problem().state().displacement(), b).ok());
     const std::int32_t p = two->problem().body().set("inside").front();
     const double density = b.strain_energy_density.data()[p];
     CHECK(std::abs(a.strain_energy_density.data()[p] - density) <= 1e-12 * density);
@@ -112,13 +112,13 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
     for (const char* base : {"baqp", "projection"}) {
       INFO(base, cloud ? " cloud" : " lattice");
       const auto plain = spur(cloud, fmt::format("type = \"{}\"", base)), mapped = spur(cloud, fmt::format("type = \"selective\"\nbase = \"{}\"", base));
-      ModelProblem& problem = mapped->problem();
+      BodyProblem& problem = mapped->problem();
       const Body& body = problem.body();
-      REQUIRE(problem.model().report().singular_families == 4);
+      REQUIRE(problem.terms().report().singular_families == 4);
       PointSamples a, b;
-      REQUIRE(plain->problem().model().sample(plain->problem().state().displacement(), a).ok());
-      REQUIRE(problem.model().sample(problem.state().displacement(), b).ok());
-      const Field condition = problem.model().shape_tensor_condition();
+      REQUIRE(plain->problem().terms().sample(plain->problem().state().displacement(), a).ok());
+      REQUIRE(problem.terms().sample(problem.state().displacement(), b).ok());
+      const Field condition = problem.terms().shape_tensor_condition();
       int same = 0, different = 0;
       for (const std::int32_t p : body.internal()) {
         const double before = a.strain_energy_density.data()[p], change = std::abs(b.strain_energy_density.data()[p] - before);

@@ -44,7 +44,7 @@ TEST_CASE("traction bar: tractions on both faces leave a homogeneous stress, for
       const auto simulation = load("partmann/traction_bar_faces.toml", {fmt::format("kinematics={}", kinematics), "constants.N=3", fmt::format("constants.m={}", ratio),
                                                                         "integrator.tolerance=1e-9"});
       // Some have modes without energy on so small a body: forces and stresses are what counts, at the homogeneous state itself.
-      ModelProblem& problem = simulation->problem();
+      BodyProblem& problem = simulation->problem();
       const double strain = hyperelastic / 0.1, across = 1 - std::sqrt(1 - 0.25 * (2 * strain + strain * strain));
       for (const std::int32_t p : problem.body().internal()) {
         const Point x = problem.body().position(static_cast<std::size_t>(p));

@@ -24,13 +24,13 @@ struct Sample {
 
 Sample sample(const std::string& scene, const std::string& set, std::vector<std::string> overrides) {
   const auto simulation = load(scene, std::move(overrides));
-  ModelProblem& problem = simulation->problem();
+  BodyProblem& problem = simulation->problem();
   PointSamples samples;
-  const EvaluationStatus status = problem.model().sample(problem.state().displacement(), samples);
+  const EvaluationStatus status = problem.terms().sample(problem.state().displacement(), samples);
   REQUIRE_MESSAGE(status.ok(), status.description);
   const std::vector<std::int32_t>& points = problem.body().set(set);
   REQUIRE(points.size() == 1);
-  const ModelReport report = problem.model().report();
+  const ModelReport report = problem.terms().report();
   const double H = samples.H.components() > 0 ? samples.H.component(0)[points[0]] : 0.0;   // pair laws have none
   return {samples.strain_energy_density.data()[points[0]], H, report.fallbacks, report.dropped_parts};
 }
@@ -170,9 +170,9 @@ TEST_CASE("sine: order 1 keeps 3/pi^2 of the amplitude, orders 3 and 6 approach 
 TEST_CASE("spectrum: the energy of short waves vanishes for conventional alone") {
   const auto spectrum = [](const std::string& kinematics, int k) {
     const auto simulation = load("chowdhury/spectrum.toml", {kinematics, fmt::format("constants.k={}", k), "body.lattice.spacing=0.002", "body.line=strain"});
-    ModelProblem& problem = simulation->problem();
+    BodyProblem& problem = simulation->problem();
     PointSamples samples;
-    REQUIRE(problem.model().sample(problem.state().displacement(), samples).ok());
+    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
     double sum = 0;
     for (const std::int32_t p : problem.body().set("inside")) sum += samples.strain_energy_density.data()[p];
     return sum;

@@ -1,22 +1,22 @@
 #pragma once
 /// Which points the force on a point depends on: those that families reach in a given number of steps.
 
-#include "assembly/point_families.hpp"
+#include "assembly/block_rows.hpp"
 #include "perikit/core/block_matrix.hpp"
 
 namespace perikit {
 
 /// K couples the rows that are at most `steps` bonds apart.
-void make_pattern(const PointFamilies& families, int steps, BlockMatrix& K);
+void make_pattern(const BlockRows& rows, int steps, BlockMatrix& K);
 
 /// Blocks of that pattern, from rows spread over the body; exact for few points.
-std::size_t predict_blocks(const PointFamilies& families, int steps);
+std::size_t predict_blocks(const BlockRows& rows, int steps);
 
 /// Finds the rows at most `steps` bonds from one row. One per thread.
 class Reach {
  public:
   /// Not sorted: the row itself, then its family, then those of the family ... each once.
-  const std::vector<std::int32_t>& of(const PointFamilies& families, std::size_t row, int steps);
+  const std::vector<std::int32_t>& of(const BlockRows& rows, std::size_t row, int steps);
   /// Place of a row in the last result; only for rows that are in it.
   std::size_t place(std::int32_t row) const noexcept { return static_cast<std::size_t>(place_[static_cast<std::size_t>(row)]); }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "families/cloud_rows.hpp"
+#include "spaces/bond_shape.hpp"
 
 namespace perikit {
 
@@ -19,20 +20,20 @@ void over_rows(std::size_t rows, Body&& body) {
 }  // namespace
 
 template <int D>
-BondAssembly<D>::BondAssembly(const ModelParts& parts)
-    : Assembly(parts, parts.formulation.base == BondBase::mean ? 3 : 2),
-      laws_(*parts.laws),
+BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
+    : rows_(rows),
+      laws_(parts.laws),
       formulation_(parts.formulation),
       mean_(formulation_.base == BondBase::mean),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
-      colouring_(cloud_reach(families().lists(), families().rows())) {
+      colouring_(cloud_reach(rows.lists(), rows.size())) {
   read_bonds();
 }
 
 template <int D>
 void BondAssembly<D>::read_bonds() {
-  const std::size_t rows = families().rows();
-  bond_.resize(families().bonds());
+  const std::size_t rows = rows_.size();
+  bond_.resize(rows_.bonds());
   own_gradient_.assign(D * rows, 0.0);
   volume_share_.assign(rows, 0.0);
   struct Scratch {
@@ -44,27 +45,27 @@ void BondAssembly<D>::read_bonds() {
   memory.prepare([] { return std::make_unique<Scratch>(); });
   over_rows(rows, [&](std::size_t i) {
     Scratch& s = memory.mine();
-    families().load(i, s.family);
-    families().bond_shares(i, s.family, s.share);
+    rows_.load(i, s.family);
+    bond_shares(rows_.families(), rows_.point(i), formulation_.weight, s.family, s.share);
     s.correction.assign(D * s.family.size, 0.0);
-    formulation_.bond->correction(s.family.view(families().body().horizon()), s.correction.data(), s.family.size);
-    point_gradient(s.family, families().body().horizon(), formulation_.order, s.gradient);
+    formulation_.bond->correction(s.family.view(rows_.body().horizon()), s.correction.data(), s.family.size);
+    point_gradient(s.family, rows_.body().horizon(), formulation_.order, s.gradient);
     const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
-    volume_share_[i] = regular ? families().left(i) : 0.0;
-    const auto neighbours = families().neighbours(i);
+    volume_share_[i] = regular ? rows_.families().left(rows_.point(i)) : 0.0;
+    const auto neighbours = rows_.neighbours(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
-      Bond& bond = bond_[families().first(i) + k];
+      Bond& bond = bond_[rows_.first(i) + k];
       for (std::size_t e = 0; e < D; ++e) {
         bond.xi[e] = s.family.xi[e][k];
         bond.correction[e] = s.correction[e * s.family.size + k];
         bond.gradient[e] = s.gradient[k * D + e];
         own_gradient_[D * i + e] -= bond.gradient[e];
       }
-      bond.weight = families().volume(i) * s.share[k];
+      bond.weight = rows_.volume(i) * s.share[k];
       const auto j = static_cast<std::size_t>(neighbours[k]);
-      const auto back = families().neighbours(j);
+      const auto back = rows_.neighbours(j);
       bond.reverse =
-          families().first(j) +
+          rows_.first(j) +
           static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(i)) - back.begin());
     }
   });
@@ -74,10 +75,10 @@ template <int D>
 void BondAssembly<D>::point_gradients(std::size_t row, ConstFieldView u) noexcept {
   double* H = Hbar_.data() + entries * row;
   std::fill_n(H, entries, 0.0);
-  const std::size_t p = families().point(row);
-  const Bond* bond = bond_.data() + families().first(row);
-  for (const std::int32_t j : families().neighbours(row)) {
-    const std::size_t q = families().point(static_cast<std::size_t>(j));
+  const std::size_t p = rows_.point(row);
+  const Bond* bond = bond_.data() + rows_.first(row);
+  for (const std::int32_t j : rows_.neighbours(row)) {
+    const std::size_t q = rows_.point(static_cast<std::size_t>(j));
     for (std::size_t c = 0; c < D; ++c) {
       const double* value = u.component(static_cast<int>(c));
       for (std::size_t e = 0; e < D; ++e) H[c * D + e] += bond->gradient[e] * (value[q] - value[p]);
@@ -88,15 +89,14 @@ void BondAssembly<D>::point_gradients(std::size_t row, ConstFieldView u) noexcep
 
 template <int D>
 bool BondAssembly<D>::evaluated_once(std::size_t i, std::size_t j) const noexcept {
-  return symmetric_ && laws_.same(families().point(i), families().point(j));
+  return symmetric_ && laws_.same(rows_.point(i), rows_.point(j));
 }
 
-// H_b = A_b + (du - A_b xi) (x) g_b.
 template <int D>
 void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, Memory& m) {
   const Bond& bond = bond_[k];
-  const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
-  const std::size_t p = families().point(i), q = families().point(j);
+  const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
+  const std::size_t p = rows_.point(i), q = rows_.point(j);
   const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
   const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i]);
   m.bond_of_lane.push_back(k);
@@ -104,13 +104,11 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const double* own = Hbar_.data() + entries * i;
   const double* far = Hbar_.data() + entries * j;
   for (std::size_t c = 0; c < D; ++c) {
-    double A[D], z = u.component(static_cast<int>(c))[q] - u.component(static_cast<int>(c))[p];
+    double A[D], H[D];
+    for (std::size_t e = 0; e < D; ++e) A[e] = mean_ ? 0.5 * (own[c * D + e] + far[c * D + e]) : own[c * D + e];
+    bond_shape_row<D>(A, u.component(static_cast<int>(c))[q] - u.component(static_cast<int>(c))[p], bond.xi, bond.correction, H);
     for (std::size_t e = 0; e < D; ++e) {
-      A[e] = mean_ ? 0.5 * (own[c * D + e] + far[c * D + e]) : own[c * D + e];
-      z -= A[e] * bond.xi[e];
-    }
-    for (std::size_t e = 0; e < D; ++e) {
-      m.batch.H(lane, static_cast<int>(c * D + e)) = A[e] + z * bond.correction[e];
+      m.batch.H(lane, static_cast<int>(c * D + e)) = H[e];
       if (formulation_.selective()) m.batch.owner_H(lane, static_cast<int>(c * D + e)) = own[c * D + e];
     }
   }
@@ -121,7 +119,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
 template <int D>
 void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept {
   const Bond& bond = bond_[k];
-  const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
+  const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
   double R[D][slots];
   for (std::size_t e = 0; e < D; ++e) {
     for (std::size_t s = 0; s < D; ++s) R[e][s] = (e == s ? 1.0 : 0.0) - bond.xi[s] * bond.correction[e];
@@ -186,12 +184,12 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
 }
 
 template <int D>
-std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, ConstFieldView u, Memory& m) {
+std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, ConstFieldView u, bool convex, Memory& m) {
   m.batch.clear();
   m.bond_of_lane.clear();
   m.row_of_lane.clear();
   const auto finish = [&]() -> std::int64_t {
-    const int bad = m.batch.evaluate(convex());
+    const int bad = m.batch.evaluate(convex);
     if (bad >= 0) return m.batch.owner(bad);
     for (int lane = 0; lane < m.batch.lanes(); ++lane) {
       const auto at = static_cast<std::size_t>(lane);
@@ -203,9 +201,9 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, Con
     return -1;
   };
   for (std::size_t i = first; i < last; ++i)
-    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k) {
-      const auto j = static_cast<std::size_t>(families().lists().neighbour[k]);
-      if ((j < i && evaluated_once(i, j)) || families().integrity(k) == 0) continue;
+    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) {
+      const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
+      if ((j < i && evaluated_once(i, j)) || bond_[k].weight == 0) continue;
       add_lane(i, k, u, m);
       if (m.batch.lanes() < batch_points) continue;
       const std::int64_t bad = finish();
@@ -217,9 +215,9 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, Con
 // C_kj = sum_i g_ik Q_ij over the points i whose gradients k enters, then K_kl = sum_j C_kj g_jl.
 template <int D>
 void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const {
-  const std::vector<std::int32_t>& near = m.reach.of(families(), row, 2);
+  const std::vector<std::int32_t>& near = m.reach.of(rows_, row, 2);
   m.C.assign(strip * near.size(), 0.0);
-  const std::size_t first = families().first(row), bonds = families().first(row + 1) - first;
+  const std::size_t first = rows_.first(row), bonds = rows_.first(row + 1) - first;
   const auto add = [&](const double* g, bool own, const double* Q, std::int32_t j) {
     double* C = m.C.data() + strip * m.reach.place(j);
     for (std::size_t x = 0; x < strip; ++x)
@@ -229,12 +227,12 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
   };
   const auto add_row = [&](std::size_t i, const double* g, bool own) {
     add(g, own, diagonal_.data() + coupling * i, static_cast<std::int32_t>(i));
-    for (std::size_t k = families().first(i); k < families().first(i + 1); ++k)
-      add(g, own, off_diagonal_.data() + coupling * k, families().lists().neighbour[k]);
+    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k)
+      add(g, own, off_diagonal_.data() + coupling * k, rows_.lists().neighbour[k]);
   };
   add_row(row, &own_gradient_[D * row], true);
   for (std::size_t k = first; k < first + bonds; ++k)
-    add_row(static_cast<std::size_t>(families().lists().neighbour[k]), bond_[bond_[k].reverse].gradient, false);
+    add_row(static_cast<std::size_t>(rows_.lists().neighbour[k]), bond_[bond_[k].reverse].gradient, false);
 
   m.places.open(K, row);
   // Only with the mean base do gradients two bonds away matter; the others have none in C.
@@ -251,27 +249,27 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     };
     const auto j = static_cast<std::size_t>(near[n]);
     add_gradient(&own_gradient_[D * j], near[n]);
-    for (std::size_t k = families().first(j); k < families().first(j + 1); ++k)
-      add_gradient(bond_[k].gradient, families().lists().neighbour[k]);
+    for (std::size_t k = rows_.first(j); k < rows_.first(j + 1); ++k)
+      add_gradient(bond_[k].gradient, rows_.lists().neighbour[k]);
   }
 }
 
 template <int D>
-std::int64_t BondAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
-  const std::size_t rows = families().rows();
+std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
+  const std::size_t rows = rows_.size();
   memory_.prepare([&] { return std::make_unique<Memory>(laws_, formulation_.selective()); });
   Hbar_.resize(entries * rows);
   diagonal_.resize(coupling * rows);
-  off_diagonal_.resize(coupling * families().bonds());
+  off_diagonal_.resize(coupling * rows_.bonds());
   over_rows(rows, [&](std::size_t r) {
     point_gradients(r, u);
     std::fill_n(diagonal_.data() + coupling * r, coupling, 0.0);
-    std::fill_n(off_diagonal_.data() + coupling * families().first(r), coupling * (families().first(r + 1) - families().first(r)),
+    std::fill_n(off_diagonal_.data() + coupling * rows_.first(r), coupling * (rows_.first(r + 1) - rows_.first(r)),
                 0.0);
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::int64_t point = add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, memory_.mine());
+    const std::int64_t point = add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
     if (point >= 0) bad.report(point);
   });
   if (bad.point() >= 0) return bad.point();
@@ -280,9 +278,9 @@ std::int64_t BondAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
 }
 
 template <int D>
-std::size_t BondAssembly<D>::work_bytes() const noexcept {
+std::size_t BondAssembly<D>::bytes() const noexcept {
   return bond_.size() * sizeof(Bond) +
-         (families().rows() * (coupling + entries + D) + families().bonds() * coupling) * sizeof(double);
+         (rows_.size() * (coupling + entries + D) + rows_.bonds() * coupling) * sizeof(double);
 }
 
 template class BondAssembly<1>;

@@ -1,7 +1,9 @@
 #pragma once
 #include "assembly/assembly.hpp"
+#include "assembly/block_pattern.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "families/blocks.hpp"
+#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
 
@@ -11,7 +13,11 @@ namespace perikit {
 template <int D>
 class BondAssembly final : public Assembly {
  public:
-  explicit BondAssembly(const ModelParts& parts);
+  BondAssembly(const SpaceParts& parts, const BlockRows& rows);
+
+  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  void bonds_changed() override { read_bonds(); }
+  std::size_t bytes() const noexcept override;
 
  private:
   static constexpr std::size_t slots = D + 1, entries = D * D;
@@ -36,20 +42,18 @@ class BondAssembly final : public Assembly {
     std::size_t reverse;   ///< the bond j -> i
   };
 
-  std::int64_t fill(ConstFieldView u, BlockMatrix& K) override;
-  void bonds_changed() override { read_bonds(); }
-  std::size_t work_bytes() const noexcept override;
   void read_bonds();
   void point_gradients(std::size_t row, ConstFieldView u) noexcept;
   /// ij and ji have the same gradient and the same law: one evaluation with both weights.
   bool evaluated_once(std::size_t i, std::size_t j) const noexcept;
-  std::int64_t add_bonds(std::size_t first, std::size_t last, ConstFieldView u, Memory& m);
+  std::int64_t add_bonds(std::size_t first, std::size_t last, ConstFieldView u, bool convex, Memory& m);
   void add_lane(std::size_t i, std::size_t k, ConstFieldView u, Memory& m);
   void couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept;
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
 
+  const BlockRows& rows_;
   const Laws& laws_;
-  Formulation formulation_;
+  const Formulation& formulation_;
   bool mean_, symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each

@@ -8,32 +8,24 @@
 namespace perikit {
 
 template <int D>
-ElementAssembly<D>::ElementAssembly(const ModelParts& parts)
-    : Assembly(parts, 2), parts_(parts), laws_(*parts.laws), colouring_(cloud_reach(families().lists(), families().rows())) {
-  shape_ = {parts.formulation, parts.formulation.parts(D)};
-  for (std::size_t r = 0; r < families().rows() && !whole_; ++r) {
-    if (!families().whole(r)) continue;
+ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& rows)
+    : rows_(rows), laws_(parts.laws), shape_{parts.formulation, parts.formulation.parts(D)}, colouring_(cloud_reach(rows.lists(), rows.size())) {
+  for (std::size_t r = 0; r < rows.size() && !whole_; ++r) {
+    if (!rows.whole(r)) continue;
     ElementScratch<D> scratch;
-    build_element<D>(families(), shape_, r, whole_.emplace(), scratch);
+    build_element<D>(rows, shape_, r, whole_.emplace(), scratch);
   }
 }
 
 template <int D>
-void ElementAssembly<D>::collect_nodes(std::size_t row, std::vector<std::int32_t>& nodes) const {
-  const auto neighbours = families().neighbours(row);
-  nodes.assign(neighbours.begin(), neighbours.end());
-  nodes.insert(std::lower_bound(nodes.begin(), nodes.end(), static_cast<std::int32_t>(row)), static_cast<std::int32_t>(row));
-}
-
-template <int D>
 void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& element, ConstFieldView u, Memory& m) const {
-  const std::size_t p = families().point(row);
-  collect_nodes(row, m.nodes);
+  const std::size_t p = rows_.point(row);
+  element_nodes(rows_, row, m.nodes);
   m.u.assign(D * element.width, 0.0);
   for (std::size_t c = 0; c < D; ++c)
     for (std::size_t k = 0; k < m.nodes.size(); ++k) {
       const double* value = u.component(static_cast<int>(c));
-      m.u[c * element.width + k] = value[families().point(static_cast<std::size_t>(m.nodes[k]))] - value[p];
+      m.u[c * element.width + k] = value[rows_.point(static_cast<std::size_t>(m.nodes[k]))] - value[p];
     }
   const auto gradient = [&](int q, int c, int e) {
     const double* g = element.row(q, e);
@@ -47,30 +39,12 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   for (int c = 0; c < D && owners > 0; ++c)
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
   for (int q = 0; q < element.points; ++q) {
-    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], families().left(row));
+    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().left(p));
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) {
         m.batch.H(lane, c * D + e) = gradient(owners + q, c, e);
         if (owners > 0) m.batch.owner_H(lane, c * D + e) = Hbar[c * D + e];
       }
-  }
-}
-
-template <int D>
-void ElementAssembly<D>::scatter(const PointElement<D>& element, BlockMatrix& K, Memory& m) const {
-  const std::size_t nodes = m.nodes.size(), width = element.width;
-  const double* S = m.scratch.K.data();
-  for (std::size_t k = 0; k < nodes; ++k) {
-    const auto row = static_cast<std::size_t>(m.nodes[k]);
-    const std::int32_t* column = K.column.data() + K.row_first[row];
-    double* block = K.values.data() + K.row_first[row] * (D * D);
-    for (std::size_t l = 0; l < nodes; ++l, ++column, block += D * D) {
-      for (; *column != m.nodes[l]; ++column) block += D * D;  // both ascend
-      const bool upper = k / padding <= l / padding;           // the rest by symmetry
-      for (std::size_t a = 0; a < D; ++a)
-        for (std::size_t b = 0; b < D; ++b)
-          block[a * D + b] += upper ? S[((a * D + b) * width + k) * width + l] : S[((b * D + a) * width + l) * width + k];
-    }
   }
 }
 
@@ -82,36 +56,34 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
   m.elements.resize(std::max(m.elements.size(), last - first));
   for (std::size_t r = first; r < last; ++r) {
     PointElement<D>& own = m.elements[r - first];
-    if (!families().whole(r)) build_element<D>(families(), shape_, r, own, m.scratch);
-    m.of_row.push_back(families().whole(r) ? &*whole_ : &own);
+    if (!rows_.whole(r)) build_element<D>(rows_, shape_, r, own, m.scratch);
+    m.of_row.push_back(rows_.whole(r) ? &*whole_ : &own);
     add_lanes(r, *m.of_row.back(), u, m);
   }
-  const int bad = m.batch.evaluate(convex());
+  const int bad = m.batch.evaluate(K.convex);
   if (bad >= 0) return m.batch.owner(bad);
   int lane = 0;
   for (std::size_t r = first; r < last; ++r) {
     const PointElement<D>& element = *m.of_row[r - first];
-    collect_nodes(r, m.nodes);
-    const bool penalised = parts_.stabilization && m.penalty.load(parts_, families(), r);
-    if (penalised) m.penalty.subtract_seen(m.batch.own(lane));
+    element_nodes(rows_, r, m.nodes);
     stiffness<D>(element, m.batch, lane, shape_.formulation.selective(), m.scratch);
-    if (penalised) m.penalty.add_springs(static_cast<std::size_t>(element.own), element.width, m.scratch.K.data());
-    scatter(element, K, m);
+    scatter_element<D>(m.nodes, m.scratch.K.data(), element.width, element.test.empty(), K);
     lane += element.points;
   }
   return -1;
 }
 
 template <int D>
-std::int64_t ElementAssembly<D>::fill(ConstFieldView u, BlockMatrix& K) {
+std::int64_t ElementAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
+  if (shape_.formulation.force_state == ForceState::local) K.symmetric = false;
   memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.formulation.selective()); });
   // Enough points at once to fill batches of the materials.
-  const std::size_t bonds = families().bonds() / families().rows() + 1;
+  const std::size_t bonds = rows_.bonds() / rows_.size() + 1;
   const std::size_t at_once =
       std::max<std::size_t>(1, batch_points / (shape_.parts > 0 ? static_cast<std::size_t>(shape_.parts) : bonds));
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::size_t end = std::min(families().rows(), (b + 1) * cloud_block_points);
+    const std::size_t end = std::min(rows_.size(), (b + 1) * cloud_block_points);
     for (std::size_t r = b * cloud_block_points; r < end; r += at_once) {
       const std::int64_t point = fill_rows(r, std::min(end, r + at_once), u, K, memory_.mine());
       if (point >= 0) return bad.report(point);

@@ -1,18 +1,23 @@
 #pragma once
+#include <optional>
+
 #include "assembly/assembly.hpp"
-#include "assembly/penalty_element.hpp"
 #include "assembly/point_element.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "families/blocks.hpp"
+#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
 
-/// Point and weighted shapes: everything that a point owns depends on its family, its zero-energy penalty too, so that K is a sum of one
-/// dense matrix per point.
+/// Point and weighted shapes: everything that a point owns depends on its family, so that K is a sum of one dense matrix per point.
 template <int D>
 class ElementAssembly final : public Assembly {
  public:
-  explicit ElementAssembly(const ModelParts& parts);
+  ElementAssembly(const SpaceParts& parts, const BlockRows& rows);
+
+  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  void bonds_changed() override {}   // elements of points that are not whole are made anew each time
+  std::size_t bytes() const noexcept override { return 0; }
 
  private:
   /// Memory of one thread.
@@ -20,21 +25,17 @@ class ElementAssembly final : public Assembly {
     explicit Memory(const Laws& laws, bool selective) : batch(laws, selective) {}
     TangentBatch<D> batch;
     ElementScratch<D> scratch;
-    PenaltyElement<D> penalty;
     std::vector<PointElement<D>> elements;          ///< of points that are not whole
     std::vector<const PointElement<D>*> of_row;
     std::vector<std::int32_t> nodes;
     AlignedVector<double> u;
   };
 
-  std::int64_t fill(ConstFieldView u, BlockMatrix& K) override;
   /// Rows [first, last) at once. Returns the field index of an inadmissible point or -1.
   std::int64_t fill_rows(std::size_t first, std::size_t last, ConstFieldView u, BlockMatrix& K, Memory& m) const;
-  void collect_nodes(std::size_t row, std::vector<std::int32_t>& nodes) const;
   void add_lanes(std::size_t row, const PointElement<D>& element, ConstFieldView u, Memory& m) const;
-  void scatter(const PointElement<D>& element, BlockMatrix& K, Memory& m) const;
 
-  ModelParts parts_;
+  const BlockRows& rows_;
   const Laws& laws_;
   ElementShape shape_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family

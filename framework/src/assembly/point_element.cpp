@@ -23,41 +23,74 @@ void write_point(PointElement<D>& out, int q, Gradient&& gradient) {
 
 }  // namespace
 
+std::size_t element_nodes(const BlockRows& rows, std::size_t row, std::vector<std::int32_t>& nodes) {
+  const auto neighbours = rows.neighbours(row);
+  nodes.assign(neighbours.begin(), neighbours.end());
+  return static_cast<std::size_t>(nodes.insert(std::lower_bound(nodes.begin(), nodes.end(), static_cast<std::int32_t>(row)), static_cast<std::int32_t>(row)) -
+                                  nodes.begin());
+}
+
 template <int D>
-void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out,
-                   ElementScratch<D>& s) {
-  const auto neighbours = families.neighbours(row);
+void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, std::size_t width, bool symmetric, BlockMatrix& K) {
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const auto row = static_cast<std::size_t>(nodes[k]);
+    const std::int32_t* column = K.column.data() + K.row_first[row];
+    double* block = K.values.data() + K.row_first[row] * (D * D);
+    for (std::size_t l = 0; l < nodes.size(); ++l, ++column, block += D * D) {
+      for (; *column != nodes[l]; ++column) block += D * D;   // both ascend
+      const bool there = !symmetric || k / padding <= l / padding;
+      for (std::size_t a = 0; a < D; ++a)
+        for (std::size_t b = 0; b < D; ++b)
+          block[a * D + b] += there ? S[((a * D + b) * width + k) * width + l] : S[((b * D + a) * width + l) * width + k];
+    }
+  }
+}
+
+template <int D>
+void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out, ElementScratch<D>& s) {
+  const auto neighbours = rows.neighbours(row);
   out.nodes = static_cast<int>(neighbours.size()) + 1;
-  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) -
-                             neighbours.begin());
+  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) - neighbours.begin());
   out.width = padded(static_cast<std::size_t>(out.nodes));
   out.weight.clear();
+  out.test.clear();
   out.points = 0;
   if (neighbours.empty()) {  // nothing to stretch
     out.g.assign(D * out.width, 0.0);
     return;
   }
-  families.load(row, s.family);
-  const double intact = families.volume(row) * (1 - families.damage(row)), horizon = families.body().horizon();
-  if (shape.formulation.point) {
-    point_gradient(s.family, horizon, shape.formulation.order, s.gradient);
+  rows.load(row, s.family);
+  const std::size_t p = rows.point(row);
+  const double intact = rows.volume(row) * (1 - rows.families().damage(p)), horizon = rows.body().horizon();
+  const Formulation& formulation = shape.formulation;
+  if (formulation.point) {
+    point_gradient(s.family, horizon, formulation.order, s.gradient);
     out.g.assign(D * out.width, 0.0);
     write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
     out.points = 1;
     out.weight.push_back(intact);
     return;
   }
-  families.bond_shares(row, s.family, s.share);
-  s.stencil.build({&shape.formulation, horizon}, s.family, s.share.data(), 0, nullptr);
+  bond_shares(rows.families(), p, formulation.weight, s.family, s.share);
+  s.stencil.build({&formulation, horizon}, s.family, s.share.data(), 0, nullptr, rows.families().normaliser(p, BondWeight::volume));
   s.stencil.expand(s.gradient);
-  const int owners = shape.formulation.selective() ? 1 : 0;
+  const int owners = formulation.selective() ? 1 : 0;
+  const std::vector<double>& tested = s.stencil.tested();
   out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
+  if (!tested.empty()) out.test = out.g;
   for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
     const double share = s.stencil.share(q);
     if (q >= owners && share == 0) continue;  // a dropped part
-    write_point<D>(out, to++, [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; });
+    const auto gradient = [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; };
+    if (!tested.empty()) {
+      out.g.swap(out.test);
+      const int own = q - owners;   // the bond of the evaluation point, the only one that its stress acts on
+      write_point<D>(out, to, [&](int k, int e) { return own < 0 ? gradient(k, e) : k == own ? tested[static_cast<std::size_t>(k)] * gradient(k, e) : 0.0; });
+      out.g.swap(out.test);
+    }
+    write_point<D>(out, to++, gradient);
     if (q < owners) continue;
-    out.weight.push_back(share * (shape.parts > 0 ? intact : families.volume(row)));
+    out.weight.push_back(share * (shape.parts > 0 ? intact : rows.volume(row)));
     ++out.points;
   }
 }
@@ -109,10 +142,10 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
     }
     for (int ab = 0; ab < n; ++ab) {
       const double* right = s.T.data() + static_cast<std::size_t>(ab) * rows * tile;
-      for (std::size_t k = 0; k < column + tile; k += 4) {
+      for (std::size_t k = 0; k < (element.test.empty() ? column + tile : width); k += 4) {
         Pack sums[4][packs];
         for (std::size_t r = 0; r < rows; ++r) {
-          const double* left = element.g.data() + r * width + k;
+          const double* left = (element.test.empty() ? element.g : element.test).data() + r * width + k;
           for (int v = 0; v < packs; ++v) {
             const Pack t = Pack::load(right + r * tile + static_cast<std::size_t>(v * pack_width));
             for (int i = 0; i < 4; ++i) sums[i][v] += Pack(left[i]) * t;
@@ -127,9 +160,12 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
   }
 }
 
-template void build_element<1>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<1>&, ElementScratch<1>&);
-template void build_element<2>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<2>&, ElementScratch<2>&);
-template void build_element<3>(const PointFamilies&, const ElementShape&, std::size_t, PointElement<3>&, ElementScratch<3>&);
+template void scatter_element<1>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
+template void build_element<1>(const BlockRows&, const ElementShape&, std::size_t, PointElement<1>&, ElementScratch<1>&);
+template void scatter_element<2>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
+template void build_element<2>(const BlockRows&, const ElementShape&, std::size_t, PointElement<2>&, ElementScratch<2>&);
+template void scatter_element<3>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
+template void build_element<3>(const BlockRows&, const ElementShape&, std::size_t, PointElement<3>&, ElementScratch<3>&);
 template void stiffness<1>(const PointElement<1>&, const TangentBatch<1>&, int, bool, ElementScratch<1>&);
 template void stiffness<2>(const PointElement<2>&, const TangentBatch<2>&, int, bool, ElementScratch<2>&);
 template void stiffness<3>(const PointElement<3>&, const TangentBatch<3>&, int, bool, ElementScratch<3>&);

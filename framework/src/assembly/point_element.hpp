@@ -4,16 +4,25 @@
 #include <memory>
 #include <vector>
 
-#include "assembly/point_families.hpp"
+#include "assembly/block_rows.hpp"
 #include "assembly/tangent_batch.hpp"
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/model/formulation.hpp"
 #include "spaces/local_stencil.hpp"
 
 namespace perikit {
 
 struct ElementShape {
-  Formulation formulation;
+  const Formulation& formulation;
   int parts = 1;  ///< evaluation points per point; 0: one per bond
 };
+
+/// The nodes of a row, ascending: its family and the point itself. Returns the place of the point.
+std::size_t element_nodes(const BlockRows& rows, std::size_t row, std::vector<std::int32_t>& nodes);
+
+/// K += S over these nodes: S[a][b][k][l], width x width each. symmetric: only tiles of 8 x 8 on and above the diagonal are there.
+template <int D>
+void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, std::size_t width, bool symmetric, BlockMatrix& K);
 
 /// Nodes: the owner and its family, ascending.
 template <int D>
@@ -22,6 +31,7 @@ struct PointElement {
   int points = 0;              ///< evaluation points with a weight
   std::size_t width = 0;       ///< padded(nodes)
   AlignedVector<double> g;     ///< [q][e][node], the owner's own gradient first (with the selective map), then points
+  AlignedVector<double> test;  ///< likewise what stresses are tested with, where that is another thing (local force states); else empty
   std::vector<double> weight;  ///< W_q [m^3]
   const double* row(int q, int e) const noexcept { return g.data() + static_cast<std::size_t>(q * D + e) * width; }
 };
@@ -34,11 +44,11 @@ struct ElementScratch {
   AlignedVector<double> share;
   std::vector<double> gradient;
   AlignedVector<double> T;  ///< A g of eight nodes
-  AlignedVector<double> K;  ///< [a][b][k][l], width x width each; tiles of 8 x 8 on and above the diagonal
+  AlignedVector<double> K;  ///< [a][b][k][l], width x width each; of symmetric ones tiles of 8 x 8 on and above the diagonal
 };
 
 template <int D>
-void build_element(const PointFamilies& families, const ElementShape& shape, std::size_t row, PointElement<D>& out,
+void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out,
                    ElementScratch<D>& s);
 
 /// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch.

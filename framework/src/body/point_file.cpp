@@ -13,7 +13,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "output/hdf5_file.hpp"
+#include "files/hdf5_file.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {

@@ -76,7 +76,7 @@ Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std:
   return Body(frame(scene, description.spacing), positions, std::vector<double>(positions.size(), volume));
 }
 
-Body lattice_body(const Scene& scene, bool lists) {
+Body lattice_body(const Scene& scene) {
   const LatticeDescription& description = *scene.body.lattice;
   const int d = scene.body.dimension;
   const double spacing = description.spacing, reach = horizon(scene, spacing), ratio = reach / spacing;
@@ -101,7 +101,7 @@ Body lattice_body(const Scene& scene, bool lists) {
   }
   // Jitter needs a cloud; so does a body that fills so little of its box that dead cells would dominate.
   const bool sparse = static_cast<double>(kept.size()) < 0.08 * static_cast<double>(cells[0] * cells[1] * cells[2]);
-  if (description.jitter > 0 || lists || sparse) {
+  if (description.jitter > 0 || sparse) {
     check_cloud(scene, kept.size(), ratio);
     return jittered(scene, lattice, kept);
   }
@@ -126,8 +126,8 @@ Body file_body(const Scene& scene) {
 
 }  // namespace
 
-Body build_body(const Scene& scene, bool lists) {
-  Body body = scene.body.lattice ? lattice_body(scene, lists) : file_body(scene);
+Body build_body(const Scene& scene) {
+  Body body = scene.body.lattice ? lattice_body(scene) : file_body(scene);
   add_sets(scene.sets, body);
   if (scene.regions.empty()) return body;
   std::vector<std::uint16_t> ids(body.stride(), 0);

@@ -8,7 +8,7 @@
 #include "perikit/problem/loads.hpp"
 #include "perikit/problem/state.hpp"
 #include "perikit/scene/scene.hpp"
-#include "perikit/terms/model.hpp"
+#include "perikit/terms/terms.hpp"
 
 namespace perikit {
 
@@ -18,10 +18,10 @@ SpaceTimeFunction function_of(const Expression& expression, bool ramps);
 /// Throws InputError for prescribed velocities in quasi-static runs.
 Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_static);
 
-/// On the owned points of parts.body, which is a part of partition->whole() where there are several ranks: totals are those of
-/// all ranks. parts: of the model, whose kinematics say what area a point has of a face. Throws InputError for faces without
+/// On the owned points of the body, which is a part of partition->whole() where there are several ranks: totals are those of
+/// all ranks. parts: of the terms, whose kinematics say what area a point has of a face. Throws InputError for faces without
 /// points.
-Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* partition, bool quasi_static);
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, bool quasi_static);
 
 /// Displacements and velocities at the start. Throws InputError where an earlier run does not hold them.
 void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, State& state);

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "families/gradual_failure.hpp"
+#include "families/families.hpp"
 
 namespace perikit {
 
@@ -34,54 +34,48 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const ModelParts& parts, bool ranks) {
-  const Formulation& formulation = parts.formulation;
+void refuse_unsuited(const Scene& scene, const Formulation& formulation, bool ranks) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   if (ranks) refuse("a body on several ranks", "one rank");
   if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
-  if (parts.laws->history()) refuse("a law whose stress depends on the path", "hyperelastic laws");
-  if (scene.stabilization && formulation.order > 1)
-    refuse("kinematics.stabilization over point gradients of higher order", "order 1, or kinematics without a stabilization");
-  if (formulation.bond && formulation.order > 1) {
-    refuse(fmt::format("kinematics \"{}\" of order {}, whose point gradients are made once", scene.kinematics->type,
-                       formulation.order),
-           "order 1");
-  }
 }
 
 }  // namespace
 
-std::shared_ptr<const Damage> build_criterion(const Scene& scene, const PartFactory& factory, bool quasi_static) {
-  if (!scene.damage) return nullptr;
-  std::shared_ptr<const Damage> criterion = factory.damage(*scene.damage);
+namespace {
+
+/// Whether failed bonds let go in the course of several steps; refused where they cannot.
+bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
   const ParameterValues& values = scene.damage->values;
-  if (!values.has("gradual") || !values.boolean("gradual")) return criterion;
+  if (!values.has("gradual") || !values.boolean("gradual")) return false;
   const auto refuse = [&](const std::string& found, const char* allowed) {
     throw InputError(values.position("gradual"), "damage.gradual",
                      fmt::format("found true with {}; allowed: {}", found, allowed));
   };
-  if (!criterion->traits().bits)
+  if (!criterion.traits().bits)
     refuse(fmt::format("\"{}\", whose bonds weaken of themselves", scene.damage->type), "criteria that break bonds at once");
   if (quasi_static) refuse(fmt::format("integrator \"{}\", which knows no time", scene.integrator->type), "explicit integrators");
-  return std::make_shared<GradualFailure>(criterion);
+  return true;
 }
 
-std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_ptr<const Damage> criterion,
-                                               const ModelParts& parts, bool ranks) {
-  if (!criterion) return nullptr;
-  refuse_unsuited(scene, parts, ranks);
-  const Body& body = *parts.body;
-  const Laws& laws = *parts.laws;
+}  // namespace
+
+std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts, bool quasi_static,
+                                               bool ranks) {
+  if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
-  damage->law = std::move(criterion);
+  damage->law = factory.damage(*scene.damage);
+  const bool gradually = gradual(scene, *damage->law, quasi_static);
+  refuse_unsuited(scene, parts.formulation, ranks);
+  const Body& body = parts.families->body();
+  const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
   damage->failure = body.make_field(1);
-  GradualFailure* const gradual = gradual_failure(damage->law);
-  Field crack_speed = gradual ? body.make_field(1) : Field();
+  if (gradually) damage->crack_speed = body.make_field(1);
   DamagePoint at{{body.space(), body.section(), body.horizon(), {}},
-                 mean_bond_length(*parts.influence, body.dimension(), body.horizon())};
+                 mean_bond_length(*parts.families->influence(), body.dimension(), body.horizon())};
   const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
   StretchLimits limits;
   bool equal = true;
@@ -97,14 +91,13 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, std::shared_p
     }
     damage->onset.data()[p] = limits.onset;
     damage->failure.data()[p] = limits.failure;
-    if (gradual) crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
+    if (gradually) damage->crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
     equal = equal && limits.onset == limits.failure;
   }
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set))
       damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
   if (equal) damage->failure = Field();
-  if (gradual) gradual->prepare(body, std::move(crack_speed));
   return damage;
 }
 

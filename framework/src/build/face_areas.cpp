@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "build/face_shares.hpp"
+#include "families/families.hpp"
 
 namespace perikit {
 
@@ -34,8 +35,8 @@ class UnitMaterial final : public Material {
 
 }  // namespace
 
-Field face_areas(ModelParts parts, int axis) {
-  const Body& body = *parts.body;
+Field face_areas(TermParts parts, int axis) {
+  const Body& body = parts.families->body();
   MaterialRecord record;
   record.material = std::make_shared<UnitMaterial>();
   record.traits = record.material->traits();
@@ -47,12 +48,12 @@ Field face_areas(ModelParts parts, int axis) {
   parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
   parts.damage = nullptr;
   parts.skip = parts.share = true;
-  const std::unique_ptr<Model> model = make_model(parts);
+  Terms terms(parts);   // over the families that are there
   const Field rest = body.make_field(body.dimension());
   Field stretch = body.make_field(body.dimension()), areas = body.make_field(body.dimension()), area = body.make_field(1);
   for (const std::int32_t p : body.internal())
     stretch.component(axis)[p] = body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(axis)];
-  if (model->tangent(rest, stretch, areas).ok()) std::copy_n(areas.component(axis), body.stride(), area.data());
+  if (terms.tangent(rest, stretch, areas).ok()) std::copy_n(areas.component(axis), body.stride(), area.data());
   return area;
 }
 

@@ -1,5 +1,7 @@
 #include "build/face_shares.hpp"
 
+#include "families/families.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -57,8 +59,8 @@ class Columns {
 /// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
 /// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
 /// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
-Shares on_lattice(const std::vector<std::int32_t>& points, const Face& face, const ModelParts& parts) {
-  const Body& body = *parts.body;
+Shares on_lattice(const std::vector<std::int32_t>& points, const Face& face, const TermParts& parts) {
+  const Body& body = parts.families->body();
   const Columns columns(body, face);
   const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis) : Field();
@@ -120,10 +122,10 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
 
 }  // namespace
 
-Shares face_shares(const LoadDescription& load, const ModelParts& parts) {
+Shares face_shares(const LoadDescription& load, const TermParts& parts) {
   const Face face(load);
-  const std::vector<std::int32_t>& points = parts.body->set(load.set);
-  Shares shares = parts.body->lattice() ? on_lattice(points, face, parts) : on_cloud(points, face, *parts.body);
+  const std::vector<std::int32_t>& points = parts.families->body().set(load.set);
+  Shares shares = parts.families->body().lattice() ? on_lattice(points, face, parts) : on_cloud(points, face, parts.families->body());
   if (shares.empty()) {
     throw InputError(
         load.position, "load.face",

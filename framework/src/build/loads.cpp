@@ -1,12 +1,15 @@
+#include <algorithm>
+
 #include "build/conditions.hpp"
 #include "build/face_shares.hpp"
+#include "families/families.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// Points and shares of a load without its values, on the points of parts.body.
-Load distributed(const LoadDescription& description, const ModelParts& parts) {
+/// Points and shares of a load without its values, on the points of the body.
+Load distributed(const LoadDescription& description, const Body& body, const TermParts& parts) {
   Load load;
   if (description.type == LoadDescription::Type::traction) {
     for (const auto& [p, share] : face_shares(description, parts)) {
@@ -15,11 +18,11 @@ Load distributed(const LoadDescription& description, const ModelParts& parts) {
     }
     return load;
   }
-  load.points = parts.body->set(description.set);
+  load.points = body.set(description.set);
   double total = 0;
-  for (const std::int32_t p : load.points) total += parts.body->volume(static_cast<std::size_t>(p));
+  for (const std::int32_t p : load.points) total += body.volume(static_cast<std::size_t>(p));
   for (const std::int32_t p : load.points) {
-    const double volume = parts.body->volume(static_cast<std::size_t>(p));
+    const double volume = body.volume(static_cast<std::size_t>(p));
     load.share.push_back(description.type == LoadDescription::Type::force ? volume / total : volume);
   }
   return load;
@@ -40,13 +43,19 @@ void keep_owned(const Partition& partition, const Body& part, Load& load) {
 
 }  // namespace
 
-Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* partition, bool quasi_static) {
-  ModelParts whole = parts;
-  if (partition) whole.body = &partition->whole();
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, bool quasi_static) {
+  const Body& body = parts.families->body();
+  TermParts whole = parts;
+  std::unique_ptr<Families> of_whole;
+  const bool faces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
+  if (partition && faces) {
+    of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
+    whole.families = of_whole.get();
+  }
   std::vector<Load> loads;
   for (const LoadDescription& description : scene.loads) {
-    Load load = distributed(description, whole);
-    if (partition) keep_owned(*partition, *parts.body, load);
+    Load load = distributed(description, partition ? partition->whole() : body, whole);
+    if (partition) keep_owned(*partition, body, load);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;
@@ -54,7 +63,7 @@ Loads build_loads(const Scene& scene, const ModelParts& parts, const Partition* 
     }
     if (!load.components.empty()) loads.push_back(std::move(load));
   }
-  return Loads(*parts.body, std::move(loads));
+  return Loads(body, std::move(loads));
 }
 
 }  // namespace perikit

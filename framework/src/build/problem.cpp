@@ -7,6 +7,7 @@
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
 #include "build/materials.hpp"
+#include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 
@@ -15,8 +16,8 @@ namespace perikit {
 namespace {
 
 /// The bodies of this rank and, where there are several, of all of them.
-void place_points(const Scene& scene, bool lists, ProblemParts& parts) {
-  Body whole = build_body(scene, lists);
+void place_points(const Scene& scene, ProblemParts& parts) {
+  Body whole = build_body(scene);
   if (communicator().size() == 1) {
     parts.body = std::make_unique<const Body>(std::move(whole));
     return;
@@ -47,63 +48,52 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
   return factory.stabilization(*scene.stabilization);
 }
 
-std::unique_ptr<Model> build_model(const Scene& scene, const ModelParts& parts) {
+std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
+  const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
   try {
-    return make_model(parts);
+    return Families::make(body, factory.influence(*scene.influence), needs);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
   }
 }
 
-/// Laws with history: refuses runs that have no steps of a path, and makes room.
-void prepare_history(const Scene& scene, const ModelParts& parts, bool quasi_static, Model& model) {
-  LawHistory* const history = parts.laws->history();
-  if (!history) return;
+/// Refuses laws with history where the path has no steps, and where forces are not the derivative of their work.
+void refuse_history(const Scene& scene, const Laws& laws, const Formulation& formulation, bool quasi_static) {
   const auto sources = materials(scene);
   for (std::size_t id = 0; id < sources.size(); ++id) {
-    if (parts.laws->records()[id].material->state_components(parts.body->space()) == 0) continue;
+    if (laws.records()[id].material->state_components(laws.space()) == 0) continue;
     const PartValues& part = *sources[id];
     const auto refuse = [&](const std::string& with, const std::string& allowed) {
-      throw InputError(
-          part.values.position("type"), part.values.path() + ".type",
-          fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
+      throw InputError(part.values.position("type"), part.values.path() + ".type",
+                       fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
     if (quasi_static)
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
              "an explicit integrator, or another material");
-    if (parts.formulation.force_state == ForceState::local)
-      refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+    if (formulation.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
-  // The first evaluation only counts.
-  const Field rest = parts.body->make_field(parts.body->dimension());
-  Field force = parts.body->make_field(parts.body->dimension());
-  model.forces(rest, force, nullptr);
-  history->allocate();
 }
 
 }  // namespace
 
-std::unique_ptr<ModelProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator) {
+std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator) {
   const bool quasi_static = integrator.quasi_static;
   ProblemParts parts;
-  std::shared_ptr<const Damage> criterion = build_criterion(scene, factory, quasi_static);
-  place_points(scene, criterion && !criterion->traits().bits, parts);
+  place_points(scene, parts);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
 
-  ModelParts of_model{.body = &body,
-                      .formulation = make_formulation(factory.kinematics(*scene.kinematics)),
-                      .influence = factory.influence(*scene.influence),
-                      .skip = scene.skip,
-                      .share = scene.share};
-  refuse_stress(scene, body, of_model.formulation);
+  TermParts of_terms{.formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
+  refuse_stress(scene, body, of_terms.formulation);
   parts.laws = build_laws(scene, factory, body, partition != nullptr);
-  of_model.laws = parts.laws.get();
-  parts.fracture = FractureRecord(build_damage(scene, std::move(criterion), of_model, partition != nullptr));
-  of_model.damage = parts.fracture.damage();
-  of_model.stabilization = build_stabilization(scene, factory, of_model.formulation);
-  parts.model = build_model(scene, of_model);
-  prepare_history(scene, of_model, quasi_static, *parts.model);
+  refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
+  parts.families = build_families(scene, factory, body, of_terms.formulation);
+  of_terms.families = parts.families.get();
+  of_terms.laws = parts.laws.get();
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, quasi_static, partition != nullptr));
+  of_terms.damage = parts.fracture.damage();
+  of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
+  parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
   if (partition) parts.materials.push_back(scene.material->type);  // of ghosts
@@ -111,10 +101,10 @@ std::unique_ptr<ModelProblem> build_problem(const Scene& scene, const PartFactor
   State state(body);
   set_initial_state(scene, body, partition, state);
   Constraints constraints = build_constraints(scene, body, quasi_static);
-  Loads loads = build_loads(scene, of_model, partition, quasi_static);
+  Loads loads = build_loads(scene, of_terms, partition, quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads)};
-  return std::make_unique<ModelProblem>(std::move(parts), std::move(values));
+  return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }
 
 }  // namespace perikit

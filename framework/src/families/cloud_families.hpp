@@ -1,72 +1,72 @@
 #pragma once
-/// Families of a cloud: lists of intact bonds, their influence, and what point gradients and weights need of them.
-
-#include <array>
-#include <cstdint>
-#include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
-#include "families/cloud_bonds.hpp"
-#include "spaces/local_stencil.hpp"
-#include "perikit/body/body.hpp"
-#include "perikit/body/influence.hpp"
-#include "perikit/model/kinematics.hpp"
+#include "families/families.hpp"
 
 namespace perikit {
 
-struct CloudFamilies {
-  CloudFamilies(const Body& body, const InfluenceFunction& influence, BondWeight weight);
+/// Families of a cloud: lists of the bonds that the set-up left, their influence, and what point gradients and weights need of them.
+class CloudFamilies final : public Families {
+ public:
+  CloudFamilies(const Body& body, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs);
 
-  const Body& body;
-  FamilyLists lists;                  ///< intact bonds
-  AlignedVector<double> omega;        ///< by bond; with damage b omega
-  AlignedVector<double> inverse;      ///< K^-1 by point, rows of 6; 0 where singular
-  AlignedVector<double> weight;       ///< W_i = V_i (1 - D_i) of the point shape
-  AlignedVector<double> normaliser;   ///< N_i of bond weights over the whole family: sum V_j or sum omega V_j
-  Field condition;                    ///< of K
-  Field damage;                       ///< D_i
-  std::size_t broken = 0, singular = 0;
+  const CloudFamilies* cloud() const noexcept override { return this; }
+  void load(std::size_t p, BondsOf which, FamilyArrays& out) const override;
+  void each_class(const std::function<void(std::span<const std::int32_t>)>& visit) const override;
+  double damage(std::size_t p) const noexcept override { return damage_[p]; }
+  double left(std::size_t p) const noexcept override { return left_.empty() ? 1.0 : left_[p]; }
+  double condition(std::size_t p) const noexcept override { return condition_.empty() ? 0.0 : condition_[p]; }
+  double normaliser(std::size_t p, BondWeight kind) const noexcept override { return kind == BondWeight::kernel ? influences_[p] : volumes_[p]; }
+  bool lost_bonds(std::size_t p) const noexcept override;
+  double integrity(BondId bond) const noexcept override;
+  std::vector<BondChange> changed() const override;
+  void mark(std::span<const std::int32_t> points, GroupMarks& marks) const override;
+  std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip, const NearestFailure* known) const override;
+  std::size_t bytes() const noexcept override;
 
-  std::size_t bonds() const noexcept { return lists.neighbour.size(); }
+  // What loops over bonds read.
+  const FamilyLists& lists() const noexcept { return lists_; }
   std::span<const std::int32_t> neighbours(std::size_t p) const noexcept {
-    return {lists.neighbour.data() + lists.first[p], static_cast<std::size_t>(lists.first[p + 1] - lists.first[p])};
+    return {lists_.neighbour.data() + lists_.first[p], static_cast<std::size_t>(lists_.first[p + 1] - lists_.first[p])};
   }
-  /// The state of the bonds; made on the first call, bodies without damage have none.
-  BondState& bond_state();
-  /// b of a bond.
-  double integrity(std::size_t bond) const noexcept { return bonds_ ? (*bonds_)[bond] : 1.0; }
-  bool fails() const noexcept { return bonds_.has_value(); }
-  /// Whether bonds of the point have failed or weakened since the set-up.
-  bool lost_bonds(std::size_t p) const noexcept;
-  /// The share of its influence at the set-up that a point has left.
-  double left(std::size_t p) const noexcept { return left_.empty() ? 1.0 : left_[p]; }
-  /// Shape tensors, weights and damage of points whose bonds have changed. Returns the bonds left to those of them that are
-  /// fragments, bonds between two of them twice.
-  std::vector<BondChange> changed(std::span<const std::int32_t> points);
-  /// The family of p as arrays over its bonds.
-  void load(std::size_t p, FamilyArrays& out) const;
-  std::size_t bytes() const noexcept;
+  /// Place in the lists of the bond from `point` to `far`, which is one; of `point` itself: of its first bond to a larger index.
+  std::int64_t index(std::int32_t point, std::int32_t far) const noexcept;
+  const double* omegas() const noexcept { return omega_.data(); }   ///< the same; null where it is 1
+  double omega(std::size_t bond) const noexcept { return omega_.empty() ? 1.0 : omega_[bond]; }                     ///< b omega
+  double whole_omega(std::size_t bond) const noexcept { return whole_.empty() ? omega(bond) : whole_[bond]; }
+  double b(std::size_t bond) const noexcept { return integrity_.empty() ? 1.0 : integrity_[bond]; }
+  const double* inverse_shape(std::size_t p) const noexcept { return &inverse_[6 * p]; }                            ///< K^-1, 6 components
 
  private:
-  /// Returns the support of the family.
+  /// Loops over all points or one whose bonds have changed.
   template <int D>
-  double changed_point(std::size_t p);
+  void measure();
   template <int D>
-  void measure_whole();
-  template <int D>
-  void measure(const InfluenceFunction& influence, BondWeight kind);
+  void renew(std::size_t p);
+  /// Far ends, influence and integrity of a family that is not whole.
+  void load_broken(std::size_t p, BondsOf which, FamilyArrays& out) const;
   /// Takes the bonds that are marked as cut out of the lists.
   void compact();
+  std::vector<std::int32_t> lower_bonds(std::span<const BondChange> changes) override;
+  std::vector<std::int32_t> mend_bonds() override;
+  void make_room() override;
+  double support(std::size_t p) const noexcept override { return support_[p]; }
 
-  std::optional<CloudBonds> bonds_;
-  AlignedVector<double> whole_;       ///< with damage: omega by bond at the set-up,
-  AlignedVector<double> intact_;      ///< sum omega V_j at the set-up by point,
-  AlignedVector<double> left_;        ///< the share of it that is left,
-  AlignedVector<double> total_;       ///< the same sum over the whole family,
-  AlignedVector<double> whole_shape_; ///< and its K, rows of 6
-  std::vector<std::pair<std::int32_t, std::array<double, 6>>> cracked_shape_;   ///< K of the whole family of points with cut bonds, in any order
+  struct CutBond {
+    std::int32_t point, far;
+    double omega;
+  };
+  std::span<const CutBond> cut_bonds(std::size_t p) const noexcept;
+
+  FamilyLists lists_;
+  AlignedVector<double> omega_;       ///< by bond; empty where it is 1
+  std::vector<CutBond> cuts_;         ///< by pre-cracks, ascending
+  AlignedVector<double> inverse_, condition_;     ///< by point
+  AlignedVector<double> volumes_, influences_;    ///< sum V_j and sum omega V_j of the uncut family
+  AlignedVector<double> damage_;
+  // Where bonds may fail: by bond, and by point.
+  AlignedVector<double> integrity_, whole_;       ///< b; omega where it is not b omega
+  AlignedVector<double> intact_, left_, support_; ///< sum omega V_j at the set-up, the share of it that is left; of K
 };
 
 }  // namespace perikit

@@ -16,7 +16,7 @@ struct FamilyClass {
 };
 
 struct FamilyClasses {
-  explicit FamilyClasses(const LatticeFamilies& families);
+  FamilyClasses(const LatticeFamilies& families, BondWeight weight);
   std::vector<FamilyClass> classes;    ///< 0: the whole family
   std::vector<std::int32_t> of_point;  ///< by internal index; -1: no point there
 };

@@ -7,54 +7,35 @@
 /// bond lets go in the time |xi|/c_R that one needs along it.
 
 #include <map>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "perikit/body/body.hpp"
-#include "perikit/families/fracture.hpp"
+#include "perikit/families/bonds.hpp"
 
 namespace perikit {
 
-/// A criterion that breaks bonds at once, with the bonds that it has found and that have not let go yet. What they do next
-/// follows from their integrity and from the bonds around them alone, so that checkpoints need nothing more.
-class GradualFailure final : public Damage {
+/// The bonds that a criterion has found and that have not let go yet. What they do next follows from their integrity and from the
+/// bonds around them alone, so that checkpoints need nothing more.
+class GradualFailure {
  public:
-  explicit GradualFailure(std::shared_ptr<const Damage> criterion) : criterion_(std::move(criterion)) {}
+  /// crack_speed: c_R by point [m/s]. Both must outlive this.
+  GradualFailure(const Body& body, const Field& crack_speed) : body_(body), crack_speed_(crack_speed) {}
 
-  DamageTraits traits() const noexcept override { return {.bits = false}; }
-  StretchLimits limits(const DamagePoint& point) const override { return criterion_->limits(point); }
-  void integrity(const IntegrityBatch& bonds) const noexcept override { criterion_->integrity(bonds); }
-
-  /// crack_speed: c_R by point [m/s].
-  void prepare(const Body& body, Field crack_speed) {
-    body_ = &body;
-    crack_speed_ = std::move(crack_speed);
-  }
-  /// Of the update that comes [s].
-  void set_time_step(double dt) noexcept { time_step_ = dt; }
-
-  /// Bonds that the criterion found begin to let go. Returns what becomes in this step of all that are at it.
-  std::vector<BondChange> let_go(std::vector<BondChange> found);
+  /// Bonds that the criterion found begin to let go. Returns what becomes in a step of this length [s] of all that are at it.
+  std::vector<BondChange> let_go(std::span<const BondChange> found, double time_step);
   /// The bonds of fragments begin to go, all by the same factor in each step: the gradients of fragments stay what they are
   /// meanwhile.
-  void fade(std::span<const BondChange> bonds);
-  /// The bonds of a checkpoint, each once, and those of its fragments.
-  void restore(std::span<const BondChange> log, std::span<const BondChange> of_fragments);
+  void fade(std::span<const BondId> bonds);
+  /// The bonds of a checkpoint that are not whole, and those of its fragments.
+  void restore(std::span<const BondChange> changes, std::span<const BondId> of_fragments);
 
  private:
-  double speed(const BondChange& c) const noexcept { return 0.5 * (crack_speed_.data()[c.point] + crack_speed_.data()[c.far]); }
+  double speed(BondId bond) const noexcept { return 0.5 * (crack_speed_.data()[bond.point] + crack_speed_.data()[bond.far]); }
 
-  std::shared_ptr<const Damage> criterion_;
-  const Body* body_ = nullptr;
-  Field crack_speed_;
-  double time_step_ = 0;
-  std::map<std::int64_t, BondChange> letting_go_, fading_;  ///< by bond
+  const Body& body_;
+  const Field& crack_speed_;
+  std::map<BondId, double> letting_go_, fading_;   ///< integrity by bond
 };
-
-/// The criterion of a body that fails gradually; null for others.
-inline GradualFailure* gradual_failure(const std::shared_ptr<const Damage>& law) {
-  return const_cast<GradualFailure*>(dynamic_cast<const GradualFailure*>(law.get()));
-}
 
 }  // namespace perikit

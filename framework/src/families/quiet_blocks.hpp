@@ -2,12 +2,13 @@
 /// Parts of a body that no wave has reached: far enough from every point that moves, a block of points at rest has no forces, for
 /// P(0) is exactly zero. Leaving it out changes no bit of the result.
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "families/blocks.hpp"
 #include "perikit/core/field.hpp"
-#include "perikit/terms/model.hpp"
+#include "perikit/families/quiet_counts.hpp"
 
 namespace perikit {
 
@@ -17,20 +18,29 @@ class QuietBlocks {
  public:
   /// No block is ever quiet.
   QuietBlocks() = default;
-  explicit QuietBlocks(BlockReach reach) : reach_(std::move(reach)), distance_(reach_.own.size(), 0), before_(distance_) {}
+  /// history: laws remember what has passed; a block that was awake once stays awake.
+  explicit QuietBlocks(BlockReach reach, bool history = false)
+      : reach_(std::move(reach)), distance_(reach_.own.size(), 0), before_(distance_), moved_(history ? distance_.size() : 0, 0) {}
 
   /// At the beginning of an evaluation of `passes` passes: moves(b) says whether a point of block b moves.
   template <class Moves>
   void look(int passes, const Moves& moves) {
     if (distance_.empty()) return;
     begin(passes);
-    parallel_for(distance_.size(), [&](std::size_t b) { distance_[b] = moves(b) ? 0 : far; });
+    parallel_for(distance_.size(), [&](std::size_t b) {
+      const bool now = (!moved_.empty() && moved_[b]) || moves(b);
+      if (!moved_.empty()) moved_[b] = now;
+      distance_[b] = now ? 0 : far;
+    });
     spread();
   }
   /// At the beginning of an evaluation that leaves nothing out.
   void wake();
 
-  /// Whether pass k >= 1 has something to do in block b. 
+  /// No block is quiet from now on: the history of a run that goes on says nothing of what has moved.
+  void stay_awake() { std::fill(moved_.begin(), moved_.end(), std::uint8_t{1}); }
+
+  /// Whether pass k >= 1 has something to do in block b.
   bool awake(std::size_t b, int pass) const noexcept { return distance_.empty() || distance_[b] <= pass; }
   /// The same of the first pass, which also clears what an earlier evaluation has left in the block.
   bool begins(std::size_t b) const noexcept { return awake(b, 1) || before_[b] <= passes_before_; }
@@ -47,6 +57,7 @@ class QuietBlocks {
 
   BlockReach reach_;
   std::vector<std::uint8_t> distance_, before_;   ///< in this evaluation and in the one before
+  std::vector<std::uint8_t> moved_;               ///< ever, where laws have a history; else empty
   std::vector<std::uint8_t> reached_;             ///< by unit
   int passes_ = 1, passes_before_ = 1;
   QuietCounts counts_;

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "spaces/local_stencil.hpp"
+#include "families/family_arrays.hpp"
 
 namespace perikit {
 

@@ -11,11 +11,37 @@ void ScratchPool::prepare(const Laws& laws) {
   while (scratch_.size() < static_cast<std::size_t>(thread_count())) {
     // Value-initialised: components that no kernel writes (lateral H) stay zero.
     scratch_.push_back(std::make_unique<BatchScratch>());
-    laws.prepare(scratch_.back()->law, false);
+    BatchScratch& s = *scratch_.back();
+    laws.prepare(s.law, false);
+    for (auto* state : {&s.old_state, &s.new_state}) state->assign(static_cast<std::size_t>(laws.state_components()) * batch_points, 0.0);
   }
 }
 
-int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept {
+// Numbers that follow each other are read and written where they lie; others, and those of bodies with several laws, are gathered.
+LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept {
+  const bool keep = keeps_history(s);
+  if (s.first_number >= 0 && laws_.records().size() == 1) {
+    const std::int64_t first = s.first_number + numbers;
+    return {history_->begin() + first, keep ? history_->end() + first : nullptr, history_->stride(), history_->time_step()};
+  }
+  for (std::size_t c = 0; c < history_->components(); ++c)
+    for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
+      const std::int64_t q = l >= n ? -1 : s.first_number >= 0 ? s.first_number + l : s.number[l];
+      s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
+    }
+  return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, history_->time_step()};
+}
+
+void BatchWork::end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept {
+  if (!keeps_history(s) || (s.first_number >= 0 && laws_.records().size() == 1)) return;
+  for (std::size_t c = 0; c < history_->components(); ++c)
+    for (int l = 0; l < n; ++l) {
+      const std::int64_t q = s.first_number >= 0 ? s.first_number + l : s.number[l];
+      if (q >= 0) history_->end()[c * history_->stride() + static_cast<std::size_t>(q + numbers)] = s.new_state[c * batch_points + static_cast<std::size_t>(l)];
+    }
+}
+
+int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept {
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
@@ -26,11 +52,10 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   if (dP) batch.dH = s.dH;
   batch.dP = dP;
   if (work_ == Work::sample) batch.lateral = s.lateral;
-  if (LawHistory* history = laws_.history()) {
-    batch.history = history->next(s.block, s.cursor, n);
-    if (work_ != Work::force) batch.history.end = nullptr;
-  }
-  return laws_.evaluate(batch, s.law).inadmissible;
+  if (history_) batch.state = begin_state(n, s, numbers);
+  const int bad = laws_.evaluate(batch, s.law).inadmissible;
+  if (history_ && bad < 0) end_state(n, s, numbers);
+  return bad;
 }
 
 namespace {
@@ -47,10 +72,11 @@ double weighted_energy(int n, const double* weight, const double* psi) noexcept 
 
 }  // namespace
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept {
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P,
+                    double* energy) const noexcept {
   const int d = dimension(laws_.space());
   const bool tangent = work_ == Work::tangent;
-  const int bad = evaluate_laws(n, s, points, tangent ? nullptr : P, tangent ? P : nullptr);
+  const int bad = evaluate_laws(n, s, points, numbers, tangent ? nullptr : P, tangent ? P : nullptr);
   if (bad >= 0) return bad;
   if (energy_) *energy += weighted_energy(n, weight, s.psi);
   if (work_ == Work::sample) return -1;
@@ -68,7 +94,14 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
   selective_map(laws_.space(), batch, s.H, s.dH);
   if (ends == 2 && !laws_.single()) std::copy_n(s.far, lanes, s.owner + lanes);
-  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, s.P, tangent ? s.other : nullptr);
+  if (ends == 2 && history_) {
+    for (int l = 0; l < lanes; ++l) {
+      if (s.first_number >= 0) s.number[l] = s.first_number + l;
+      s.number[lanes + l] = s.number[l] < 0 ? -1 : s.number[l] + s.far_number;
+    }
+    s.first_number = -1;
+  }
+  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
   if (bad >= 0) return bad % lanes;
   if (energy_) {
     *energy += weighted_energy(n, s.weight, s.psi);
@@ -82,7 +115,7 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
-  if (!both_ends) return pass(n, s, owners, s.weight, s.P, energy);
+  if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
   bool differ = false;
   if (laws_.single()) {
@@ -97,9 +130,9 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
       }
     }
   }
-  int bad = pass(n, s, owners, s.weight, s.P, energy);
+  int bad = pass(n, s, owners, 0, s.weight, s.P, energy);
   if (bad >= 0 || !differ) return bad;
-  bad = pass(n, s, s.far, s.far_weight, s.other, energy);
+  bad = pass(n, s, s.far, s.far_number, s.far_weight, s.other, energy);
   const int d = dimension(laws_.space());
   for (int c = 0; c < d * d; ++c)
     for (int l = 0; l < n; ++l) s.P[c * batch_points + l] += s.other[c * batch_points + l];

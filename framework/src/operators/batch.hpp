@@ -1,15 +1,16 @@
 #pragma once
-/// One batch of evaluation points on its way through the law: H -> W P (forces), H, dH -> -W A : dH (tangent), or sums of point
-/// averages (sample). Shared by every engine.
+/// What is done to evaluation points, once for all spaces and both maps. A batch of them on its way through the law:
+/// H -> W P (forces), H, dH -> -W A : dH (tangent), or sums of point averages (sample), with the history of laws that have one.
 
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
 
-#include "perikit/core/parallel.hpp"
-#include "perikit/operators/laws.hpp"
 #include "maps/selective_map.hpp"
+#include "perikit/core/parallel.hpp"
+#include "perikit/operators/law_history.hpp"
+#include "perikit/operators/laws.hpp"
 
 namespace perikit {
 
@@ -45,7 +46,12 @@ struct BatchScratch {
   std::int32_t owner[batch_points];
   std::int32_t far[batch_points];
   LawScratch law;
-  std::size_t block = 0, cursor = 0;             ///< where history is kept: the block, and its lanes so far
+  // Laws with history: the stable numbers of the lanes, to be filled in by the space where history is kept.
+  std::int64_t first_number = -1;                ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
+  std::int64_t number[batch_points];             ///< by lane; -1: fresh, and not kept
+  std::int64_t far_number = 0;                   ///< added where a bond is evaluated for its far end
+  bool keep_history = true;                      ///< false: another block keeps that of these lanes
+  AlignedVector<double> old_state, new_state;    ///< gathered, [component][lane]
 };
 
 /// Sums over lanes of sampled quantities go here, one row per owner.
@@ -64,13 +70,7 @@ class ScratchPool {
  public:
   /// Before a parallel loop: memory for every thread, with room for the constants of the laws.
   void prepare(const Laws& laws);
-  /// The memory of this thread, at the beginning of a block of batches.
-  BatchScratch& begin_block(std::size_t block) noexcept {
-    BatchScratch& s = *scratch_[static_cast<std::size_t>(thread_index())];
-    s.block = block;
-    s.cursor = 0;
-    return s;
-  }
+  BatchScratch& mine() noexcept { return *scratch_[static_cast<std::size_t>(thread_index())]; }
   std::size_t bytes() const noexcept { return scratch_.size() * sizeof(BatchScratch); }
 
  private:
@@ -79,10 +79,14 @@ class ScratchPool {
 
 class BatchWork {
  public:
-  BatchWork(const Laws& laws, Work work, bool energy, bool selective) : laws_(laws), work_(work), energy_(energy), selective_(selective) {}
+  /// history: null where no law has one.
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history)
+      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
+  /// Whether the numbers of lanes are asked for.
+  bool history() const noexcept { return history_ != nullptr; }
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
@@ -93,14 +97,19 @@ class BatchWork {
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
  private:
-  int pass(int n, BatchScratch& s, const std::int32_t* points, const double* weight, double* P, double* energy) const noexcept;
+  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, double* energy) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
-  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, double* P, double* dP) const noexcept;
+  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
+  /// Of the lanes of a batch; their numbers plus `numbers`.
+  LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
+  void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
+  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && history_->time_step() > 0 && s.keep_history; }
 
   const Laws& laws_;
   Work work_;
   bool energy_;
   bool selective_;
+  LawHistory* history_;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.

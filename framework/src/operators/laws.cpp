@@ -8,7 +8,6 @@ Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std
     : space_(space), records_(std::move(records)), ids_(ids), stride_(stride),
       single_(ids.empty() && records_.front().uniform) {
   for (const MaterialRecord& record : records_) state_ = std::max(state_, record.material->state_components(space));
-  if (state_ > 0) history_ = std::make_unique<LawHistory>(state_);
 }
 
 bool Laws::constant_tangent() const noexcept {
@@ -52,12 +51,10 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.dP = batch.dP;
   call.A = batch.A;
   call.lateral = batch.lateral;
-  if (history_) {
-    call.time_step = history_->time_step();
-    call.state_old = batch.history.begin;
-    call.state_new = batch.history.end;
-    call.state_stride = batch.history.stride;
-  }
+  call.time_step = batch.state.time_step;
+  call.state_old = batch.state.begin;
+  call.state_new = batch.state.end;
+  call.state_stride = batch.state.stride;
   call.constants = record.constants.data();
   if (!record.uniform) {
     const auto count = static_cast<std::size_t>(record.traits.constants);
@@ -97,7 +94,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     part.dP = batch.dP ? scratch.dP : nullptr;
     part.lateral = batch.lateral ? scratch.lateral : nullptr;
     part.A = batch.A ? scratch.A.data() : nullptr;
-    part.history.end = batch.history.end ? scratch.history.data() : nullptr;
+    if (batch.state.end) part.state.end = scratch.history.data();   // the state of mixed batches has stride batch_points
     const Status one = evaluate_one(records_[m], part, scratch);
     if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
     const auto keep = [&](double* to, const double* from, int components, std::size_t stride) {
@@ -111,7 +108,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     keep(batch.P, scratch.P, components(), batch_points);
     keep(batch.dP, scratch.dP, components(), batch_points);
     keep(batch.A, scratch.A.data(), components() * components(), batch_points);
-    keep(batch.history.end, scratch.history.data(), records_[m].material->state_components(space_), batch.history.stride);
+    keep(batch.state.end, scratch.history.data(), records_[m].material->state_components(space_), batch.state.stride);
   }
   return status;
 }

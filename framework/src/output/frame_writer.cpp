@@ -4,8 +4,8 @@
 #include <numeric>
 #include <system_error>
 
-#include "output/atomic_file.hpp"
-#include "output/hdf5_file.hpp"
+#include "files/atomic_file.hpp"
+#include "files/hdf5_file.hpp"
 #include "output/result_file.hpp"
 #include "output/xdmf.hpp"
 #include "perikit/core/errors.hpp"
@@ -149,6 +149,10 @@ void FrameWriter::write(double time, std::int64_t step, std::span<const OutputFi
 
 std::int64_t FrameWriter::frames() const noexcept {
   return implementation_->frames;
+}
+
+void write_file_atomically(const std::filesystem::path& file, const std::string& text) {
+  store_atomically(file, std::as_bytes(std::span(text)));
 }
 
 }  // namespace perikit

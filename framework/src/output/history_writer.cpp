@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/output/recorder.hpp"
 

@@ -15,7 +15,7 @@
 #include "output/picture/gnuplot.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/errors.hpp"
-#include "scene/sections.hpp"
+#include "perikit/fields/point_field.hpp"
 
 namespace perikit {
 
@@ -64,11 +64,9 @@ hdf5::Source::Array read_field(const ResultFile& results, const std::string& gro
   std::vector<std::string> known = source.names(group, true);
   for (const char* name : {"volume", "material_id", "id"}) known.emplace_back(name);
   if (std::find(known.begin(), known.end(), field) == known.end()) {
-    const std::vector<std::string> fields = history_parameters().find("quantity")->choices;
-    const bool possible = std::ranges::find(fields, field) != fields.end();
     throw InputError({results.path().string(), 0, 0}, "field",
                      fmt::format("found '{}'; this run has {}{}", field, fmt::join(known, ", "),
-                                 possible ? "; what a run writes stands in its scene: [output] fields" : did_you_mean(field, known)));
+                                 find_point_field(field) ? "; what a run writes stands in its scene: [output] fields" : did_you_mean(field, known)));
   }
   const std::string path = source.contains(group + "/" + field) ? group + "/" + field : "/reference/" + field;
   hdf5::Source::Array array = source.read(path);

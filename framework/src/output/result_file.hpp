@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "output/hdf5_file.hpp"
+#include "files/hdf5_file.hpp"
 
 namespace perikit {
 

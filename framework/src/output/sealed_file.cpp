@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/fingerprint.hpp"
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {

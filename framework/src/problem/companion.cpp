@@ -49,7 +49,9 @@ FamilyLists merged(const FamilyLists& near, const FamilyLists& far, const std::v
 
 }  // namespace
 
-Companion::Companion(const Body& body, const Laws& laws) : body_(body), dimension_(body.dimension()) {
+Companion::Companion(const Families& families, const Laws& laws)
+    : families_(families), body_(families.body()), dimension_(body_.dimension()) {
+  const Body& body = body_;
   for (std::size_t p = 0; p < body.stride(); ++p) {
     if (!body.alive(p)) continue;
     point_.push_back(static_cast<std::int32_t>(p));
@@ -96,8 +98,9 @@ void Companion::find_pattern() {
   lists_ = std::move(whole);
 }
 
-std::vector<double> Companion::shares(std::span<const BondChange> changed) const {
+std::vector<double> Companion::shares() const {
   std::vector<double> share;
+  const std::vector<BondChange> changed = families_.changed();
   if (changed.empty()) return share;
   share.assign(lists_.neighbour.size(), 1.0);
   const auto row = [&](std::int32_t point) { return std::lower_bound(point_.begin(), point_.end(), point) - point_.begin(); };
@@ -108,16 +111,16 @@ std::vector<double> Companion::shares(std::span<const BondChange> changed) const
     if (spring != end && *spring == j)
       share[static_cast<std::size_t>(spring - lists_.neighbour.begin())] = std::max(integrity, least);
   };
-  for (const BondChange& bond : changed) {
+  for (const auto& [bond, integrity] : changed) {
     const std::ptrdiff_t i = row(bond.point), j = row(bond.far);
-    weaken(i, j, bond.integrity);
-    weaken(j, i, bond.integrity);
+    weaken(i, j, integrity);
+    weaken(j, i, integrity);
   }
   return share;
 }
 
-void Companion::assemble(ConstFieldView u, std::span<const BondChange> changed, BlockMatrix& K) const {
-  const std::vector<double> share = shares(changed);
+void Companion::assemble(ConstFieldView u, BlockMatrix& K) const {
+  const std::vector<double> share = shares();
   const std::size_t n = point_.size(), d = static_cast<std::size_t>(dimension_), size = d * d;
   if (!K.has_pattern()) {
     K.dimension = dimension_;

@@ -1,12 +1,11 @@
 #pragma once
 /// A cheap relative of a body's tangent, for preconditioners.
 
-#include <span>
 #include <vector>
 
 #include "perikit/body/body.hpp"
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/families/fracture.hpp"
+#include "families/families.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
@@ -22,16 +21,17 @@ namespace perikit {
 /// bonds between their ends do, to a thousandth: what longer bonds still hold together stays so.
 class Companion {
  public:
-  Companion(const Body& body, const Laws& laws);
-  /// K at u, a pattern of nearest neighbours. changed: bonds that are not whole. Deterministic for any number of threads.
-  void assemble(ConstFieldView u, std::span<const BondChange> changed, BlockMatrix& K) const;
+  Companion(const Families& families, const Laws& laws);
+  /// K at u, a pattern of nearest neighbours, with the bonds as they are. Deterministic for any number of threads.
+  void assemble(ConstFieldView u, BlockMatrix& K) const;
 
  private:
   void find_pattern();
   /// Share of the stiffness that is left, of each spring in the order of lists_; empty where all are whole.
-  std::vector<double> shares(std::span<const BondChange> changed) const;
+  std::vector<double> shares() const;
   double influence(double xi2) const noexcept { return dimension_ == 3 ? 1 : 1 / xi2; }
 
+  const Families& families_;
   const Body& body_;
   int dimension_;
   std::vector<std::int32_t> point_;      ///< field indices of live points, ascending

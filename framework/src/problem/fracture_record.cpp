@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include "families/gradual_failure.hpp"
 #include "problem/snapshot.hpp"
 
 namespace perikit {
 
-bool FractureRecord::update(Model& model, State& state, double time_step, const Motion& motion) {
+bool FractureRecord::update(Terms& terms, State& state, double time_step, const Motion& motion) {
   if (!damage_) return false;
-  if (GradualFailure* const gradual = gradual_failure(damage_->law)) gradual->set_time_step(time_step);
-  const BondUpdate update = model.update_bonds(state.displacement(), motion);
+  const BondUpdate update = terms.update_bonds(state.displacement(), time_step, motion);
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.released;
   if (update.dissipated < 0) {
@@ -38,32 +36,30 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
   return text;
 }
 
-void FractureRecord::write(const Model& model, ByteWriter& out) const {
+void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   out.value(gains_);
   out.value(gained_);
-  const std::vector<BondChange> bonds = model.changed_bonds();
+  const std::vector<BondChange> bonds = terms.changed_bonds();
   out.value(static_cast<std::uint64_t>(bonds.size()));
   for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
-    out.value(b.point);
-    out.value(b.far);
-    out.value(b.bond);
+    out.value(b.bond.point);
+    out.value(b.bond.far);
     out.value(b.integrity);
   }
 }
 
-void FractureRecord::read(Model& model, ByteReader& in) {
+void FractureRecord::read(Terms& terms, ByteReader& in) {
   gains_ = in.value<std::int64_t>();
   gained_ = in.value<double>();
   std::vector<BondChange> bonds;
   for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
     BondChange b;
-    b.point = in.value<std::int32_t>();
-    b.far = in.value<std::int32_t>();
-    b.bond = in.value<std::int64_t>();
+    b.bond.point = in.value<std::int32_t>();
+    b.bond.far = in.value<std::int32_t>();
     b.integrity = in.value<double>();
     bonds.push_back(b);
   }
-  model.restore_bonds(bonds);
+  terms.restore_bonds(bonds);
 }
 
 }  // namespace perikit

@@ -22,7 +22,7 @@ void hold_loose_points(std::span<const BondChange> changed, BlockMatrix& K) {
   const double held = share * sum / static_cast<double>(K.rows() * d);
   std::vector<std::uint8_t> loose(static_cast<std::size_t>(K.point.back()) + 1,
                                   0);  // by point; rows are in ascending order of them
-  for (const BondChange& b : changed) loose[static_cast<std::size_t>(b.point)] = loose[static_cast<std::size_t>(b.far)] = 1;
+  for (const BondChange& b : changed) loose[static_cast<std::size_t>(b.bond.point)] = loose[static_cast<std::size_t>(b.bond.far)] = 1;
   for (std::size_t row = 0; row < K.rows(); ++row)
     for (std::size_t c = 0; c < d && loose[static_cast<std::size_t>(K.point[row])]; ++c) diagonal(row)[c * d + c] += held;
 }

@@ -2,7 +2,7 @@
 #include <span>
 
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/families/fracture.hpp"
+#include "perikit/families/bonds.hpp"
 
 namespace perikit {
 

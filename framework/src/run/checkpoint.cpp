@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "core/fingerprint.hpp"
-#include "output/atomic_file.hpp"
-#include "output/hdf5_file.hpp"
+#include "files/atomic_file.hpp"
+#include "files/hdf5_file.hpp"
 #include "output/sealed_file.hpp"
 #include "scene/scene_differences.hpp"
 

@@ -33,10 +33,10 @@ std::string quiet_summary(const QuietCounts& counts) {
 }  // namespace
 
 std::string RunRecorder::closing(double set_up) const {
-  ModelProblem& problem = simulation_.problem();
+  BodyProblem& problem = simulation_.problem();
   const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(), steps_time = std::max(0.0, spent - output_seconds_);
   const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.body().points_of_all_ranks());
-  std::string text = problem.fracture_summary() + quiet_summary(problem.model().quiet_counts());
+  std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
   text += fmt::format("time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, steps_time,
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (steps > 0) {

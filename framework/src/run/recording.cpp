@@ -9,7 +9,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/problem/motion.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
@@ -47,7 +47,7 @@ std::string earlier_run(const std::filesystem::path& folder) {
   return fmt::format("replaces the results of an earlier run in {}", folder.string());
 }
 
-ReferenceData reference_of(const ModelProblem& problem) {
+ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.body();
   ReferenceData data;
   for (std::size_t p = 0; p < body.points(); ++p) {
@@ -232,7 +232,7 @@ void RunRecorder::write_frame(const StepReport& report) {
 }
 
 void RunRecorder::write_history(const StepReport& report) {
-  ModelProblem& problem = simulation_.problem();
+  BodyProblem& problem = simulation_.problem();
   Energies& energies = problem.state().energies;
   if (simulation_.dynamic()) energies.kinetic = kinetic_energy(problem, problem.state().velocity());
   std::vector<double> row{static_cast<double>(report.step), report.time, report.time_step, energies.strain, energies.kinetic,

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "perikit/run/point_fields.hpp"
+#include "perikit/fields/point_fields.hpp"
 
 namespace perikit {
 

@@ -19,15 +19,15 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
         fmt::format("found with integrator \"{}\", which knows no velocities; allowed: with integrators of dynamic runs",
                     scene_.integrator->type));
   }
-  if (!problem_->model().has_gradients()) refuse_gradients();
+  if (!problem_->terms().has_gradients()) refuse_gradients();
 }
 
 void Simulation::refuse_gradients() const {
   const auto check = [&](const std::string& field, const SourcePosition& position, const std::string& key) {
-    if (!PointFields::needs_gradients(field)) return;
+    if (!find_point_field(field)->of_gradients) return;
     std::vector<std::string> others;
-    for (const std::string& name : PointFields::names())
-      if (!PointFields::needs_gradients(name)) others.push_back(name);
+    for (const PointField& other : point_fields())
+      if (!other.of_gradients) others.push_back(other.name);
     throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
                                                 field, scene_.kinematics->type, fmt::join(others, ", ")));
   };
@@ -41,17 +41,17 @@ void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer)
 
 std::string Simulation::summary() {
   const Body& body = problem_->body();
-  const ModelReport report = problem_->model().report();
+  const ModelReport report = problem_->terms().report();
   std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
     text += fmt::format("warning       {} points have {}\n", report.singular_families,
-                        problem_->model().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
+                        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
-  if (problem_->laws().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
+  if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
     text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
   }
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
@@ -65,13 +65,13 @@ std::string Simulation::summary() {
 }
 
 std::string Simulation::explanation(const Registry& registry) const {
-  std::vector<SkipNote> notes = problem_->model().report().skips;
+  std::vector<SkipNote> notes = problem_->terms().report().skips;
   std::size_t known = 0;
   for (const Kind kind : all_kinds) known += registry.names(kind).size();
   notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
   if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
   if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
-  if (scene_.skip && traits_.dynamic && problem_->model().conservative() && !problem_->laws().history()) {
+  if (scene_.skip && traits_.dynamic && problem_->terms().conservative()) {
     notes.push_back({"parts of the body that no wave has reached", "blocks of points at rest whose families' families are at rest have no forces", "counted in run.log at the end"});
     if (const std::size_t held = problem_->constraints().points_held_at_rest(); held > 0) {
       notes.push_back({"points held at rest", "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
@@ -81,7 +81,9 @@ std::string Simulation::explanation(const Registry& registry) const {
   if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
-  notes.push_back({"fields that nobody asked for", "computed when written", fmt::format("{} of {} point fields", PointFields::names().size() - std::min(PointFields::names().size(), std::max<std::size_t>(scene_.output.fields.size(), 3)), PointFields::names().size())});
+  const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
+  notes.push_back({"fields that nobody asked for", "computed when written",
+                   fmt::format("{} of {} point fields", fields - std::min(fields, written), fields)});
   std::string text = "skipped:\n";
   for (const SkipNote& note : notes) text += fmt::format("  {}: {} - saves {}\n", note.what, note.why, note.saves);
   return text;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "output/history_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"

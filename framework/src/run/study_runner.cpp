@@ -14,7 +14,7 @@
 #include <span>
 #include <sstream>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
 
@@ -82,9 +82,9 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     const auto start = clock::now();
     Simulation simulation(scene, parts);
     outcome.measures["set_up_time"] = seconds(clock::now() - start);
-    ModelProblem& problem = simulation.problem();
+    BodyProblem& problem = simulation.problem();
     outcome.measures["points"] = static_cast<double>(problem.body().points_of_all_ranks());
-    outcome.measures["bonds"] = static_cast<double>(problem.model().report().bonds);
+    outcome.measures["bonds"] = static_cast<double>(problem.terms().report().bonds);
     outcome.measures["memory"] = static_cast<double>(problem.bytes());
     RunRecorder recorder(simulation, folder, false);
     recorder.log(simulation.summary());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "perikit/fields/point_field.hpp"
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml_text.hpp"
@@ -139,7 +140,7 @@ void SceneReader::read_history(const toml::table& output) {
       columns.push_back(name);
     }
     if (values.has("quantity")) {
-      const std::vector<std::string> allowed = field_components(description.quantity, reader_.dimension);
+      const std::vector<std::string> allowed = find_point_field(description.quantity)->components(reader_.dimension);
       const bool known = std::find(allowed.begin(), allowed.end(), description.component) != allowed.end();
       if (allowed.empty() && values.has("component")) {
         refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", description.component,

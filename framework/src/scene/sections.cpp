@@ -1,5 +1,6 @@
 #include "scene/sections.hpp"
 
+#include "perikit/fields/point_field.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -7,22 +8,6 @@ namespace perikit {
 namespace {
 
 constexpr auto unbounded = std::numeric_limits<std::size_t>::max();
-
-const std::vector<std::string> point_fields{"displacement",
-                                            "velocity",
-                                            "acceleration",
-                                            "internal_force",
-                                            "external_force",
-                                            "reaction",
-                                            "strain_energy_density",
-                                            "deformation_gradient",
-                                            "first_piola",
-                                            "cauchy",
-                                            "von_mises",
-                                            "jacobian",
-                                            "damage",
-                                            "shape_tensor_condition",
-                                            "material_id"};
 
 }  // namespace
 
@@ -160,7 +145,7 @@ ParameterTable output_parameters() {
            "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if "
            "any).")
       .length(1, unbounded)
-      .choices = point_fields;
+      .choices = point_field_names();
   table.at_most_of(1, {"frames", "every", "times"});
   return table;
 }
@@ -169,7 +154,7 @@ ParameterTable history_parameters() {
   ParameterTable table;
   table.string("name", "Name of the column.").require();
   table.string("set", "The points that are sampled.").by_default("\"all\"");
-  table.choice("quantity", point_fields, "A point field.").require();
+  table.choice("quantity", point_field_names(), "A point field.").require();
   table.string("component", "Component of a vector (x) or tensor (xy).");
   table
       .choice("reduce", {"mean", "sum", "min", "max", "fit", "error"},
@@ -200,19 +185,6 @@ ParameterTable common_part_parameters(Kind kind) {
     table.boolean("gradual", "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.").by_default("false");
   }
   return table;
-}
-
-std::vector<std::string> field_components(std::string_view field, int dimension) {
-  if (field == "deformation_gradient" || field == "first_piola" || field == "cauchy") {
-    return {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};
-  }
-  for (std::string_view vector : {"displacement", "velocity", "acceleration", "internal_force", "external_force", "reaction"}) {
-    if (field != vector) continue;
-    std::vector<std::string> axes{"x", "y", "z"};
-    axes.resize(static_cast<std::size_t>(dimension > 0 ? dimension : 3));
-    return axes;
-  }
-  return {};
 }
 
 const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {

@@ -24,7 +24,4 @@ ParameterTable run_parameters();
 /// Keys that the framework adds to every part of a kind at the top level: stabilization, no_fail, gradual.
 ParameterTable common_part_parameters(Kind kind);
 
-/// The components of a point field that history may ask for, none for scalars.
-std::vector<std::string> field_components(std::string_view field, int dimension);
-
 }  // namespace perikit

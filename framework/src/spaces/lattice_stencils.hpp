@@ -14,20 +14,23 @@ class LatticeStencils {
   /// Reproducing-kernel gradients of this order, lower where a family does not support it.
   LatticeStencils(const LatticeFamilies& families, int order);
 
+  /// The pattern of this chunk has changed.
+  void renew(const LatticeChunk& chunk);
   /// H at the points of the chunk.
   void gradient(const LatticeChunk& chunk, ConstFieldView u, FieldView H) const noexcept;
   /// f += G^T S for the stress S at the points of the chunk; writes live points of their families only.
   void adjoint(const LatticeChunk& chunk, ConstFieldView S, FieldView f) const noexcept;
-  /// Points of a lower order than asked for.
+  /// Points of a lower order than asked for, at the set-up.
   std::size_t fallbacks() const noexcept { return fallbacks_; }
   std::size_t bytes() const noexcept { return g_.size() * sizeof(double); }
 
  private:
-  const double* stencil(const LatticeChunk& chunk) const noexcept {
-    return g_.data() + static_cast<std::size_t>(chunk.pattern + 1) * stencil_size_;
-  }
+  /// Stores the stencils of the chunk's pattern. Returns how many of its points have a lower order.
+  std::size_t make(const LatticeChunk& chunk);
+  std::size_t place(const LatticeChunk& chunk) const noexcept { return static_cast<std::size_t>(chunk.pattern + 1) * stencil_size_; }
 
   const LatticeFamilies& f_;
+  int order_;
   std::size_t stencil_size_;
   AlignedVector<double> g_;  ///< [whole, patterns ...][slot][e][lane]
   std::size_t fallbacks_ = 0;

@@ -3,36 +3,9 @@
 #include <algorithm>
 
 #include "perikit/core/simd.hpp"
-#include "families/reproducing_kernel.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
-
-void FamilyArrays::resize(int d, int n) {
-  dimension = d;
-  bonds = n;
-  size = padded(static_cast<std::size_t>(n));
-  const auto pad = [&](AlignedVector<double>& v, double rest) {
-    v.resize(size);
-    std::fill(v.begin() + n, v.end(), rest);
-  };
-  for (int c = 0; c < d; ++c) pad(xi[c], 1.0);
-  pad(length, 1.0);
-  pad(volume, 0.0);
-  pad(omega, 0.0);
-}
-
-FamilyView FamilyArrays::view(double horizon) const noexcept {
-  return {dimension,
-          bonds,
-          horizon,
-          {xi[0].data(), dimension > 1 ? xi[1].data() : nullptr, dimension > 2 ? xi[2].data() : nullptr},
-          length.data(),
-          volume.data(),
-          omega.data(),
-          inverse_shape,
-          0};
-}
 
 namespace {
 
@@ -216,7 +189,7 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
   lever_.resize(D * row_);
   if (rules.at_points()) {
     std::vector<double> g;
-    fallbacks_ = reproducing_kernel(family, rules.horizon, rules.formulation->order, g) < rules.formulation->order;
+    fallbacks_ = point_gradient(family, rules.horizon, rules.formulation->order, g) < rules.formulation->order;
     std::fill(lever_.begin(), lever_.end(), 0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
       for (std::size_t e = 0; e < D; ++e) lever_[e * row_ + k] = g[k * D + e];
@@ -231,10 +204,7 @@ void LocalStencil<D>::weigh(const StencilRules& rules, const FamilyArrays& famil
   FamilyView view = family.view(rules.horizon);
   if (family.integrity.empty()) return rules.formulation->weighted->weights(view, rows, row_);
   // Weakened bonds: the influence is that of whole ones, times b, however a kinematics makes use of omega.
-  whole_.assign(row_, 0.0);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
-    if (family.integrity[k] > 0) whole_[k] = family.omega[k] / family.integrity[k];
-  view.omega = whole_.data();
+  view.omega = family.whole.data();
   rules.formulation->weighted->weights(view, rows, row_);
   for (int q = rules.formulation->selective() ? 1 : 0; q < points_; ++q, rows += row_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k) rows[k] *= family.integrity[k];
@@ -242,7 +212,7 @@ void LocalStencil<D>::weigh(const StencilRules& rules, const FamilyArrays& famil
 
 template <int D>
 void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields,
-                            const double* const (*u)[D]) {
+                            const double* const (*u)[D], double family_volume) {
   bonds_ = family.bonds;
   row_ = family.size;
   fallbacks_ = dropped_ = 0;
@@ -304,13 +274,27 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
       total += share;
     }
   }
-  if (by_bond) return;
+  tested_.clear();
+  if (by_bond) return rules.local() ? set_tested(family, family_volume, first) : void();
   if (!(total > 0)) {
     ++fallbacks_;
     use_family(first);
     share_[static_cast<std::size_t>(first)] = total = 1.0;
   }
   for (double& share : share_) share /= total;
+}
+
+template <int D>
+void LocalStencil<D>::set_tested(const FamilyArrays& family, double family_volume, int first) {
+  tested_.assign(static_cast<std::size_t>(bonds_), 0.0);
+  for (std::size_t q = 0; q < tested_.size(); ++q) {
+    const double* row = omega_.data() + (q + static_cast<std::size_t>(first)) * row_;
+    double volume = 0;
+    for (std::size_t k = 0; k < tested_.size(); ++k)
+      if (family.omega[k] > 0) volume += row[k] / family.omega[k] * family.volume[k];
+    const double share = share_[q + static_cast<std::size_t>(first)];
+    tested_[q] = share > 0 ? volume / family_volume / share : 0.0;
+  }
 }
 
 template <int D>
@@ -348,9 +332,16 @@ template <int D>
 void LocalStencil<D>::adjoint(double* const (&t)[D]) noexcept {
   constexpr std::size_t pack = pack_width;
   std::size_t k = 0;
+  // Of local force states only the owner's own gradient (selective map) acts through all bonds.
+  const int points = tested_.empty() ? points_ : points_ - bonds_;
   for (; k + 2 * pack <= row_; k += 2 * pack)
-    adjoint_tile<D, 2>(omega_.data(), row_, points_, stress_.data(), lanes_, lever_.data(), t, k);
-  for (; k < row_; k += pack) adjoint_tile<D, 1>(omega_.data(), row_, points_, stress_.data(), lanes_, lever_.data(), t, k);
+    adjoint_tile<D, 2>(omega_.data(), row_, points, stress_.data(), lanes_, lever_.data(), t, k);
+  for (; k < row_; k += pack) adjoint_tile<D, 1>(omega_.data(), row_, points, stress_.data(), lanes_, lever_.data(), t, k);
+  for (std::size_t b = 0; b < tested_.size(); ++b) {
+    const std::size_t q = b + static_cast<std::size_t>(points);
+    for (std::size_t c = 0; c < D; ++c)
+      for (std::size_t e = 0; e < D; ++e) t[c][b] += tested_[b] * omega_[q * row_ + b] * stress_[(c * D + e) * lanes_ + q] * lever_[e * row_ + b];
+  }
 }
 
 template <int D>

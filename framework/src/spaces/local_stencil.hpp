@@ -5,31 +5,24 @@
 ///
 /// One number is kept for a pair (q, k), not one vector, and the sums over k for all q are one matrix product: the influence
 /// times the columns (b_k (x) xi_k, u_k (x) b_k). The adjoint is the transposed product with the columns P_q K_q^-1.
+///
+/// Local force states (evaluation points at bonds) test the stress of a bond with that bond alone instead: with w_q the share of the energy,
+///   t_q = (sum of V over the domain of q / sum of V over the family) / w_q  P_q g_qq                    [Partmann et al. 4.20]
 
 #include <cstdint>
 #include <vector>
 
-#include "perikit/core/field.hpp"
+#include "families/family_arrays.hpp"
 #include "perikit/model/formulation.hpp"
 
 namespace perikit {
-
-/// Bonds of one family as arrays, padded; the memory behind a FamilyView.
-struct FamilyArrays {
-  void resize(int dimension, int bonds);
-  FamilyView view(double horizon) const noexcept;
-  int dimension = 3, bonds = 0;
-  std::size_t size = 0;  ///< padded(bonds)
-  AlignedVector<double> xi[3], length, volume, omega;
-  AlignedVector<double> integrity;  ///< b, where bonds are neither whole nor broken: omega holds it already; else empty
-  double inverse_shape[6] = {};
-};
 
 /// What the stencil of any family needs to know.
 struct StencilRules {
   const Formulation* formulation;
   double horizon;
   bool at_points() const noexcept { return formulation->point != nullptr; }  ///< a point gradient of higher order
+  bool local() const noexcept { return formulation->force_state == ForceState::local; }
 };
 
 /// Evaluation points of one point. With the selective map, the owner's own gradient comes first, with no share.
@@ -37,8 +30,10 @@ template <int D>
 class LocalStencil {
  public:
   /// For families that carry up to two `fields` of displacements: u[f][c]: component c of field f relative to the owner, by bond,
-  /// `family.size` long. bond_share: w_ij of each bond, used where evaluation points belong to bonds.
-  void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields, const double* const (*u)[D]);
+  /// `family.size` long. bond_share: w_ij of each bond, used where evaluation points belong to bonds. family_volume: sum of V over the
+  /// uncut family, for local force states.
+  void build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields, const double* const (*u)[D],
+             double family_volume = 0);
 
   int bonds() const noexcept { return bonds_; }
   int points() const noexcept { return points_; }
@@ -51,10 +46,12 @@ class LocalStencil {
   void gradient(int field, int first, int n, double* H, std::size_t stride) const noexcept;
   /// Adds to the stress of these points: columns P_q K_q^-1, zero at first.
   void add_stress(int first, int n, const double* P, std::size_t stride) noexcept;
-  /// t_k = sum_q P_q g_qk by bond, t[c][k], from all stresses.
+  /// t_k = sum_q P_q g_qk by bond, t[c][k], from all stresses; of local force states t_k = tested_k P_k g_kk.
   void adjoint(double* const (&t)[D]) noexcept;
   /// g_qk, all of them: g[(q * bonds + k) * D + e].
   void expand(std::vector<double>& g) const;
+  /// Local force states: the factor of P_q g_qq; empty for others.
+  const std::vector<double>& tested() const noexcept { return tested_; }
 
  private:
   void set_lever(const StencilRules& rules, const FamilyArrays& family);
@@ -67,6 +64,7 @@ class LocalStencil {
   /// K_q^-1 of row q, or of all rows, and whether they are regular: the eigenvalues of K spread by less than 1 / ratio.
   void invert_one(int q, double ratio);
   void invert_all(double ratio);
+  void set_tested(const FamilyArrays& family, double family_volume, int first);
   /// What the eigenvalues of a part's K must not spread beyond: part_ratio times those of the family, or poor_ratio.
   double least_part_ratio(const FamilyArrays& family) const;
 
@@ -81,8 +79,8 @@ class LocalStencil {
   AlignedVector<double> inverse_;  ///< K_q^-1: [entry * lanes_ + q]; 0 where q is dropped
   AlignedVector<double> stress_;   ///< P_q K_q^-1: [component * lanes_ + q]
   AlignedVector<double> share_;
-  AlignedVector<double> whole_;  ///< omega without b
   std::vector<std::uint8_t> regular_;
+  std::vector<double> tested_;
 };
 
 }  // namespace perikit

@@ -110,19 +110,18 @@ MirroredStencil<D>::MirroredStencil(const FamilyArrays& family, const LocalStenc
     : bonds_(family.bonds) {
   std::vector<double> g;
   stencil.expand(g);
-  std::vector<std::int32_t> kept;
   for (int q = 0; q < stencil.points(); ++q) {
     if (q >= owners && stencil.share(q) == 0) continue;
-    kept.push_back(q);
+    kept_.push_back(q);
     shares_.push_back(stencil.share(q));
   }
-  find_mirrors(family, g, kept, owners, by_bond);
-  make_tiles(g, kept);
+  find_mirrors(family, g, owners, by_bond);
+  make_tiles(g);
 }
 
 template <int D>
-void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vector<double>& g,
-                                      const std::vector<std::int32_t>& kept, int owners, bool by_bond) {
+void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vector<double>& g, int owners, bool by_bond) {
+  const std::vector<std::int32_t>& kept = kept_;
   const auto bonds = static_cast<std::size_t>(bonds_), points = kept.size();
   double largest = 0;
   for (const double value : g) largest = std::max(largest, std::abs(value));
@@ -185,7 +184,8 @@ void MirroredStencil<D>::find_mirrors(const FamilyArrays& family, const std::vec
 }
 
 template <int D>
-void MirroredStencil<D>::make_tiles(const std::vector<double>& g, const std::vector<std::int32_t>& kept) {
+void MirroredStencil<D>::make_tiles(const std::vector<double>& g) {
+  const std::vector<std::int32_t>& kept = kept_;
   const auto bonds = static_cast<std::size_t>(bonds_);
   // Orbit and character (in the bits of the orbit) of each coefficient.
   const auto coefficients = [](const MirrorBasis& basis) {

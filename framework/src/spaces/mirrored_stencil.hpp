@@ -56,6 +56,8 @@ class MirroredStencil {
   int bonds() const noexcept { return bonds_; }
   int points() const noexcept { return static_cast<int>(shares_.size()); }
   double share(int q) const noexcept { return shares_[static_cast<std::size_t>(q)]; }
+  /// Which of the stencil's evaluation points it is.
+  int original(int q) const noexcept { return kept_[static_cast<std::size_t>(q)]; }
   const MirrorBasis& bond_basis() const noexcept { return bond_basis_; }
   const MirrorBasis& point_basis() const noexcept { return point_basis_; }
   std::size_t bytes() const noexcept;
@@ -66,13 +68,13 @@ class MirroredStencil {
   void adjoint(const double* m, double* t) const noexcept;
 
  private:
-  void find_mirrors(const FamilyArrays& family, const std::vector<double>& g, const std::vector<std::int32_t>& kept, int owners,
-                    bool by_bond);
-  void make_tiles(const std::vector<double>& g, const std::vector<std::int32_t>& kept);
+  void find_mirrors(const FamilyArrays& family, const std::vector<double>& g, int owners, bool by_bond);
+  void make_tiles(const std::vector<double>& g);
 
   int bonds_;
   bool mirror_[3] = {};
   MirrorBasis bond_basis_, point_basis_;
+  std::vector<std::int32_t> kept_;   ///< evaluation points of the stencil
   std::vector<double> shares_;
   std::vector<StencilTile> tiles_;
   AlignedVector<double> g_;

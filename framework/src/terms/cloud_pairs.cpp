@@ -2,11 +2,10 @@
 /// end is the opposite one). Bond vectors and lengths are recomputed from positions.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
+#include <limits>
 
-#include "families/cloud_bonds.hpp"
+#include "families/cloud_families.hpp"
 #include "families/cloud_rows.hpp"
 #include "terms/pair_loop.hpp"
 
@@ -19,23 +18,18 @@ class CloudPairs final : public PairLoop {
  public:
   explicit CloudPairs(const PairLoopParts& parts);
 
-  void families(const Visit& visit) const override;
-  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
-  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(body_, lists_); }
-  std::size_t blocks() const noexcept override { return cloud_blocks(body_.points()); }
-  PairCounts counts() const noexcept override {
-    return {lists_.neighbour.size(), broken_.size(),
-            lists_.neighbour.size() * 4 + lists_.first.size() * 16 + omega_.size() * 8 + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row) + (bonds_ ? bonds_->bytes() : 0),
-            lists_.neighbour.size() * 8 * (D + 1)};
+  const NearestFailure* watch(double least_onset) override {
+    nearest_.least_onset = least_onset;
+    fails_ = true;
+    return &nearest_;
+  }
+  std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
+  std::size_t bytes() const noexcept override {
+    return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
   std::int64_t run(const PairPass& pass) override;
 
  private:
-  struct BrokenBond {
-    std::size_t point;
-    std::int32_t far;
-    double omega;
-  };
   struct Gathered {
     alignas(64) double xi[3][batch_points];
     alignas(64) double du[3][batch_points];
@@ -49,7 +43,6 @@ class CloudPairs final : public PairLoop {
     alignas(64) double t[3][batch_points];
   };
 
-  void family_of(std::size_t p, std::vector<FamilyBond>& bonds) const;
   /// Each bond once, for both ends.
   bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
   template <PairWork work>
@@ -60,16 +53,16 @@ class CloudPairs final : public PairLoop {
   template <PairWork work>
   void gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept;
 
-  const Body& body_;
+  const CloudFamilies& families_;
+  const FamilyLists& lists_;
   const PairKinematics& law_;
   const PairFields& fields_;
   bool dilatation_, half_;
+  bool fails_ = false;
+  std::size_t points_;
   const Row* position_;                        ///< {x, y, z, V}
-  FamilyLists lists_;                          ///< intact bonds
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
-  AlignedVector<double> omega_;                ///< by bond; empty where the law does not ask
-  std::vector<BrokenBond> broken_;             ///< ascending by point
-  std::optional<CloudBonds> bonds_;            ///< only where damage is on
+  NearestFailure nearest_;                     ///< only where damage is on
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
   AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
@@ -78,87 +71,13 @@ class CloudPairs final : public PairLoop {
 
 template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
-    : body_(parts.body), law_(parts.law), fields_(parts.fields), dilatation_(parts.law.dilatation() != nullptr), half_(parts.half),
-      position_(reinterpret_cast<const Row*>(body_.rows().data())),
-      lists_(find_families(body_.rows(), body_.points(), D, body_.horizon())) {
-  const std::size_t n = body_.points();
-  const bool keep_omega = law_.traits().influence;
-  omega_.resize(keep_omega ? lists_.neighbour.size() : 0);
-  upper_.resize(n);
-  force_.resize(n);
-  std::vector<double> r, omega;
-  std::vector<std::int64_t> first(n + 1, 0);
-  std::int64_t kept = 0;
-  for (std::size_t p = 0; p < n; ++p) {
-    const std::int64_t begin = lists_.first[p], end = lists_.first[p + 1];
-    const Point x = body_.position(p);
-    r.clear();
-    for (std::int64_t k = begin; k < end; ++k) {
-      const Row xi = position_[lists_.neighbour[static_cast<std::size_t>(k)]] - position_[p];
-      r.push_back(std::min(1.0, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]) / body_.horizon()));
-    }
-    omega.resize(r.size());
-    parts.influence.evaluate(r, omega);
-    const bool near_crack = std::any_of(body_.cracks().begin(), body_.cracks().end(), [&](const Crack& c) { return c.near(x, body_.horizon()); });
-    first[p] = kept;
-    upper_[p] = -1;
-    for (std::int64_t k = begin; k < end; ++k) {
-      const std::int32_t j = lists_.neighbour[static_cast<std::size_t>(k)];
-      const double w = omega[static_cast<std::size_t>(k - begin)];
-      if (near_crack && body_.cut(x, body_.position(static_cast<std::size_t>(j)))) {
-        broken_.push_back({p, j, w});
-        continue;
-      }
-      if (upper_[p] < 0 && static_cast<std::size_t>(j) > p) upper_[p] = kept;
-      // Lists shrink in place where bonds are cut.
-      lists_.neighbour[static_cast<std::size_t>(kept)] = j;
-      if (keep_omega) omega_[static_cast<std::size_t>(kept)] = w;
-      ++kept;
-    }
-    if (upper_[p] < 0) upper_[p] = kept;
-  }
-  first[n] = kept;
-  lists_.first = std::move(first);
-  lists_.neighbour.resize(static_cast<std::size_t>(kept));
-  if (keep_omega) omega_.resize(static_cast<std::size_t>(kept));
-  const BlockReach reach = cloud_reach(lists_, n);
+    : families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
+      dilatation_(parts.formulation.dilatation != nullptr), half_(parts.half), points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
+  for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
+  const BlockReach reach = cloud_reach(lists_, points_);
   colouring_ = Colouring(reach);
-  if (parts.quiet) watch(reach);
-}
-
-template <int D>
-void CloudPairs<D>::family_of(std::size_t p, std::vector<FamilyBond>& bonds) const {
-  bonds.clear();
-  const auto add = [&](std::int32_t j, double omega, double integrity) {
-    const Row xi = position_[j] - position_[p];
-    bonds.push_back({{xi[0], xi[1], xi[2]}, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]), omega, position_[j][3], integrity});
-  };
-  for (std::int64_t at = lists_.first[p]; at < lists_.first[p + 1]; ++at) {
-    const auto k = static_cast<std::size_t>(at);
-    add(lists_.neighbour[k], omega_.empty() ? 1.0 : omega_[k], bonds_ ? (*bonds_)[k] : 1.0);
-  }
-  for (auto cut = std::lower_bound(broken_.begin(), broken_.end(), p, [](const BrokenBond& b, std::size_t q) { return b.point < q; });
-       cut != broken_.end() && cut->point == p; ++cut) {
-    add(cut->far, omega_.empty() ? 1.0 : cut->omega, 0.0);
-  }
-}
-
-template <int D>
-void CloudPairs<D>::families(const Visit& visit) const {
-  std::vector<FamilyBond> bonds;
-  for (std::size_t p = 0; p < body_.points(); ++p) {
-    family_of(p, bonds);
-    visit(bonds, {static_cast<std::int32_t>(p)});
-  }
-}
-
-template <int D>
-void CloudPairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
-  std::vector<FamilyBond> bonds;
-  for (const std::int32_t p : points) {
-    family_of(static_cast<std::size_t>(p), bonds);
-    visit(bonds, {p});
-  }
+  if (parts.quiet) watch_waves(reach);
 }
 
 template <int D>
@@ -171,7 +90,7 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     const auto k = static_cast<std::size_t>(begin + l);
     const auto j = static_cast<std::size_t>(lists_.neighbour[k]);
     // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
-    const double b = bonds_ ? (*bonds_)[k] : 1.0;
+    const double b = families_.b(k);
     const Row far = position_[j], xi = far - x, du = b > 0 ? u_[j] - own : Row{};
     double square = 0;
     for (int c = 0; c < D; ++c) {
@@ -181,8 +100,8 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     }
     g.length[l] = square;
     g.far_volume[l] = b * far[3];
-    if (bonds_) g.integrity[l] = b;
-    g.omega[l] = omega_.empty() ? 1.0 : omega_[k];
+    if (fails_) g.integrity[l] = b;
+    g.omega[l] = families_.whole_omega(k);
     if constexpr (rate) {
       const Row dw = w_[j] - own_w;
       for (int c = 0; c < D; ++c) g.dw[c][l] = dw[c];
@@ -227,7 +146,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   Row own{};
   double own_sum = 0, stored = 0;
   bool finite = true;
-  const Pack onset(bonds_ ? bonds_->nearest().least_onset : 0.0);
+  const Pack onset(nearest_.least_onset);
   Pack excess(-std::numeric_limits<double>::max());
   for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < lists_.first[p + 1]; begin += batch_points) {
     const int n = static_cast<int>(std::min<std::int64_t>(batch_points, lists_.first[p + 1] - begin));
@@ -243,7 +162,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       const Pack length = Pack::load(g.length + l);
       const Stretch<D> bond(xi, length, du);
       finite = finite && all(bond.e == bond.e);
-      if (work == PairWork::force && bonds_) excess = max(excess, bond.e - onset * length);
+      if (work == PairWork::force && fails_) excess = max(excess, bond.e - onset * length);
       bond.e.store(s.e + l);
       for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
@@ -253,7 +172,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     if constexpr (sums) {
       for (int l = 0; l < n; ++l) {
         own_sum += g.t[0][l] * g.far_volume[l];
-        if (half) pass.out.data[far_point(l)] += g.t[0][l] * (bonds_ ? g.integrity[l] * volume : volume);
+        if (half) pass.out.data[far_point(l)] += g.t[0][l] * (fails_ ? g.integrity[l] * volume : volume);
       }
       continue;
     }
@@ -286,10 +205,10 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (half) force_[far_point(l)] -= t;
     }
   }
-  if (work == PairWork::force && bonds_) {
+  if (work == PairWork::force && fails_) {
     alignas(64) double lanes[pack_width];
     excess.store(lanes);
-    bonds_->nearest().excess[p] = *std::max_element(lanes, lanes + pack_width);
+    nearest_.excess[p] = *std::max_element(lanes, lanes + pack_width);
   }
   if constexpr (sums) pass.out.data[p] += own_sum;
   else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored;
@@ -302,7 +221,7 @@ template <int D>
 template <PairWork work>
 void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
   double energy = 0;
-  for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p) {
+  for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
     if (pass.only && !pass.only[p / padding]) continue;
     if (run_point<work>(p, pass, energy)) continue;
     report_bad(static_cast<std::int64_t>(p));
@@ -314,18 +233,18 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
 template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
-  look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, body_.points()); });
+  look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
-  mirror_rows(pass.u, body_.points(), u_);
-  if (bonds_) {
-    bonds_->nearest().u = nullptr;
-    bonds_->nearest().excess.resize(body_.points());
+  mirror_rows(pass.u, points_, u_);
+  if (fails_) {
+    nearest_.u = nullptr;
+    nearest_.excess.resize(points_);
   }
-  if (pass.w.data) mirror_rows(pass.w, body_.points(), w_);
-  if (fields_.modulus.size() > 0) moduli_.resize(body_.points());
+  if (pass.w.data) mirror_rows(pass.w, points_, w_);
+  if (fields_.modulus.size() > 0) moduli_.resize(points_);
   const auto over_points = [&](auto&& body) {
     parallel_for(blocks(), [&](std::size_t b) {
-      for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p) body(p);
+      for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) body(p);
     });
   };
   over_points([&](std::size_t p) {
@@ -337,7 +256,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
       row[3] = fields_.modulus.data()[p];
       moduli_[p] = row;
     }
-    if (pass.work == PairWork::force && bonds_) bonds_->nearest().excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
+    if (pass.work == PairWork::force && fails_) nearest_.excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
     if (vectors) force_[p] = Row{};
     else pass.out.data[p] = 0;
   });
@@ -353,10 +272,10 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   };
   if (at_once(pass)) colouring_.for_each(block);
   else parallel_for(blocks(), block);
-  if (pass.work == PairWork::force && bonds_ && bad() < 0) bonds_->nearest().u = &u_;
+  if (pass.work == PairWork::force && fails_ && bad() < 0) nearest_.u = &u_;
   if (vectors && bad() < 0) {
     over_points([&](std::size_t p) {
-      for (int c = 0; c < D; ++c) pass.out.component(c)[p] = force_[p][c];
+      for (int c = 0; c < D; ++c) pass.out.component(c)[p] += force_[p][c];
     });
   }
   return bad();

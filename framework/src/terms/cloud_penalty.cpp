@@ -2,10 +2,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "spaces/cloud_model.hpp"
-#include "families/family_point.hpp"
+#include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
 #include "families/quiet_blocks.hpp"
+#include "spaces/cloud_gradient.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
 namespace perikit {
@@ -20,24 +20,24 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   using Column = std::conditional_t<isotropic, double, Row>;
 
  public:
-  CloudPenalty(const ModelParts& parts, const CloudModel<D>& model)
-      : model_(model),
-        families_(model.families()),
-        position_(reinterpret_cast<const Row*>(parts.body->rows().data())),
-        points_(parts.body->points()),
-        parts_(parts),
+  explicit CloudPenalty(const PenaltyParts& parts)
+      : ZeroEnergyPenalty(parts),
+        families_(*parts.families.cloud()),
+        gradient_(families_),
+        position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
+        points_(families_.body().points()),
         M_(columns * points_, Column{}),
         flux_(D * points_) {
-    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists, points_));
+    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists(), points_));
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
     mirror_rows(u, points_, u_);
     std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
     quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
     over_points([&](std::size_t b) { return quiet_.begins(b); }, [&](std::size_t p) {
-      model_.gradient_rows(p, u_, flux_);
+      gradient_.at(p, u_, &flux_[D * p]);
       if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
       for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
     });
@@ -52,7 +52,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     mirror_rows(u, points_, u_);
     quiet_.wake();
     over_points(everywhere, [&](std::size_t p) {
-      model_.gradient_rows(p, u_, flux_);
+      gradient_.at(p, u_, &flux_[D * p]);
       density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
     });
   }
@@ -63,7 +63,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     double energy = 0;
     for (std::size_t p = 0; p < points_; ++p) {
       if (!marks[p / padding]) continue;
-      model_.gradient_rows(p, u_, flux_);
+      gradient_.at(p, u_, &flux_[D * p]);
       energy += energy_of_point(p, &flux_[D * p]);
     }
     return energy;
@@ -88,14 +88,12 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   }
 
   void set_matrix(std::size_t p) {
-    const double* inverse = &families_.inverse[6 * p];
+    const double* inverse = families_.inverse_shape(p);
     std::fill_n(&M_[columns * p], columns, Column{});
-    if (!penalised(families_.condition.data()[p])) return;  // M = 0
+    if (!penalised(families_.condition(p))) return;  // M = 0
     double intact = 0, M[6];
     for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
-    const double damage = families_.damage.data()[p];
-    parts_.stabilization->penalty(penalty_point(*parts_.body, *parts_.laws, p, intact, damage, families_.normaliser[p], inverse),
-                                  M);
+    parts_.stabilization->penalty(penalty_point(families_, parts_.laws, p, intact, inverse), M);
     if constexpr (isotropic) {
       M_[p] = M[0];
     } else {
@@ -107,8 +105,9 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   /// use(j, omega_pj) for the intact bonds of p.
   template <class Use>
   void for_bonds(std::size_t p, Use&& use) const noexcept {
-    for (std::int64_t k = families_.lists.first[p]; k < families_.lists.first[p + 1]; ++k)
-      use(static_cast<std::size_t>(families_.lists.neighbour[static_cast<std::size_t>(k)]), families_.omega[static_cast<std::size_t>(k)]);
+    const double* omega = families_.omegas();
+    for (std::int64_t k = families_.lists().first[p]; k < families_.lists().first[p + 1]; ++k)
+      use(static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(k)]), omega[k]);
   }
 
   Row times(std::size_t p, Row x) const noexcept {
@@ -160,11 +159,10 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     return f;
   }
 
-  const CloudModel<D>& model_;
   const CloudFamilies& families_;
+  CloudGradient<D> gradient_;
   const Row* position_;          ///< {x, y, z, V}
   std::size_t points_;
-  ModelParts parts_;
   AlignedVector<Column> M_;
   AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns
   QuietBlocks quiet_;
@@ -173,13 +171,13 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 }  // namespace
 
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model) {
-  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<CloudPenalty<D, true>>(parts, model);
-  return std::make_unique<CloudPenalty<D, false>>(parts, model);
+std::unique_ptr<Term> make_cloud_penalty(const PenaltyParts& parts) {
+  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<CloudPenalty<D, true>>(parts);
+  return std::make_unique<CloudPenalty<D, false>>(parts);
 }
 
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<1>(const ModelParts&, const CloudModel<1>&);
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<2>(const ModelParts&, const CloudModel<2>&);
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<3>(const ModelParts&, const CloudModel<3>&);
+template std::unique_ptr<Term> make_cloud_penalty<1>(const PenaltyParts&);
+template std::unique_ptr<Term> make_cloud_penalty<2>(const PenaltyParts&);
+template std::unique_ptr<Term> make_cloud_penalty<3>(const PenaltyParts&);
 
 }  // namespace perikit

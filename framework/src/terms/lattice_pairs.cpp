@@ -1,12 +1,11 @@
 /// Pair laws on a lattice: packs of contiguous points against their neighbours at one offset, offsets +d only (the force at
 /// the far end is the opposite one), slot by slot, with nothing stored by bond.
 
-#include <array>
 #include <cmath>
 #include <cstring>
-#include <optional>
+#include <vector>
 
-#include "families/lattice_bonds.hpp"
+#include "families/lattice_families.hpp"
 #include "terms/pair_loop.hpp"
 
 namespace perikit {
@@ -19,41 +18,25 @@ template <int D>
 class LatticePairs final : public PairLoop {
  public:
   explicit LatticePairs(const PairLoopParts& parts)
-      : law_(parts.law), fields_(parts.fields), dilatation_(parts.law.dilatation() != nullptr), half_(parts.half),
-        families_(parts.body, parts.influence, BondWeight::volume), squared_volume_(families_.volume * families_.volume) {
-    if (parts.quiet) watch(families_.reach);
-    for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
-      const auto xi = families_.bond(s);
-      const double length = std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
-      std::array<double, D> bond;
-      for (std::size_t c = 0; c < D; ++c) bond[c] = xi[c];
-      xi_.push_back(bond);
-      length_.insert(length_.end(), chunk_points, length);
-      omega_.insert(omega_.end(), chunk_points, law_.traits().influence ? families_.omega[s] : 1.0);
+      : law_(*parts.formulation.pairs), fields_(parts.fields), dilatation_(parts.formulation.dilatation != nullptr), half_(parts.half),
+        families_(*parts.families.lattice()), squared_volume_(families_.volume * families_.volume) {
+    if (parts.quiet) watch_waves(families_.tiles.reach);
+    for (std::size_t s = 0; s < families_.slots.size(); ++s) {
+      const auto& xi = families_.slots.xi[s];
+      length_.insert(length_.end(), chunk_points, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]));
+      omega_.insert(omega_.end(), chunk_points, families_.slots.omega[s]);
     }
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
   }
 
-  void families(const Visit& visit) const override;
-  void families_of(std::span<const std::int32_t> points, const Visit& visit) const override;
-  BondState& bond_state() override { return bonds_ ? *bonds_ : bonds_.emplace(families_); }
-  std::size_t blocks() const noexcept override { return families_.blocks.size(); }
-  PairCounts counts() const noexcept override {
-    return {families_.bonds, families_.broken - families_.failed, families_.bytes(), families_.bonds * (4 + 8 * (D + 2))};
-  }
+  std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
+  std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
-    look(pass, [&](std::size_t b) { return families_.moves(b, pass.u); });
-    if (!pass.only) parallel_for(blocks(), [&](std::size_t b) {
-      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r) {
-        const LatticeRow& row = families_.rows[r];
-        for (int c = 0; c < pass.out.components; ++c) {
-          std::memset(pass.out.component(c) + row.first, 0, sizeof(double) * static_cast<std::size_t>(row.chunks) * chunk_points);
-        }
-      }
-    });
+    look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); });
+    if (!pass.only && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
     auto block = [&](std::size_t b) {
       if (!awake(b)) return;
       switch (pass.work) {
@@ -64,7 +47,7 @@ class LatticePairs final : public PairLoop {
         case PairWork::energy: return run_block<PairWork::energy>(b, pass);
       }
     };
-    if (at_once(pass)) families_.colouring.for_each(block);
+    if (at_once(pass)) families_.tiles.colouring.for_each(block);
     else parallel_for(blocks(), block);
     return bad();
   }
@@ -75,10 +58,10 @@ class LatticePairs final : public PairLoop {
 
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass) {
-    const LatticeBlock& block = families_.blocks[b];
+    const LatticeBlock& block = families_.tiles.blocks[b];
     double energy = 0;
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
-      const LatticeChunk& chunk = families_.chunks[c];
+      const LatticeChunk& chunk = families_.tiles.chunks[c];
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
         for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
@@ -95,15 +78,11 @@ class LatticePairs final : public PairLoop {
   template <PairWork work, bool half>
   int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
 
-  void family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const;
-
   const PairKinematics& law_;
   const PairFields& fields_;
   bool dilatation_, half_;
-  LatticeFamilies families_;
-  std::optional<LatticeBonds> bonds_;
+  const LatticeFamilies& families_;
   double squared_volume_;
-  std::vector<std::array<double, D>> xi_;      ///< by slot, input axes
   AlignedVector<double> length_, omega_;       ///< by slot, one value a lane
 };
 
@@ -114,8 +93,9 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   constexpr int packs = chunk_points / pack_width, results = sums || work == PairWork::energy ? 1 : D;
   const LatticePattern& pattern = families_.pattern(chunk);
+  const bool weakened = !pattern.integrity.empty();   // some b lies between 0 and 1: it weighs all that its bond does
   const std::int64_t p = chunk.first;
-  const std::size_t slots = half ? families_.half : families_.offsets.size();
+  const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
   const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
   const bool uniform = fields_.modulus.size() == 0;
   alignas(64) PairScratch s;
@@ -136,7 +116,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     // Bonds: extension and direction, kept for the second half of the work.
     for (int k = 0; k < count; ++k) {
       const std::size_t at = slot + static_cast<std::size_t>(k);
-      const std::int64_t far = p + families_.shifts[at];
+      const std::int64_t far = p + families_.slots.shifts[at];
       const std::uint8_t mask = pattern.mask[at];
       if (mask == 0) {
         for (int lane = k * chunk_points; lane < (k + 1) * chunk_points; lane += pack_width) {
@@ -146,7 +126,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         continue;
       }
       Pack xi[D];
-      for (int c = 0; c < D; ++c) xi[c] = Pack(xi_[at][static_cast<std::size_t>(c)]);
+      for (int c = 0; c < D; ++c) xi[c] = Pack(families_.slots.xi[at][static_cast<std::size_t>(c)]);
       for (int v = 0; v < packs; ++v) {
         const int l = v * pack_width, lane = k * chunk_points + l;
         const auto bits = static_cast<std::uint8_t>(mask >> l);
@@ -163,7 +143,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         const Stretch<D> bond(xi, length, du);
         finite[v] &= bond.e == bond.e;
         if constexpr (sums) {
-          const Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          if (weakened) term *= pattern.b_pack(at, l);
           own[0][v] += term;
           if constexpr (half) {
             double* target = pass.out.data + far + l;
@@ -182,7 +163,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
             if (fields_.correction.size() > 0) {
               Pack g(0.0);
               for (int a = 0; a < D; ++a) {
-                const double cosine = xi_[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
+                const double cosine = families_.slots.xi[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
                 const double* G = fields_.correction.component(a);
                 g += Pack(0.5 * cosine * cosine) * (Pack::load(G + p + l) + Pack::load(G + far + l));
               }
@@ -199,13 +180,14 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
                      energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
       for (int k = 0; k < count; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
-        const std::int64_t far = p + families_.shifts[at];
+        const std::int64_t far = p + families_.slots.shifts[at];
         const std::uint8_t mask = pattern.mask[at];
         if (mask == 0) continue;
         for (int v = 0; v < packs; ++v) {
           const int l = v * pack_width, lane = k * chunk_points + l;
           const auto bits = static_cast<std::uint8_t>(mask >> l);
-          if (energies) stored[v] += keep(bits, Pack::load(s.energy + lane));
+          const Pack b = weakened ? pattern.b_pack(at, l) : Pack(1.0);
+          if (energies) stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
           if constexpr (work == PairWork::energy) continue;
           Pack t[D], T = Pack::load(s.force + lane);
           const double weight = omega_[at * chunk_points] * length_[at * chunk_points];
@@ -225,6 +207,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
             }
           }
           for (int c = 0; c < D; ++c) {
+            if (weakened) t[c] *= b;
             if (mask != 0xff) t[c] = keep(bits, t[c]);
             own[c][v] += t[c];
             if constexpr (half) {
@@ -250,46 +233,6 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     }
   }
   return bad;
-}
-
-template <int D>
-void LatticePairs<D>::family_of(std::int64_t point, const LatticePattern& pattern, std::vector<FamilyBond>& bonds) const {
-  bonds.clear();
-  for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
-    if (!families_.body.alive(static_cast<std::size_t>(point + families_.shifts[s]))) continue;
-    const auto xi = families_.bond(s);
-    const bool intact = LatticeFamilies::intact(pattern, s, static_cast<int>(point % chunk_points));
-    bonds.push_back({{xi[0], xi[1], xi[2]}, length_[s * chunk_points], omega_[s * chunk_points], families_.volume, intact ? 1.0 : 0.0});
-  }
-}
-
-template <int D>
-void LatticePairs<D>::families(const Visit& visit) const {
-  std::vector<std::vector<std::int32_t>> chunks(families_.patterns.size() + 1);
-  for (const LatticeChunk& chunk : families_.chunks) chunks[static_cast<std::size_t>(chunk.pattern + 1)].push_back(chunk.first);
-  std::vector<FamilyBond> bonds;
-  std::vector<std::int32_t> points;
-  for (std::size_t k = 0; k < chunks.size(); ++k) {
-    if (chunks[k].empty()) continue;
-    const LatticePattern& pattern = k == 0 ? families_.whole : families_.patterns[k - 1];
-    for (int lane = 0; lane < chunk_points; ++lane) {
-      if (!(pattern.live >> lane & 1)) continue;
-      // All chunks of a pattern have the same live neighbours.
-      if (k > 0 || lane == 0) family_of(chunks[k].front() + lane, pattern, bonds);
-      points.clear();
-      for (const std::int32_t first : chunks[k]) points.push_back(first + lane);
-      visit(bonds, points);
-    }
-  }
-}
-
-template <int D>
-void LatticePairs<D>::families_of(std::span<const std::int32_t> points, const Visit& visit) const {
-  std::vector<FamilyBond> bonds;
-  for (const std::int32_t p : points) {
-    family_of(p, families_.pattern(families_.chunks[static_cast<std::size_t>(families_.chunk_of(p))]), bonds);
-    visit(bonds, {p});
-  }
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include <numeric>
 
-#include "families/family_point.hpp"
-#include "spaces/lattice_model.hpp"
+#include "terms/family_point.hpp"
+#include "families/lattice_families.hpp"
+#include "families/quiet_blocks.hpp"
+#include "spaces/lattice_gradient.hpp"
 #include "terms/penalty_matrix.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
@@ -20,25 +22,24 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   using Matrix = PenaltyMatrix<D, isotropic>;
 
  public:
-  LatticePenalty(const ModelParts& parts, const LatticeModel<D>& model)
-      : model_(model),
-        families_(model.families()),
+  explicit LatticePenalty(const PenaltyParts& parts)
+      : ZeroEnergyPenalty(parts),
+        families_(*parts.families.lattice()),
         operator_(families_),
-        parts_(parts),
-        M_(parts.body->make_field(Matrix::components)),
-        B_(parts.body->make_field(Matrix::components)),
-        flux_(parts.body->make_field(D * D)),
-        source_(parts.body->make_field(D)) {
-    if (parts.skip) quiet_ = QuietBlocks(families_.reach);
-    const std::size_t blocks = families_.blocks.size();
+        M_(families_.body().make_field(Matrix::components)),
+        B_(families_.body().make_field(Matrix::components)),
+        flux_(families_.body().make_field(D * D)),
+        source_(families_.body().make_field(D)) {
+    if (parts.skip) quiet_ = QuietBlocks(families_.tiles.reach);
+    const std::size_t blocks = families_.tiles.blocks.size();
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(chunk); }); });
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
-    std::vector<double> energies(energy ? families_.blocks.size() : 0, 0.0);
-    quiet_.look(2, [&](std::size_t b) { return families_.moves(b, u); });
-    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
+    std::vector<double> energies(energy ? families_.tiles.blocks.size() : 0, 0.0);
+    quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
+    parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       if (!quiet_.begins(b)) return;
       for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
         own_forces(chunk, u, factor, H, sums, force);
@@ -48,19 +49,19 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         for (const double e : of_points) energies[b] += e;
       });
     });
-    families_.colouring.for_each([&](std::size_t b) {
+    families_.tiles.colouring.for_each([&](std::size_t b) {
       if (!quiet_.awake(b, 2)) return;
-      for (std::size_t r = families_.blocks[b].row_begin; r < families_.blocks[b].row_end; ++r)
-        operator_.divergence(families_.rows[r], flux_, source_, force);
-      if (families_.broken == 0) return;
+      for (std::size_t r = families_.tiles.blocks[b].row_begin; r < families_.tiles.blocks[b].row_end; ++r)
+        operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
+      if (!families_.any_broken()) return;
       for_chunks(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, source_, force); });
     });
-    model_.clean(force);
+    families_.tiles.clear_dead(force);
     if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
   }
 
   void add_density(ConstFieldView u, double* density) override {
-    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+    parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double*) {
         double of_points[chunk_points];
         energies_of_points(chunk, u, H, of_points);
@@ -70,8 +71,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   }
 
   double energy_of(ConstFieldView u, const GroupMarks& marks) override {
-    std::vector<double> energies(families_.blocks.size(), 0.0);
-    parallel_for(families_.blocks.size(), [&](std::size_t b) {
+    std::vector<double> energies(families_.tiles.blocks.size(), 0.0);
+    parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       alignas(64) double H[D * D * batch_points], sums[D * batch_points];
       for_chunks(b, [&](const LatticeChunk& chunk) {
         if (!marks[static_cast<std::size_t>(chunk.first) / padding]) return;
@@ -86,13 +87,13 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 
   void bonds_changed(std::span<const std::int32_t> points) override {
     // B of a point depends on M of its family.
-    GroupMarks changed(families_.body.stride() / padding, 0), near = changed;
+    GroupMarks changed(families_.body().stride() / padding, 0), near = changed;
     for (const std::int32_t p : points) {
       changed[static_cast<std::size_t>(p) / padding] = near[static_cast<std::size_t>(p) / padding] = 1;
-      for (const std::int64_t shift : families_.shifts) near[static_cast<std::size_t>(p + shift) / padding] = 1;
+      for (const std::int64_t shift : families_.slots.shifts) near[static_cast<std::size_t>(p + shift) / padding] = 1;
     }
     const auto over = [&](const GroupMarks& marks, auto&& set) {
-      for (const LatticeChunk& chunk : families_.chunks)
+      for (const LatticeChunk& chunk : families_.tiles.chunks)
         if (marks[static_cast<std::size_t>(chunk.first) / padding]) set(chunk);
     };
     over(changed, [&](const LatticeChunk& chunk) { set_matrices(chunk); });
@@ -104,7 +105,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
  private:
   template <class Body>
   void for_chunks(std::size_t b, Body&& body) const {
-    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; ++c) body(families_.chunks[c]);
+    for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; ++c) body(families_.tiles.chunks[c]);
   }
 
   void set_matrices(const LatticeChunk& chunk) {
@@ -114,12 +115,12 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       if (!(pattern.live >> l & 1) || !penalised(pattern.condition[l])) continue;  // M = 0
       const auto p = static_cast<std::size_t>(chunk.first + l);
       double intact = 0, inverse[6], M[6];
-      for (std::size_t s = 0; s < families_.offsets.size(); ++s)
-        if (LatticeFamilies::intact(pattern, s, l)) intact += families_.omega[s];
+      for (std::size_t s = 0; s < families_.slots.size(); ++s)
+        intact += pattern.b(s, l) * families_.slots.omega[s];
       families_.inverse_shape(pattern, l, inverse);
       const double V = families_.volume;
       parts_.stabilization->penalty(
-          penalty_point(*parts_.body, *parts_.laws, p, V * intact, pattern.damage[l], V / pattern.scale[l], inverse), M);
+          penalty_point(families_, parts_.laws, p, V * intact, inverse), M);
       for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
     }
   }
@@ -130,8 +131,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       for (int c = 0; c < Matrix::components; ++c) {
         const double* M = M_.component(c) + chunk.first + l;
         Pack sum(0.0);
-        for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
-          sum += keep(lanes(pattern, s, l), Pack(families_.omega[s]) * (Pack::load(M) + Pack::load(M + families_.shifts[s])));
+        for (std::size_t s = 0; s < families_.slots.offsets.size(); ++s) {
+          sum += pattern.b_pack(s, l) * Pack(families_.slots.omega[s]) * (Pack::load(M) + Pack::load(M + families_.slots.shifts[s]));
         }
         sum.store(B_.component(c) + chunk.first + l);
       }
@@ -141,17 +142,17 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     return static_cast<std::uint8_t>(pattern.mask[slot] >> l);
   }
   /// Component of H beside internal axis e.
-  std::size_t component(int c, int e) const noexcept { return static_cast<std::size_t>(c * D + families_.lattice.axis[static_cast<std::size_t>(e)]); }
+  std::size_t component(int c, int e) const noexcept { return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]); }
 
   /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b.
   template <class Use>
   void for_gradients(std::size_t b, ConstFieldView u, Use&& use) const {
     alignas(64) double H[D * D * batch_points], sums[D * batch_points];
     constexpr std::size_t at_once = batch_points / chunk_points;
-    for (std::size_t c = families_.blocks[b].chunk_begin; c < families_.blocks[b].chunk_end; c += at_once) {
-      const std::size_t n = std::min(at_once, families_.blocks[b].chunk_end - c);
-      operator_.gradient_and_sums(&families_.chunks[c], static_cast<int>(n), u, H, sums, batch_points);
-      for (std::size_t k = 0; k < n; ++k) use(families_.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
+    for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; c += at_once) {
+      const std::size_t n = std::min(at_once, families_.tiles.blocks[b].chunk_end - c);
+      operator_.gradient_and_sums(&families_.tiles.chunks[c], static_cast<int>(n), u, H, sums, batch_points);
+      for (std::size_t k = 0; k < n; ++k) use(families_.tiles.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
     }
   }
 
@@ -201,24 +202,22 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         own[c] = Pack::load(u.component(c) + p);
         for (int e = 0; e < D; ++e) G[c][e] = Pack(families_.spacing) * Pack::load(H + component(c, e) * batch_points + l);
       }
-      for (std::size_t s = 0; s < families_.offsets.size(); ++s) {
+      for (std::size_t s = 0; s < families_.slots.offsets.size(); ++s) {
         Pack z[D], t[D], product(0.0);
         for (int c = 0; c < D; ++c) {
-          z[c] = Pack::load(u.component(c) + p + families_.shifts[s]) - own[c];
-          for (int e = 0; e < D; ++e) z[c] -= G[c][e] * Pack(families_.offsets[s][static_cast<std::size_t>(e)]);
+          z[c] = Pack::load(u.component(c) + p + families_.slots.shifts[s]) - own[c];
+          for (int e = 0; e < D; ++e) z[c] -= G[c][e] * Pack(families_.slots.offsets[s][static_cast<std::size_t>(e)]);
         }
         Matrix::apply(M, z, t);
         for (int c = 0; c < D; ++c) product += z[c] * t[c];
-        sum += keep(lanes(pattern, s, l), Pack(0.5 * families_.omega[s]) * product);
+        sum += keep(lanes(pattern, s, l), pattern.b_pack(s, l) * Pack(0.5 * families_.slots.omega[s]) * product);
       }
       sum.store(energy + l);
     }
   }
 
-  const LatticeModel<D>& model_;
   const LatticeFamilies& families_;
   LatticeOperator<D> operator_;
-  ModelParts parts_;
   Field M_, B_;
   Field flux_, source_;   ///< Q, v
   QuietBlocks quiet_;
@@ -227,13 +226,13 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 }  // namespace
 
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model) {
-  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<LatticePenalty<D, true>>(parts, model);
-  return std::make_unique<LatticePenalty<D, false>>(parts, model);
+std::unique_ptr<Term> make_lattice_penalty(const PenaltyParts& parts) {
+  if (D == 1 || parts.stabilization->traits().isotropic) return std::make_unique<LatticePenalty<D, true>>(parts);
+  return std::make_unique<LatticePenalty<D, false>>(parts);
 }
 
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<1>(const ModelParts&, const LatticeModel<1>&);
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<2>(const ModelParts&, const LatticeModel<2>&);
-template std::unique_ptr<ZeroEnergyPenalty> make_penalty<3>(const ModelParts&, const LatticeModel<3>&);
+template std::unique_ptr<Term> make_lattice_penalty<1>(const PenaltyParts&);
+template std::unique_ptr<Term> make_lattice_penalty<2>(const PenaltyParts&);
+template std::unique_ptr<Term> make_lattice_penalty<3>(const PenaltyParts&);
 
 }  // namespace perikit

@@ -4,17 +4,15 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <vector>
 
-#include "families/bond_state.hpp"
-#include "perikit/body/body.hpp"
-#include "perikit/body/influence.hpp"
-#include "perikit/core/simd.hpp"
-#include "perikit/operators/laws.hpp"
-#include "perikit/model/kinematics.hpp"
+#include "families/bond_monitor.hpp"
+#include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
+#include "families/stretch.hpp"
+#include "perikit/core/simd.hpp"
+#include "perikit/model/formulation.hpp"
+#include "perikit/operators/laws.hpp"
 
 namespace perikit {
 
@@ -38,36 +36,21 @@ struct PairFields {
   Field correction;               ///< by axis; empty without surface correction
 };
 
-/// A bond of a family as the set-up sees it.
-struct FamilyBond {
-  double xi[3];                   ///< input axes [m]
-  double length, omega, volume;
-  double integrity;
-};
-
-struct PairCounts {
-  std::size_t bonds = 0, broken = 0, bytes = 0, recomputed = 0;   ///< recomputed: bytes that are not stored
-};
-
 class PairLoop {
  public:
-  using Visit = std::function<void(const std::vector<FamilyBond>&, const std::vector<std::int32_t>& points)>;
   virtual ~PairLoop() = default;
-  /// Every family once, with all points that have it.
-  virtual void families(const Visit& visit) const = 0;
-  /// The families of these points, one by one.
-  virtual void families_of(std::span<const std::int32_t> points, const Visit& visit) const = 0;
-  /// Made on the first call: bodies without damage have no state.
-  virtual BondState& bond_state() = 0;
+  /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
+  virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
-  /// `out` is fully overwritten. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
+  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;
-  virtual PairCounts counts() const noexcept = 0;
+  virtual std::size_t bytes() const noexcept = 0;
   QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
 
  protected:
   /// Skips what no wave has reached from now on.
-  void watch(const BlockReach& reach) { quiet_ = QuietBlocks(reach); }
+  void watch_waves(const BlockReach& reach) { quiet_ = QuietBlocks(reach); }
+  static bool adds(PairWork work) noexcept { return work == PairWork::force || work == PairWork::tangent; }
   /// At the beginning of `run`. Dilatations, and forces without them, reach one family; forces from dilatations two.
   template <class Moves>
   void look(const PairPass& pass, const Moves& moves) {
@@ -91,9 +74,8 @@ class PairLoop {
 };
 
 struct PairLoopParts {
-  const Body& body;
-  const InfluenceFunction& influence;
-  const PairKinematics& law;
+  const Families& families;
+  const Formulation& formulation;
   const PairFields& fields;
   bool half;                      ///< each bond once, for both ends
   bool quiet;                     ///< without the parts that no wave has reached
@@ -114,30 +96,6 @@ struct PairScratch {
   alignas(64) double energy[batch_points];
   alignas(64) double force[batch_points];
   alignas(64) double stiffness[batch_points];
-};
-
-/// Extension and direction of a deformed bond. e = (|y|^2 - |xi|^2)/(|y| + |xi|) keeps its digits for small strains and is
-/// exactly zero for du = 0.
-template <int D>
-struct Stretch {
-  Pack e, inverse_length, n[D];
-
-  Stretch(const Pack (&xi)[D], Pack length, const Pack (&du)[D]) noexcept {
-    Pack difference(0.0), y[D];
-    for (int c = 0; c < D; ++c) {
-      y[c] = xi[c] + du[c];
-      difference += du[c] * (xi[c] + y[c]);
-    }
-    const Pack square = length * length + difference;
-    inverse_length = reciprocal_sqrt(square);
-    e = difference * reciprocal(square * inverse_length + length);
-    for (int c = 0; c < D; ++c) n[c] = y[c] * inverse_length;
-  }
-  Pack along(const Pack (&dw)[D]) const noexcept {
-    Pack sum(0.0);
-    for (int c = 0; c < D; ++c) sum += n[c] * dw[c];
-    return sum;
-  }
 };
 
 }  // namespace perikit

@@ -1,7 +1,7 @@
+#include <algorithm>
 #include <numeric>
 
 #include "families/cloud_rows.hpp"
-#include "assembly/penalty_element.hpp"
 #include "families/quiet_blocks.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
@@ -24,30 +24,31 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   };
 
  public:
-  explicit StencilPenalty(const ModelParts& parts)
-      : families_(*parts.body, *parts.influence, parts.formulation.weight), stencil_(families_.rows(), -1) {
-    const BlockReach reach = cloud_reach(families_.lists(), families_.rows());
+  explicit StencilPenalty(const PenaltyParts& parts) : ZeroEnergyPenalty(parts), rows_(parts.families), stencil_(rows_.size(), -1) {
+    const BlockReach reach = cloud_reach(rows_.lists(), rows_.size());
     colouring_ = Colouring(reach);
     if (parts.skip) quiet_ = QuietBlocks(reach);
-    PenaltyElement<D> element;
-    const bool same_law = parts.laws->single();
-    std::int32_t whole = -1;
-    for (std::size_t r = 0; r < families_.rows(); ++r) {
-      const bool shared = families_.whole(r) && same_law;
-      if (shared && whole >= 0) {
-        stencil_[r] = whole;
-      } else if (element.load(parts, families_, r)) {
-        stencil_[r] = static_cast<std::int32_t>(stencils_.size());
-        stencils_.push_back(keep(element));
-        if (shared) whole = stencil_[r];
-      }
-    }
+    for (std::size_t r = 0; r < rows_.size(); ++r) set_stencil(r);
   }
 
-  void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) override {
+  void bonds_changed(std::span<const std::int32_t> points) override {
+    for (const std::int32_t p : points)
+      set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
+  }
+
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
     read(u);
-    force_.assign(families_.rows(), Row{});
-    std::vector<double> energies(cloud_blocks(families_.rows()), 0.0);
+    std::vector<Row> t;
+    double energy = 0;
+    for (std::size_t r = 0; r < rows_.size(); ++r)
+      if (marks[rows_.point(r) / padding] && stencil_[r] >= 0) energy += 0.5 * springs(r, t);
+    return energy;
+  }
+
+  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
+    read(u);
+    force_.assign(rows_.size(), Row{});
+    std::vector<double> energies(cloud_blocks(rows_.size()), 0.0);
     quiet_.look(1, [&](std::size_t b) {
       bool any = false;
       over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
@@ -58,31 +59,47 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) { energies[b] += 0.5 * pull(r, factor, t); });
     });
-    for (std::size_t r = 0; r < families_.rows(); ++r)
-      for (int c = 0; c < D; ++c) force.component(c)[families_.point(r)] += force_[r][c];
+    for (std::size_t r = 0; r < rows_.size(); ++r)
+      for (int c = 0; c < D; ++c) force.component(c)[rows_.point(r)] += force_[r][c];
     if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
   }
 
   void add_density(ConstFieldView u, double* density) override {
     read(u);
-    parallel_for(cloud_blocks(families_.rows()), [&](std::size_t b) {
+    parallel_for(cloud_blocks(rows_.size()), [&](std::size_t b) {
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
-        if (stencil_[r] >= 0) density[families_.point(r)] += 0.5 * springs(r, t) / families_.volume(r);
+        if (stencil_[r] >= 0) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
       });
     });
   }
 
   std::size_t bytes() const noexcept override {
-    std::size_t total = families_.bytes() + stencil_.size() * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
+    std::size_t total = rows_.bytes() + stencil_.size() * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
     for (const Stencil& s : stencils_) total += sizeof(Stencil) + 2 * s.spring.size() * sizeof(Row);
     return total;
   }
-  bool simple_force() const noexcept override { return false; }
-  double energy_of(ConstFieldView, const GroupMarks&) override { return 0; }
-  void bonds_changed(std::span<const std::int32_t>) override {}
 
  private:
+  /// Of row r, as its bonds are now. Whole families of one law share theirs.
+  void set_stencil(std::size_t r) {
+    const bool shared = rows_.whole(r) && parts_.laws.single();
+    if (shared && whole_ >= 0) {
+      stencil_[r] = whole_;
+      return;
+    }
+    if (!element_.load(parts_, rows_.point(r))) {
+      stencil_[r] = -1;
+      return;
+    }
+    if (stencil_[r] < 0 || stencil_[r] == whole_) {
+      stencil_[r] = static_cast<std::int32_t>(stencils_.size());
+      stencils_.emplace_back();
+    }
+    stencils_[static_cast<std::size_t>(stencil_[r])] = keep(element_);
+    if (shared) whole_ = stencil_[r];
+  }
+
   static Stencil keep(const PenaltyElement<D>& element) {
     Stencil s;
     for (std::size_t k = 0; k < static_cast<std::size_t>(element.family().bonds); ++k) {
@@ -100,22 +117,22 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   }
 
   void read(ConstFieldView u) {
-    u_.resize(families_.rows());
-    for (std::size_t r = 0; r < families_.rows(); ++r) {
+    u_.resize(rows_.size());
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
       u_[r] = Row{};
-      for (int c = 0; c < D; ++c) u_[r][c] = u.component(c)[families_.point(r)];
+      for (int c = 0; c < D; ++c) u_[r][c] = u.component(c)[rows_.point(r)];
     }
   }
 
   template <class Use>
   void over_rows(std::size_t b, Use&& use) const {
-    for (std::size_t r = b * cloud_block_points; r < std::min(families_.rows(), (b + 1) * cloud_block_points); ++r) use(r);
+    for (std::size_t r = b * cloud_block_points; r < std::min(rows_.size(), (b + 1) * cloud_block_points); ++r) use(r);
   }
 
   /// t <- t_k by bond; sum_k z_ik . t_k.
   double springs(std::size_t r, std::vector<Row>& t) const {
     const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
-    const auto family = families_.neighbours(r);
+    const auto family = rows_.neighbours(r);
     Row H[D] = {};  // columns
     for (std::size_t k = 0; k < family.size(); ++k) {
       const Row difference = u_[static_cast<std::size_t>(family[k])] - u_[r];
@@ -138,7 +155,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     if (stencil_[r] < 0) return 0;
     const double total = springs(r, t);
     const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
-    const auto family = families_.neighbours(r);
+    const auto family = rows_.neighbours(r);
     Row B[D] = {};  // columns
     for (std::size_t k = 0; k < family.size(); ++k)
       for (int e = 0; e < D; ++e) B[e] += t[k] * s.spring[k][e];
@@ -152,23 +169,25 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     return total;
   }
 
-  PointFamilies families_;
+  BlockRows rows_;
+  PenaltyElement<D> element_;
   Colouring colouring_;
   QuietBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient
   std::vector<Stencil> stencils_;
+  std::int32_t whole_ = -1;            ///< that of whole families
   AlignedVector<Row> u_, force_;       ///< by row
 };
 
 }  // namespace
 
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty(const ModelParts& parts) {
+std::unique_ptr<Term> make_stencil_penalty(const PenaltyParts& parts) {
   return std::make_unique<StencilPenalty<D>>(parts);
 }
 
-template std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty<1>(const ModelParts&);
-template std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty<2>(const ModelParts&);
-template std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty<3>(const ModelParts&);
+template std::unique_ptr<Term> make_stencil_penalty<1>(const PenaltyParts&);
+template std::unique_ptr<Term> make_stencil_penalty<2>(const PenaltyParts&);
+template std::unique_ptr<Term> make_stencil_penalty<3>(const PenaltyParts&);
 
 }  // namespace perikit

@@ -7,45 +7,42 @@
 /// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w). At higher orders the gradient's own share remains: see
 /// stencil_penalty.cpp.
 
-#include <cstdint>
-#include <memory>
-#include <span>
-
-#include "families/bond_state.hpp"
-#include "perikit/core/field.hpp"
-#include "perikit/model/stabilization.hpp"
+#include "terms/penalty_element.hpp"
+#include "terms/term.hpp"
 
 namespace perikit {
 
-struct ModelParts;
-template <int D>
-class CloudModel;
-template <int D>
-class LatticeModel;
-
-class ZeroEnergyPenalty {
+class ZeroEnergyPenalty : public Term {
  public:
-  virtual ~ZeroEnergyPenalty() = default;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) final;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
+  std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
+  int steps() const noexcept final { return 2; }
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
+  const NearestFailure* watch(const BodyDamage&) final { return nullptr; }
+  void report(ModelReport& report) const final;
+  QuietCounts quiet_counts() const noexcept final { return {}; }   // counted with the gradients
+
+ protected:
+  explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
   /// force += -factor dE/du [N]; *energy += E [J] where wanted.
-  virtual void add_forces(ConstFieldView u, double factor, FieldView force, double* energy) = 0;
+  virtual void apply(ConstFieldView u, double factor, FieldView force, double* energy) = 0;
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;
-  /// E of the points of the marked groups (where bonds fail).
-  virtual double energy_of(ConstFieldView u, const GroupMarks& marks) = 0;
-  /// What follows from the bonds of these points is to be computed anew; the model knows already.
-  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
-  /// The force needs no divergence of its own, as sum of omega z (x) xi V = 0.
-  virtual bool simple_force() const noexcept { return true; }
+
+  PenaltyParts parts_;
 };
 
-/// The penalty of parts.stabilization over a point gradient of order 1, whose families it shares: `model` must outlive it.
+/// Over the point gradient of a body.
+std::unique_ptr<Term> make_penalty(const PenaltyParts& parts);
+
+/// Over a point gradient of order 1, on lattices and clouds, and of any order.
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const LatticeModel<D>& model);
+std::unique_ptr<Term> make_lattice_penalty(const PenaltyParts& parts);
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_penalty(const ModelParts& parts, const CloudModel<D>& model);
-/// Over a point gradient of higher order; bonds do not fail.
+std::unique_ptr<Term> make_cloud_penalty(const PenaltyParts& parts);
 template <int D>
-std::unique_ptr<ZeroEnergyPenalty> make_stencil_penalty(const ModelParts& parts);
+std::unique_ptr<Term> make_stencil_penalty(const PenaltyParts& parts);
 
 }  // namespace perikit

@@ -3,8 +3,8 @@
 #include <exception>
 #include <filesystem>
 
-#include "output/atomic_file.hpp"
-#include "output/hdf5_file.hpp"
+#include "files/atomic_file.hpp"
+#include "files/hdf5_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "run/checkpoint.hpp"
 

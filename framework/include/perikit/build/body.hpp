@@ -7,8 +7,7 @@
 namespace perikit {
 
 /// The points that the scene describes, with its sets, materials (0: [material], 1 ...: [[region]] in order) and pre-cracks.
-/// lists: a lattice is treated as a cloud, since every bond has a number of its own.
 /// Throws InputError for an empty body, an empty set, a horizon smaller than the spacing of all points, too many points.
-Body build_body(const Scene& scene, bool lists = false);
+Body build_body(const Scene& scene);
 
 }  // namespace perikit

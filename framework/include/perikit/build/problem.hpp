@@ -5,13 +5,13 @@
 
 #include "perikit/plugin/part.hpp"
 #include "perikit/problem/integrator.hpp"
-#include "perikit/problem/model_problem.hpp"
+#include "perikit/problem/body_problem.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
 
 /// Builds everything that the scene describes, by parts from `factory`, for an integrator with these traits. Where the communicator
 /// has several ranks: this rank's part of it. Throws InputError for what only building can show.
-std::unique_ptr<ModelProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator);
+std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator);
 
 }  // namespace perikit

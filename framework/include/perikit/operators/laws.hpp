@@ -8,7 +8,6 @@
 
 #include "perikit/core/field.hpp"
 #include "perikit/core/space.hpp"
-#include "perikit/operators/law_history.hpp"
 #include "perikit/model/material.hpp"
 
 namespace perikit {
@@ -38,6 +37,14 @@ struct LawScratch {
   AlignedVector<double> history;         ///< of laws that have one
 };
 
+/// LawHistory of the lanes of a batch: component c of lane l is [c * stride + l]. Batches that may mix laws have stride batch_points.
+struct LawState {
+  const double* begin = nullptr;         ///< at the beginning of the step; null: fresh
+  double* end = nullptr;                 ///< where to put it if the step ends here; null: not wanted
+  std::size_t stride = 0;
+  double time_step = 0;                  ///< [s]
+};
+
 struct LawBatch {
   int n = 0;                             ///< <= batch_points; arrays have stride batch_points
   const double* H = nullptr;
@@ -48,7 +55,7 @@ struct LawBatch {
   double* P = nullptr;
   double* dP = nullptr;
   double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
-  LawHistory::Place history;             ///< nothing: fresh, and not kept
+  LawState state;                        ///< of laws with history
   double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
 };
 
@@ -62,9 +69,7 @@ class Laws {
   bool single() const noexcept { return single_; }
   bool constant_tangent() const noexcept;
   bool objective() const noexcept;
-  /// Null where every law depends on F alone.
-  LawHistory* history() const noexcept { return history_.get(); }
-  /// Doubles of history per evaluation point, the most of any law.
+  /// Doubles of history per evaluation point, the most of any law; 0 where every law depends on F alone.
   int state_components() const noexcept { return state_; }
   /// Both points have the same law and the same constants, so that a symmetric bond needs one evaluation.
   bool same(std::size_t p, std::size_t q) const noexcept {
@@ -88,7 +93,6 @@ class Laws {
   std::size_t stride_;
   bool single_;
   int state_ = 0;                        ///< components of history, the most of any law
-  std::unique_ptr<LawHistory> history_;
 };
 
 }  // namespace perikit

@@ -10,14 +10,9 @@
 #include <string>
 #include <vector>
 
-namespace perikit {
+#include "perikit/fields/point_field.hpp"
 
-/// A point field in input order, float64: rows of 3 for vectors, 9 (row-major) for tensors, flat for scalars.
-struct OutputField {
-  std::string name;
-  int width = 1;                       ///< 1, 3 or 9
-  std::vector<double> data;            ///< width * points
-};
+namespace perikit {
 
 struct ReferenceData {
   std::vector<double> position;        ///< rows of 3 [m]

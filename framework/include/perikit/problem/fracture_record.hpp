@@ -6,7 +6,7 @@
 #include <string>
 
 #include "perikit/problem/state.hpp"
-#include "perikit/terms/model.hpp"
+#include "perikit/terms/terms.hpp"
 
 namespace perikit {
 
@@ -17,13 +17,13 @@ class FractureRecord {
 
   /// Null where bonds never fail.
   const BodyDamage* damage() const noexcept { return damage_.get(); }
-  /// Lets bonds of `model` fail at the displacement of the state, whose energies follow; true where any changed. motion: see Model.
-  bool update(Model& model, State& state, double time_step, const Motion& motion);
+  /// Lets bonds of `terms` fail at the displacement of the state, whose energies follow; true where any changed. motion: see Terms.
+  bool update(Terms& terms, State& state, double time_step, const Motion& motion);
   /// How bonds failed so far, in words; empty where they never fail.
   std::string summary(const BondChecks& checks, double dissipated) const;
 
-  void write(const Model& model, ByteWriter& out) const;
-  void read(Model& model, ByteReader& in);
+  void write(const Terms& terms, ByteWriter& out) const;
+  void read(Terms& terms, ByteReader& in);
 
  private:
   std::unique_ptr<const BodyDamage> damage_;

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
 #include "perikit/problem/integrator.hpp"
-#include "perikit/problem/model_problem.hpp"
-#include "perikit/run/point_fields.hpp"
+#include "perikit/problem/body_problem.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -22,7 +22,7 @@ class Simulation {
   Simulation(const Scene& scene, const PartFactory& factory);
 
   const Scene& scene() const noexcept { return scene_; }
-  ModelProblem& problem() noexcept { return *problem_; }
+  BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   bool dynamic() const noexcept { return traits_.dynamic; }
   /// Runs to the end. Throws RunError.
@@ -39,7 +39,7 @@ class Simulation {
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
-  std::unique_ptr<ModelProblem> problem_;
+  std::unique_ptr<BodyProblem> problem_;
 };
 
 /// The columns of history.csv: the standard ones, then those that the scene asks for.

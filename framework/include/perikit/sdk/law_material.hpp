@@ -7,8 +7,7 @@
 ///     Moduli small_strain(const double* k) const noexcept;
 ///     template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept;             // one of these
 ///     template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept;    // or both
-///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left
-///     out
+///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left out
 ///   };
 ///   auto material = std::make_unique<LawMaterial<MyLaw>>();
 ///

@@ -7,27 +7,11 @@
 #include <cmath>
 
 #include "perikit/core/errors.hpp"
+#include "perikit/fields/point_field.hpp"
 
 namespace perikit {
 
 namespace {
-
-struct KnownField {
-  const char *name, *label, *unit;
-};
-constexpr KnownField known_fields[] = {
-    {"displacement", "displacement", "m"},
-    {"velocity", "velocity", "m/s"},
-    {"acceleration", "acceleration", "m/s²"},
-    {"internal_force", "internal force density", "N/m³"},
-    {"external_force", "external force density", "N/m³"},
-    {"reaction", "reaction", "N"},
-    {"strain_energy_density", "strain energy density", "J/m³"},
-    {"first_piola", "first Piola-Kirchhoff stress", "Pa"},
-    {"cauchy", "Cauchy stress", "Pa"},
-    {"von_mises", "von Mises stress", "Pa"},
-    {"volume", "volume", "m³"},
-};
 
 using Tensor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -51,25 +35,21 @@ double component_value(const double* row, int width, std::size_t component, cons
   return name == "von_mises" ? von_mises(tensor) : tensor.norm();
 }
 
-const KnownField* known_field(const std::string& field) {
-  const auto known = std::find_if(std::begin(known_fields), std::end(known_fields), [&](const auto& k) { return field == k.name; });
-  return known == std::end(known_fields) ? nullptr : known;
-}
-
 }  // namespace
 
 std::string field_unit(const std::string& field) {
-  const KnownField* known = known_field(field);
-  return known ? known->unit : "";
+  const PointField* known = find_point_field(field);
+  return known ? known->unit : field == "volume" ? "m³" : "";
 }
 
 FieldValues field_values(const std::string& field, int width, std::span<const double> data, const std::string& component) {
   FieldValues result;
-  result.label = field;
-  std::replace(result.label.begin(), result.label.end(), '_', ' ');
-  if (const KnownField* known = known_field(field)) {
+  result.unit = field_unit(field);
+  if (const PointField* known = find_point_field(field)) {
     result.label = known->label;
-    result.unit = known->unit;
+  } else {
+    result.label = field;
+    std::ranges::replace(result.label, '_', ' ');
   }
   if (width == 1) {
     if (!component.empty()) throw InputError({}, "component", fmt::format("found '{}'; '{}' is a scalar", component, field));

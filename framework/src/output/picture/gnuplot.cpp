@@ -12,7 +12,7 @@
 #include <memory>
 #include <vector>
 
-#include "output/atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/output/recorder.hpp"
 

@@ -1,0 +1,44 @@
+#pragma once
+/// The point fields of a problem, computed when asked for and once per step.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "perikit/fields/point_field.hpp"
+#include "perikit/problem/body_problem.hpp"
+
+namespace perikit {
+
+class PointFields {
+ public:
+  /// moves: the state has a velocity, which dynamic runs always have.
+  PointFields(BodyProblem& problem, bool dynamic, bool moves) : problem_(problem), dynamic_(dynamic), moves_(dynamic || moves) {}
+
+  /// Column of a row by component name ("x", "xy"); -1 for "magnitude". Throws std::out_of_range for an unknown one.
+  static int column(const std::string& name, const std::string& component);
+
+  /// Forget what was computed: the state has changed.
+  void renew() { cache_.clear(), samples_.reset(); }
+  const OutputField& get(const std::string& name);
+
+ private:
+  friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
+
+  const PointSamples& samples();
+  std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
+  std::vector<double> scalar(ConstFieldView field) const;
+  std::vector<double> tensor(ConstFieldView field, bool identity = false) const;
+  std::vector<double> acceleration() const;
+  std::vector<double> external_force() const;
+  std::vector<double> jacobian();
+  std::vector<double> material_id() const;
+
+  BodyProblem& problem_;
+  bool dynamic_, moves_;
+  std::map<std::string, OutputField> cache_;
+  std::optional<PointSamples> samples_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,71 @@
+#pragma once
+/// The Problem of one body: its families, its terms, and what holds and loads it.
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "perikit/body/partition.hpp"
+#include "perikit/problem/fracture_record.hpp"
+#include "perikit/problem/ghosts.hpp"
+#include "perikit/problem/problem.hpp"
+
+namespace perikit {
+
+class Companion;
+class Families;
+
+/// Everything behind the operations of a problem; later members refer to earlier ones.
+struct ProblemParts {
+  ProblemParts();
+  ProblemParts(ProblemParts&&) noexcept;
+  ~ProblemParts();
+  std::unique_ptr<const Partition> partition;   ///< null where one rank has the whole body
+  std::unique_ptr<const Body> body;             ///< of this rank
+  std::unique_ptr<Laws> laws;
+  std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
+  FractureRecord fracture;
+  std::unique_ptr<Terms> terms;
+  std::string kinematics;                       ///< names, for messages
+  std::vector<std::string> materials;           ///< by material of the body
+};
+
+class BodyProblem final : public Problem {
+ public:
+  /// `values` are of the body and the laws of `parts`. Where the communicator has several ranks: of this rank's part of the body,
+  /// with fields that are zero at ghosts.
+  BodyProblem(ProblemParts parts, ProblemValues values);
+  ~BodyProblem() override;
+
+  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
+  AssembledSize assembled_size() override;
+  void assemble_companion(ConstFieldView u, BlockMatrix& K) override;
+  bool constant_stiffness() const noexcept override;
+  bool advance(double time_step, ConstFieldView velocity = {}) override;
+  std::vector<std::byte> bonds() const override;
+  void restore_bonds(std::span<const std::byte> bonds) override;
+
+  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another problem.
+  std::vector<std::byte> snapshot() const;
+  void restore(std::span<const std::byte> bytes);
+
+  Terms& terms() noexcept { return *parts_.terms; }
+  const Terms& terms() const noexcept { return *parts_.terms; }
+  /// The body of all ranks.
+  const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
+  std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
+  /// Bytes held by body, terms and state.
+  std::size_t bytes() const noexcept;
+
+ private:
+  ProblemParts parts_;
+  ProblemValues values_;
+  std::optional<Ghosts> ghosts_;
+  Field with_ghosts_, direction_with_ghosts_;
+  std::unique_ptr<Companion> companion_;        ///< made when asked for
+};
+
+}  // namespace perikit

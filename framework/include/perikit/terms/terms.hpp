@@ -1,0 +1,91 @@
+#pragma once
+/// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to them. Their sum
+/// as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds that fail.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/evaluation_status.hpp"
+#include "perikit/families/bonds.hpp"
+#include "perikit/families/quiet_counts.hpp"
+#include "perikit/model/formulation.hpp"
+#include "perikit/model/stabilization.hpp"
+#include "perikit/operators/law_history.hpp"
+#include "perikit/operators/laws.hpp"
+#include "perikit/operators/report.hpp"
+#include "perikit/operators/samples.hpp"
+
+namespace perikit {
+
+class Families;
+class Mechanics;
+class Term;
+
+/// What the terms of a formulation are made of. families, laws and damage must outlive them.
+struct TermParts {
+  Families* families = nullptr;
+  Formulation formulation;
+  const Laws* laws = nullptr;
+  std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients
+  bool skip = true;                           ///< leave out work whose result is known; changes no bit
+  bool share = true;                          ///< savings by symmetry and uniformity; change rounding
+  const BodyDamage* damage = nullptr;         ///< null: bonds never fail
+};
+
+class Terms {
+ public:
+  explicit Terms(TermParts parts);
+  ~Terms();
+
+  /// force <- -dE/du [N] (conservative terms), fully overwritten; E -> *energy where wanted.
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
+  /// Kw <- -d(force)/du w [N], fully overwritten.
+  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
+  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
+  /// from these terms and stays as it is. Values are overwritten; undefined after a failure.
+  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K);
+  /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
+  /// no more points.
+  AssembledSize assembled_size();
+  EvaluationStatus sample(ConstFieldView u, PointSamples& samples);
+
+  /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
+  bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
+  /// Whether forces are -dE/du, so that the tangent is symmetric.
+  bool conservative() const noexcept { return parts_.formulation.force_state == ForceState::variational; }
+  /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).
+  Field shape_tensor_condition() const;
+  /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
+  Field damage() const;
+  ModelReport report() const;
+  QuietCounts quiet_counts() const;
+  /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
+  LawHistory* history() const noexcept;
+  void history_restored();
+
+  // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
+  /// Lowers the integrity of bonds that u stretches too far, and recomputes what depends on them. To be called after every step, with its
+  /// length [s] (0 in quasi-static runs).
+  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const Motion& motion = {});
+  /// Every bond that is not as it was at the set-up: run state, for checkpoints.
+  std::vector<BondChange> changed_bonds() const;
+  void restore_bonds(std::span<const BondChange> changes);
+  BondChecks bond_checks() const;
+
+ private:
+  struct Assemblies;
+  struct Failing;
+  EvaluationStatus status(std::int64_t bad) const;
+  void bonds_changed(std::span<const std::int32_t> points);
+  Assemblies& assemblies();
+
+  TermParts parts_;
+  std::vector<std::unique_ptr<Term>> terms_;
+  Mechanics* mechanics_ = nullptr;           ///< one of them, but for pair laws
+  std::unique_ptr<Assemblies> assemblies_;   ///< made when asked for
+  std::unique_ptr<Failing> failing_;         ///< null without [damage]
+};
+
+}  // namespace perikit

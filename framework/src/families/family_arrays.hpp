@@ -1,0 +1,30 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "perikit/core/field.hpp"
+#include "perikit/model/kinematics.hpp"
+
+namespace perikit {
+
+/// Bonds of one family as arrays, padded; the memory behind a FamilyView.
+struct FamilyArrays {
+  void resize(int dimension, int bonds);
+  FamilyView view(double horizon) const noexcept;
+  int dimension = 3, bonds = 0;
+  std::size_t size = 0;  ///< padded(bonds)
+  AlignedVector<double> xi[3], length, volume;
+  AlignedVector<double> omega;      ///< b omega
+  AlignedVector<double> integrity, whole;  ///< b, and omega without it, where some bond of the family is not whole; else empty
+  std::vector<std::int32_t> far;    ///< internal indices
+  double inverse_shape[6] = {};     ///< K^-1; 0 where singular
+
+  double whole_omega(std::size_t k) const noexcept { return whole.empty() ? omega[k] : whole[k]; }
+  double b(std::size_t k) const noexcept { return integrity.empty() ? 1.0 : integrity[k]; }
+};
+
+/// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:
+/// g_k = b omega V_k K^-1 xi_k, 0 where K is singular. The order that the family supports is returned, 0 for no gradient at all.
+int point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g);
+
+}  // namespace perikit

@@ -1,0 +1,30 @@
+#pragma once
+#include "perikit/core/simd.hpp"
+
+namespace perikit {
+
+/// Extension and direction of a deformed bond. e = (|y|^2 - |xi|^2)/(|y| + |xi|) keeps its digits for small strains and is
+/// exactly zero for du = 0.
+template <int D>
+struct Stretch {
+  Pack e, inverse_length, n[D];
+
+  Stretch(const Pack (&xi)[D], Pack length, const Pack (&du)[D]) noexcept {
+    Pack difference(0.0), y[D];
+    for (int c = 0; c < D; ++c) {
+      y[c] = xi[c] + du[c];
+      difference += du[c] * (xi[c] + y[c]);
+    }
+    const Pack square = length * length + difference;
+    inverse_length = reciprocal_sqrt(square);
+    e = difference * reciprocal(square * inverse_length + length);
+    for (int c = 0; c < D; ++c) n[c] = y[c] * inverse_length;
+  }
+  Pack along(const Pack (&dw)[D]) const noexcept {
+    Pack sum(0.0);
+    for (int c = 0; c < D; ++c) sum += n[c] * dw[c];
+    return sum;
+  }
+};
+
+}  // namespace perikit

@@ -1,0 +1,96 @@
+#include "files/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "perikit/core/errors.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Makes the new name itself last. File systems that cannot sync a folder say EINVAL; there is nothing more to do then.
+void sync_folder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!descriptor) throw_system_error(folder, "cannot open the folder", errno);
+  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) throw_system_error(folder, "cannot write the folder", errno);
+}
+
+}  // namespace
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  std::swap(value_, other.value_);
+  return *this;
+}
+
+Descriptor::~Descriptor() {
+  if (value_ >= 0) ::close(value_);
+}
+
+int Descriptor::release() noexcept {
+  return std::exchange(value_, -1);
+}
+
+void throw_system_error(const std::filesystem::path& file, const std::string& action, int code) {
+  throw RunError(fmt::format("{}: {}: {}", file.string(), action, std::generic_category().message(code)));
+}
+
+std::filesystem::path temporary_name(const std::filesystem::path& file) {
+  return file.parent_path() / fmt::format(".{}.part", file.filename().string());
+}
+
+int write_all(int descriptor, std::span<const std::byte> bytes) noexcept {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(descriptor, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return errno;
+    if (count == 0) return ENOSPC;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return 0;
+}
+
+void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more) {
+  const std::filesystem::path temporary = temporary_name(file);
+  const auto give_up = [&](int code) {
+    ::unlink(temporary.c_str());
+    throw_system_error(file, "cannot write", code);
+  };
+  Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (!descriptor) throw_system_error(file, "cannot write", errno);
+  for (const auto part : {bytes, more})
+    if (const int code = write_all(descriptor.get(), part)) give_up(code);
+  if (::fsync(descriptor.get()) != 0) give_up(errno);
+  // Network file systems report a full disk only here.
+  if (::close(descriptor.release()) != 0) give_up(errno);
+  if (::rename(temporary.c_str(), file.c_str()) != 0) give_up(errno);
+  sync_folder(file);
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error && !std::filesystem::is_directory(folder, error) && !error) error = std::make_error_code(std::errc::not_a_directory);
+  if (error) throw_system_error(folder, "cannot create the folder", error.value());
+}
+
+void remove_file(const std::filesystem::path& file) {
+  std::error_code error;
+  std::filesystem::remove(file, error);
+  if (error) throw_system_error(file, "cannot remove", error.value());
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace perikit

@@ -1,0 +1,235 @@
+#include "files/hdf5_file.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "perikit/core/errors.hpp"
+
+namespace perikit::hdf5 {
+
+namespace {
+
+/// HDF5 prints its error stack by itself unless told not to; ours are thrown.
+void silence() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Handle checked(hid_t id, Handle::Close close, const std::string& what) {
+  if (id < 0) throw RunError(fmt::format("HDF5 cannot create {}", what));
+  return {id, close};
+}
+
+void check(herr_t status, const std::string& what) {
+  if (status < 0) throw RunError(fmt::format("HDF5 cannot write {}", what));
+}
+
+Handle utf8_type(const std::string& what) {
+  Handle type = checked(H5Tcopy(H5T_C_S1), H5Tclose, what);
+  check(H5Tset_size(type.get(), H5T_VARIABLE), what);
+  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), what);
+  return type;
+}
+
+void write_dataset(hid_t file, const std::string& path, hid_t file_type, hid_t memory_type, const void* data,
+                   const std::vector<hsize_t>& shape) {
+  const Handle space = checked(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, path);
+  const Handle dataset =
+      checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose, path);
+  check(H5Dwrite(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), path);
+}
+
+void write_attribute(hid_t file, const std::string& name, hid_t file_type, hid_t memory_type, const void* data) {
+  const Handle space = checked(H5Screate(H5S_SCALAR), H5Sclose, name);
+  const Handle attribute =
+      checked(H5Acreate2(file, name.c_str(), file_type, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
+  check(H5Awrite(attribute.get(), memory_type, data), name);
+}
+
+}  // namespace
+
+Handle::Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+
+Handle& Handle::operator=(Handle&& other) noexcept {
+  std::swap(id_, other.id_);
+  std::swap(close_, other.close_);
+  return *this;
+}
+
+Handle::~Handle() {
+  if (id_ >= 0) close_(id_);
+}
+
+Image::Image() {
+  silence();
+  constexpr std::size_t growth = 1 << 16;
+  access_ = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a file in memory");
+  check(H5Pset_fapl_core(access_.get(), growth, false), "a file in memory");
+  // Format 1.8: large groups and large attributes are stored well, and every reader of today opens it.
+  check(H5Pset_libver_bounds(access_.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "a file in memory");
+  // HDF5 takes two open files in memory of equal name for the same one.
+  static std::atomic<unsigned long> count = 0;
+  const std::string name = fmt::format("perikit image {}", count++);
+  file_ = checked(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access_.get()), H5Fclose, "a file in memory");
+}
+
+void Image::dataset(const std::string& path, std::span<const double> values, int width) {
+  std::vector<hsize_t> shape{values.size() / static_cast<std::size_t>(width)};
+  if (width > 1) shape.push_back(static_cast<hsize_t>(width));
+  write_dataset(file_.get(), path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), shape);
+}
+
+void Image::dataset(const std::string& path, std::span<const std::int64_t> values) {
+  write_dataset(file_.get(), path, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()});
+}
+
+void Image::dataset(const std::string& path, std::span<const std::byte> values) {
+  write_dataset(file_.get(), path, H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), {values.size()});
+}
+
+void Image::group(const std::string& path) {
+  checked(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose, path);
+}
+
+void Image::attribute(const std::string& name, double value) {
+  write_attribute(file_.get(), name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &value);
+}
+
+void Image::attribute(const std::string& name, std::int64_t value) {
+  write_attribute(file_.get(), name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value);
+}
+
+void Image::attribute(const std::string& name, const std::string& text) {
+  const Handle type = utf8_type(name);
+  const char* characters = text.c_str();
+  write_attribute(file_.get(), name, type.get(), type.get(), &characters);
+}
+
+void Image::external_link(const std::string& path, const std::string& file) {
+  check(H5Lcreate_external(file.c_str(), "/", file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT), path);
+}
+
+bool Image::contains(const std::string& path) const {
+  return H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0;
+}
+
+std::span<const std::byte> Image::bytes() {
+  check(H5Fflush(file_.get(), H5F_SCOPE_LOCAL), "a file in memory");
+  void* handle = nullptr;
+  check(H5Fget_vfd_handle(file_.get(), access_.get(), &handle), "a file in memory");
+  const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
+  if (size < 0) throw RunError("HDF5 cannot tell the size of a file in memory");
+  return {*static_cast<const std::byte* const*>(handle), static_cast<std::size_t>(size)};
+}
+
+Source::Source(const std::filesystem::path& file) : path_(file) {
+  silence();
+  if (::access(file.c_str(), R_OK) != 0) refuse("", fmt::format("cannot be read: {}", std::generic_category().message(errno)));
+  if (std::filesystem::is_directory(file)) refuse("", "is a folder, not an HDF5 file");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  // Finished files never change, and locks fail on read-only and on some network file systems.
+  H5Pset_file_locking(access.get(), false, true);
+  file_ = Handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
+  if (!file_) refuse("", "is not an HDF5 file, or is damaged");
+}
+
+void Source::refuse(const std::string& what, const std::string& message) const {
+  throw InputError({path_.string(), 0, 0}, what, message);
+}
+
+std::vector<std::string> Source::names(const std::string& group, bool datasets_only) const {
+  const Handle handle(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
+  if (!handle) refuse(group, "no such group");
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
+    static_cast<std::vector<std::string>*>(list)->push_back(name);
+    return 0;
+  };
+  if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, visit, &names) < 0) refuse(group, "cannot be listed");
+  if (datasets_only) {
+    std::erase_if(names, [&](const std::string& name) {
+      H5O_info_t info;
+      return H5Oget_info_by_name2(handle.get(), name.c_str(), &info, H5O_INFO_BASIC, H5P_DEFAULT) < 0 ||
+             info.type != H5O_TYPE_DATASET;
+    });
+  }
+  return names;
+}
+
+bool Source::contains(const std::string& path) const {
+  return path == "/" ||
+         (H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0 && H5Oexists_by_name(file_.get(), path.c_str(), H5P_DEFAULT) > 0);
+}
+
+Handle Source::dataset(const std::string& path) const {
+  Handle handle(H5Dopen2(file_.get(), path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!handle) refuse(path, "no such dataset");
+  return handle;
+}
+
+std::vector<std::size_t> Source::shape(const std::string& path) const {
+  const Handle data = dataset(path);
+  const Handle space(H5Dget_space(data.get()), H5Sclose);
+  const int rank = H5Sget_simple_extent_ndims(space.get());
+  if (rank < 1 || rank > 2) refuse(path, fmt::format("found {} dimensions; must be 1 or 2", rank));
+  hsize_t extent[2] = {0, 0};
+  H5Sget_simple_extent_dims(space.get(), extent, nullptr);
+  return {extent, extent + rank};
+}
+
+Source::Array Source::read(const std::string& path) const {
+  Array array{shape(path), {}};
+  const Handle data = dataset(path);
+  const Handle type(H5Dget_type(data.get()), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(path, "must hold numbers");
+  array.data.resize(array.rows() * static_cast<std::size_t>(array.width()));
+  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
+    refuse(path, "cannot be read");
+  return array;
+}
+
+std::vector<std::byte> Source::read_bytes(const std::string& path) const {
+  std::vector<std::byte> bytes(shape(path)[0]);
+  const Handle data = dataset(path);
+  const Handle type(H5Dget_type(data.get()), H5Tclose);
+  if (H5Tequal(type.get(), H5T_STD_U8LE) <= 0 || shape(path).size() != 1) refuse(path, "must be a flat dataset of bytes");
+  if (H5Dread(data.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0) refuse(path, "cannot be read");
+  return bytes;
+}
+
+Handle Source::attribute(const std::string& group, const std::string& name) const {
+  Handle handle(H5Aopen_by_name(file_.get(), group.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (!handle) refuse(group, fmt::format("no attribute '{}'", name));
+  return handle;
+}
+
+double Source::real(const std::string& group, const std::string& name) const {
+  double value = 0;
+  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_DOUBLE, &value) < 0)
+    refuse(group, fmt::format("'{}' is not a number", name));
+  return value;
+}
+
+std::int64_t Source::integer(const std::string& group, const std::string& name) const {
+  std::int64_t value = 0;
+  if (H5Aread(attribute(group, name).get(), H5T_NATIVE_INT64, &value) < 0)
+    refuse(group, fmt::format("'{}' is not a number", name));
+  return value;
+}
+
+std::string Source::text(const std::string& group, const std::string& name) const {
+  char* characters = nullptr;
+  const Handle type = utf8_type(name);
+  if (H5Aread(attribute(group, name).get(), type.get(), &characters) < 0) refuse(group, fmt::format("'{}' is not text", name));
+  const std::string text = characters ? characters : "";
+  H5free_memory(characters);
+  return text;
+}
+
+}  // namespace perikit::hdf5

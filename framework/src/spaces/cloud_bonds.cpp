@@ -1,0 +1,292 @@
+#include "spaces/cloud_bonds.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+template <int D>
+CloudBonds<D>::CloudBonds(const SpaceParts& parts)
+    : families_(*parts.families.cloud()), formulation_(parts.formulation), laws_(parts.laws), selective_(formulation_.selective()),
+      mean_(formulation_.base == BondBase::mean), pairs_(formulation_.pair_symmetric && parts.share), two_states_(pairs_ && (selective_ || !laws_.single())),
+      points_(families_.body().points()), position_(reinterpret_cast<const Row*>(families_.body().rows().data())), gradient_of_(families_, formulation_.order),
+      upper_(points_), scale_(points_), u_(points_), gradient_(D * points_), flux_(D * points_), force_(points_) {
+  const BlockReach reach = cloud_reach(families_.lists(), points_);
+  colouring_ = Colouring(reach);
+  quiet_ = parts.quiet_blocks(reach);
+  for (std::size_t p = 0; p < points_; ++p) {
+    const double normaliser = families_.normaliser(p, formulation_.weight);
+    upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
+    scale_[p] = normaliser > 0 ? position_[p][3] / normaliser : 0.0;
+  }
+  if (parts.history()) number_bonds();
+  if (!selective_) return;
+  volume_.resize(points_);
+  pressure_.resize(points_);
+  for (std::size_t p = 0; p < points_; ++p) volume_[p][volume_share] = share_of_volume(p);
+}
+
+template <int D>
+void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
+  for (const std::int32_t point : points) {
+    const auto p = static_cast<std::size_t>(point);
+    gradient_of_.renew(p);
+    if (selective_) volume_[p][volume_share] = share_of_volume(p);
+  }
+}
+
+/// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
+template <int D>
+void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
+                           double* A) const noexcept {
+  for (int l = 0; l < n; ++l) {
+    const auto j = static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(begin + l)]);
+    const Row d = u[j] - u[p];
+    for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
+    for (int e = 0; e < D; ++e) {
+      const Row h = mean_ ? 0.5 * (H[D * p + static_cast<std::size_t>(e)] + H[D * j + static_cast<std::size_t>(e)]) : H[D * p + static_cast<std::size_t>(e)];
+      for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
+    }
+  }
+  for (int l = families_.fails() ? 0 : n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
+    if (l < n && families_.b(static_cast<std::size_t>(begin + l)) > 0) continue;
+    for (int c = 0; c < D; ++c) du[c * batch_points + l] = 0.0;
+    for (int c = 0; c < D * D; ++c) A[c * batch_points + l] = 0.0;
+  }
+}
+
+/// Bonds begin ... begin + n - 1 as arrays: xi, length, omega, volume, weights of both ends, and the ends.
+template <int D>
+void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept {
+  double *xi = s.bond[0], *length = s.bond[2], *omega = s.bond[2] + batch_points, *volume = s.bond[2] + 2 * batch_points;
+  const double* influence = families_.omegas();
+  const Row x = position_[p];
+  for (int l = 0; l < lanes; ++l) {
+    const bool real = l < n;
+    const auto k = static_cast<std::size_t>(begin + (real ? l : 0));
+    const auto j = static_cast<std::size_t>(families_.lists().neighbour[k]);
+    const Row bond = position_[j] - x;
+    for (int c = 0; c < D; ++c) xi[c * batch_points + l] = bond[c];
+    length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
+    omega[l] = real ? influence[k] : 0.0;
+    volume[l] = real ? position_[j][3] : 0.0;
+    const double factor = !real ? 0.0 : formulation_.weight == BondWeight::kernel ? influence[k] : families_.b(k);
+    s.weight[l] = scale_[p] * position_[j][3] * factor;
+    s.far_weight[l] = scale_[j] * x[3] * factor;
+    s.owner[l] = static_cast<std::int32_t>(p);
+    s.far[l] = static_cast<std::int32_t>(j);
+  }
+}
+
+/// One group for the owner, then those of the far ends.
+template <int D>
+void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, BatchScratch& s) const noexcept {
+  constexpr int group = static_cast<int>(padding);
+  s.owner_volumes = {s.volume, batch_points, s.volume_group, families_.singular() == 0 && !families_.fails()};
+  for (int l = 0; l < lanes; l += group) {
+    s.volume_group[l / group] = 0;
+    if (both_ends) s.volume_group[(lanes + l) / group] = l + group;
+  }
+  for (int c = 0; c < volume_components; ++c) {
+    std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
+    for (int l = 0; l < lanes && both_ends; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
+  }
+}
+
+template <int D>
+int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy) {
+  const bool tangent = pass.work.tangent(), both_ends = pairs_ && !pass.alone();
+  double* const H = selective_ ? s.Ht : s.H;
+  double* const dH = selective_ ? s.dHt : s.dH;
+  double *xi = s.bond[0], *g = s.bond[1];
+  const std::int64_t end = families_.lists().first[p + 1];
+  for (std::int64_t begin = both_ends ? upper_[p] : families_.lists().first[p]; begin < end; begin += bonds_at_once()) {
+    const int n = static_cast<int>(std::min<std::int64_t>(bonds_at_once(), end - begin));
+    const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+    read_bonds(p, begin, n, lanes, s);
+    gather(p, begin, n, u_, gradient_, s.du, s.A);
+    if (tangent) gather(p, begin, n, w_, direction_, s.dw, s.dA);
+    if (selective_) volumes_of_bonds(p, lanes, both_ends, s);
+    const FamilyView view{D, n, families_.body().horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, s.bond[2], s.bond[2] + 2 * batch_points,
+                          s.bond[2] + batch_points, families_.inverse_shape(p), 0};
+    formulation_.bond->correction(view, g, batch_points);
+    const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
+    bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
+    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, dH);
+    if (pass.work.history()) number(p, begin, n, lanes, s);
+    const int bad = pass.work.evaluate(n, s, both_ends, energy);
+    if (bad >= 0) return bad;
+    if (pass.work.work() == Work::sample) pass.work.add_samples(n, s, *pass.sums);
+    if (pass.alone()) continue;
+    bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
+    scatter(p, n, s, both_ends, tangent);
+  }
+  return -1;
+}
+
+/// Forces, stresses on the point gradients, and pressures of n bonds.
+template <int D>
+void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
+  Row own{}, own_stress[D] = {};
+  const double share = mean_ ? 0.5 : 1.0;
+  for (int l = 0; l < n; ++l) {
+    const auto j = static_cast<std::size_t>(s.far[l]);
+    Row t{};
+    for (int c = 0; c < D; ++c) t[c] = s.t[c * batch_points + l];
+    own += t;
+    force_[j] -= t;
+    for (int e = 0; e < D; ++e) {
+      Row stress{};
+      for (int c = 0; c < D; ++c) stress[c] = share * s.P[(c * D + e) * batch_points + l];
+      own_stress[e] += stress;
+      if (mean_) flux_[D * j + static_cast<std::size_t>(e)] += stress;
+    }
+  }
+  const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };
+  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+  for (int l = 0; l < n && selective_; ++l) {
+    pressure_[p] += pressure(l);
+    if (both_ends) pressure_[static_cast<std::size_t>(s.far[l])] += pressure(lanes + l);
+  }
+  force_[p] += own;
+  for (int e = 0; e < D; ++e) flux_[D * p + static_cast<std::size_t>(e)] += own_stress[e];
+}
+
+/// Eight points at a time: rows of gradients to lanes.
+template <int D>
+static OwnerGradients gather_gradients(const AlignedVector<Row>& rows, std::size_t first, std::size_t n, double* H) noexcept {
+  for (int c = 0; c < D; ++c)
+    for (int e = 0; e < D; ++e)
+      for (std::size_t l = 0; l < padding; ++l) H[static_cast<std::size_t>(c * D + e) * padding + l] = l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
+  return {static_cast<int>(padding), padding, H, nullptr};
+}
+
+template <int D>
+void CloudBonds<D>::volumes(std::size_t b, bool tangent) noexcept {
+  double H[9 * padding], dH[9 * padding], volume[volume_components * padding] = {};
+  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
+  for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+    const std::size_t n = std::min(padding, end - first);
+    OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
+    if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
+    owner_volume(laws_.space(), owners, volume, padding);
+    for (std::size_t l = 0; l < n; ++l)
+      for (const int c : {volume_jacobian, volume_root, volume_rate}) volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
+  }
+}
+
+template <int D>
+void CloudBonds<D>::pressures(std::size_t b, bool tangent) noexcept {
+  double H[9 * padding], dH[9 * padding], pressure[2][padding] = {};
+  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
+  for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+    const std::size_t n = std::min(padding, end - first);
+    OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
+    if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
+    double stress[9 * padding] = {};
+    for (std::size_t l = 0; l < n; ++l)
+      for (int c = 0; c < 2; ++c) pressure[c][l] = pressure_[first + l][c];
+    add_owner_stress(laws_.space(), owners, pressure[0], pressure[1], stress, padding);
+    for (std::size_t l = 0; l < n; ++l)
+      for (int c = 0; c < D; ++c)
+        for (int e = 0; e < D; ++e) flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
+  }
+}
+
+template <int D>
+void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
+  over_points(b, [&](std::size_t p) {
+    if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
+    gradient_of_.at(p, u_, &gradient_[D * p]);
+    if (pass.work.tangent()) gradient_of_.at(p, w_, &direction_[D * p]);
+    force_[p] = Row{};
+    for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
+    if (selective_) pressure_[p] = Row{};
+  });
+  if (selective_) volumes(b, pass.work.tangent());
+}
+
+template <int D>
+void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
+  BatchScratch& s = scratch_.mine();
+  double energy = 0;
+  for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+    if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0) return pass.report(static_cast<std::int64_t>(p));
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void CloudBonds<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  constexpr int last = 3;
+  const bool tangent = pass.work.tangent();
+  mirror_rows(pass.u, points_, u_);
+  if (tangent) {
+    mirror_rows(pass.w, points_, w_);
+    direction_.resize(D * points_);
+  }
+  if (pass.alone() || tangent) quiet_.wake();
+  else quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
+  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) gradients(b, pass); });
+  if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
+  colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
+  if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, tangent); }));
+  auto stress_on_points = [&](std::size_t b) {
+    if (!quiet_.awake(b, 2)) return;
+    over_points(b, [&](std::size_t p) {
+      if (gradient_of_.stored()) gradient_of_.scatter(p, &flux_[D * p], force_);
+      else gradient_of_.times_inverse(p, &flux_[D * p], &flux_[D * p]);
+    });
+  };
+  if (gradient_of_.stored()) colouring_.for_each(stress_on_points);
+  else parallel_for(blocks(), stress_on_points);
+  if (pass.bad >= 0) return;
+  parallel_for(blocks(), [&](std::size_t b) {
+    const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
+    over_points(b, [&](std::size_t p) {
+      const Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
+      for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
+    });
+  });
+}
+
+/// Bonds of one point follow each other, from a multiple of `padding` on.
+template <int D>
+void CloudBonds<D>::number_bonds() {
+  number_.resize(points_);
+  for (std::size_t p = 0; p < points_; ++p) {
+    number_[p] = static_cast<std::int64_t>(one_end_);
+    one_end_ += padded(static_cast<std::size_t>(families_.lists().first[p + 1] - first_bond(p)));
+  }
+}
+
+template <int D>
+void CloudBonds<D>::number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept {
+  s.far_number = static_cast<std::int64_t>(two_states_ ? one_end_ : 0);
+  s.first_number = begin >= first_bond(p) ? number_[p] + begin - first_bond(p) : -1;
+  for (int l = 0; l < lanes && s.first_number < 0; ++l) {
+    const auto j = static_cast<std::size_t>(s.far[l]);
+    if (begin + l >= first_bond(p)) {
+      s.number[l] = l < n ? number_[p] + begin + l - first_bond(p) : -1;
+    } else {
+      const bool same = !two_states_ || (!selective_ && laws_.same(p, j));
+      s.number[l] = number_[j] + families_.index(s.far[l], static_cast<std::int32_t>(p)) - upper_[j] + (same ? 0 : s.far_number);
+    }
+  }
+}
+
+template <int D>
+void CloudBonds<D>::report(ModelReport& report) const {
+  report.fallbacks += gradient_of_.fallbacks();
+  report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
+  report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size()) * sizeof(std::int64_t) + scale_.size() * sizeof(double) + scratch_.bytes() +
+                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() + pressure_.size()) * sizeof(Row);
+  if (pairs_) report.skips.push_back(second_evaluation(families_.bonds()));
+}
+
+template class CloudBonds<1>;
+template class CloudBonds<2>;
+template class CloudBonds<3>;
+
+}  // namespace perikit

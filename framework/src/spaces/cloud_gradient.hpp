@@ -1,0 +1,103 @@
+#pragma once
+/// Point gradients on a cloud and their adjoint, one point at a time over its sorted neighbours. Rows run over displacement components:
+/// H[D p + e][c] = H_ce.
+///
+///   order 1:   S = sum_j omega V_j u_ij (x) xi_ij,  H = S K^-1;   f_i = sum_j omega xi_ij (V_j Q_i + V_i Q_j),  Q = P K^-1
+///   order 2+:  H = sum_j u_ij (x) g_ij with stored g;             f_i += P_i g_ij,  f_j -= P_i g_ij
+
+#include "families/cloud_families.hpp"
+#include "families/cloud_rows.hpp"
+#include "families/shape_tensor.hpp"
+
+namespace perikit {
+
+template <int D>
+class CloudGradient {
+ public:
+  explicit CloudGradient(const CloudFamilies& families, int order = 1)
+      : families_(families), position_(reinterpret_cast<const Row*>(families.body().rows().data())), order_(order) {
+    if (order > 1) store_stencils();
+  }
+
+  bool stored() const noexcept { return order_ > 1; }
+  /// H of point p.
+  void at(std::size_t p, const AlignedVector<Row>& u, Row* H) const noexcept {
+    if (!stored()) {
+      Row S[D];
+      moments(p, u, S);
+      return times_inverse(p, S, H);
+    }
+    Row h[D] = {};
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      const Row du = u[static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)])] - u[p];
+      for (int e = 0; e < D; ++e) h[e] += stencil_[static_cast<std::size_t>(k * D + e)] * du;
+    }
+    for (int e = 0; e < D; ++e) H[e] = h[e];
+  }
+  /// Q = S K^-1; Q may be S.
+  void times_inverse(std::size_t p, const Row* S, Row* Q) const noexcept {
+    const double* inverse = families_.inverse_shape(p);
+    Row out[D];
+    for (int e = 0; e < D; ++e) {
+      out[e] = Row{};
+      for (int k = 0; k < D; ++k) out[e] += inverse[symmetric_index(D, k, e)] * S[k];
+    }
+    for (int e = 0; e < D; ++e) Q[e] = out[e];
+  }
+  /// Order 1: f, and what Q of all points adds to the force on p.
+  Row divergence(std::size_t p, const AlignedVector<Row>& Q, Row f = Row{}) const noexcept {
+    const Row x = position_[p];
+    const Row* own = &Q[D * p];
+    const double* omega = families_.omegas();
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
+      const Row far = position_[j], xi = far - x;
+      const double w = omega[k], to_own = w * far[3], to_far = w * x[3];
+      for (int e = 0; e < D; ++e) f += xi[e] * (to_own * own[e] + to_far * Q[D * j + static_cast<std::size_t>(e)]);
+    }
+    return f;
+  }
+  /// Stored stencils: what the stress S on H of point p does, added to force.
+  void scatter(std::size_t p, const Row* S, AlignedVector<Row>& force) const noexcept {
+    Row own{};
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      Row t{};
+      for (int e = 0; e < D; ++e) t += stencil_[static_cast<std::size_t>(k * D + e)] * S[e];
+      own += t;
+      force[static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)])] -= t;
+    }
+    force[p] += own;
+  }
+  /// The bonds of p have changed.
+  void renew(std::size_t p) {
+    if (stored()) store_stencil(p);
+  }
+  /// Points of a lower order than asked for, at the set-up.
+  std::size_t fallbacks() const noexcept { return fallbacks_; }
+  std::size_t bytes() const noexcept { return stencil_.size() * sizeof(double); }
+
+ private:
+  const FamilyLists& lists() const noexcept { return families_.lists(); }
+  void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept {
+    const Row x = position_[p], own = u[p];
+    const double* omega = families_.omegas();
+    for (int e = 0; e < D; ++e) S[e] = Row{};
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
+      const Row xi = position_[j] - x;
+      const Row du = (omega[k] * position_[j][3]) * (u[j] - own);
+      for (int e = 0; e < D; ++e) S[e] += xi[e] * du;
+    }
+  }
+  void store_stencils();
+  /// Whether it has a lower order.
+  bool store_stencil(std::size_t p);
+
+  const CloudFamilies& families_;
+  const Row* position_;                  ///< {x, y, z, V}
+  int order_;
+  AlignedVector<double> stencil_;        ///< g[D * bond + e]
+  std::size_t fallbacks_ = 0;
+};
+
+}  // namespace perikit

@@ -1,0 +1,90 @@
+#include "spaces/cloud_points.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+template <int D>
+CloudPoints<D>::CloudPoints(const SpaceParts& parts)
+    : families_(*parts.families.cloud()), laws_(parts.laws), points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), gradient_(families_), u_(points_), flux_(D * points_) {
+  quiet_ = parts.quiet_blocks(cloud_reach(families_.lists(), points_));
+}
+
+template <int D>
+void CloudPoints<D>::block(std::size_t b, Pass& pass) {
+  BatchScratch& s = scratch_.mine();
+  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
+  const auto gradient_lane = [&](std::size_t p, const AlignedVector<Row>& u, double* H) {
+    Row h[D];
+    gradient_.at(p, u, h);
+    for (int c = 0; c < D; ++c)
+      for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points] = h[e][c];
+  };
+  double energy = 0;
+  for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
+    const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
+    const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
+    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding, [](std::uint8_t m) { return m != 0; })) continue;
+    for (int l = 0; l < lanes; ++l) {
+      const std::size_t p = first + static_cast<std::size_t>(l);
+      if (l >= n || !pass.wanted(static_cast<std::int64_t>(p))) {
+        for (int c = 0; c < D * D; ++c) s.H[c * batch_points + l] = s.dH[c * batch_points + l] = 0.0;
+        s.weight[l] = 0;
+        s.owner[l] = static_cast<std::int32_t>(first);
+        continue;
+      }
+      gradient_lane(p, u_, s.H + l);
+      if (pass.work.tangent()) gradient_lane(p, w_, s.dH + l);
+      s.weight[l] = position_[p][3] * (1 - families_.damage(p));
+      s.owner[l] = static_cast<std::int32_t>(p);
+    }
+    s.first_number = static_cast<std::int64_t>(first);
+    const int bad = pass.work.evaluate(n, s, false, &energy);
+    if (bad >= 0) return pass.report(static_cast<std::int64_t>(first) + bad);
+    if (pass.work.work() == Work::sample) {
+      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);   // a lone point shows its own values
+      pass.work.add_samples(n, s, *pass.sums);
+      continue;
+    }
+    for (int l = 0; l < n && !pass.only; ++l) {
+      Row S[D];
+      for (int e = 0; e < D; ++e) {
+        S[e] = Row{};
+        for (int c = 0; c < D; ++c) S[e][c] = s.P[(c * D + e) * batch_points + l];
+      }
+      gradient_.times_inverse(first + static_cast<std::size_t>(l), S, &flux_[D * (first + static_cast<std::size_t>(l))]);
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void CloudPoints<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  mirror_rows(pass.u, points_, u_);
+  if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
+  if (pass.alone() || pass.work.tangent()) quiet_.wake();
+  else quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) block(b, pass); });
+  if (pass.bad >= 0 || pass.alone()) return;
+  parallel_for(blocks(), [&](std::size_t b) {
+    if (!quiet_.awake(b, 2)) return;
+    for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+      const Row f = gradient_.divergence(p, flux_);
+      for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
+    }
+  });
+}
+
+template <int D>
+void CloudPoints<D>::report(ModelReport& report) const {
+  report.evaluation_points += points_;
+  report.bytes += gradient_.bytes() + (u_.size() + w_.size() + flux_.size()) * sizeof(Row) + scratch_.bytes();
+}
+
+template class CloudPoints<1>;
+template class CloudPoints<2>;
+template class CloudPoints<3>;
+
+}  // namespace perikit

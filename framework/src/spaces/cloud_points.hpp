@@ -1,0 +1,33 @@
+#pragma once
+#include "spaces/cloud_gradient.hpp"
+#include "spaces/evaluation_space.hpp"
+
+namespace perikit {
+
+/// Evaluation points at the points of a cloud, point gradients of order 1: gradient, law and Q of one block after the other, then forces,
+/// gathered from both ends of each bond.
+template <int D>
+class CloudPoints final : public EvaluationSpace {
+ public:
+  explicit CloudPoints(const SpaceParts& parts);
+
+  void run(Pass& pass) override;
+  std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
+  std::size_t numbers() const noexcept override { return padded(points_); }
+  void bonds_changed(std::span<const std::int32_t>) override {}
+  void report(ModelReport& report) const override;
+
+ private:
+  void block(std::size_t b, Pass& pass);
+
+  const CloudFamilies& families_;
+  const Laws& laws_;
+  std::size_t points_;
+  const Row* position_;                        ///< {x, y, z, V}
+  CloudGradient<D> gradient_;
+  AlignedVector<Row> u_, w_;                   ///< mirrors
+  AlignedVector<Row> flux_;                    ///< Q, D rows a point
+  ScratchPool scratch_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,57 @@
+#pragma once
+/// Evaluation points of a body: where gradients are taken and laws evaluated. A space visits them batch by batch,
+///
+///   u -> H = F - I (its stencils)  ->  the operator, once for all spaces (operators/batch.hpp)  ->  its adjoint: forces,
+///
+/// and gives each a stable number, by which the history of laws is kept.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "families/families.hpp"
+#include "families/quiet_blocks.hpp"
+#include "operators/batch.hpp"
+#include "perikit/model/formulation.hpp"
+#include "perikit/operators/report.hpp"
+
+namespace perikit {
+
+class EvaluationSpace {
+ public:
+  virtual ~EvaluationSpace() = default;
+  /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone.
+  virtual void run(Pass& pass) = 0;
+  virtual std::size_t blocks() const noexcept = 0;
+  /// The numbers of evaluation points lie below this.
+  virtual std::size_t numbers() const noexcept = 0;
+  /// What follows from the bonds of these points is to be made anew.
+  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
+  /// Adds bytes, counts and notes of what is left out.
+  virtual void report(ModelReport& report) const = 0;
+  /// The history of laws was replaced.
+  void history_restored() { quiet_.stay_awake(); }
+  QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
+
+ protected:
+  QuietBlocks quiet_;
+};
+
+/// What a space is made of. All but the kinematics must outlive it.
+struct SpaceParts {
+  const Families& families;
+  const Formulation& formulation;
+  const Laws& laws;
+  bool skip = true;                           ///< leave out work whose result is known; changes no bit
+  bool share = true;                          ///< savings by symmetry and uniformity; change rounding
+
+  bool history() const noexcept { return laws.state_components() > 0; }
+  QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }
+};
+
+/// The space of these parts on a body of D dimensions.
+template <int D>
+std::unique_ptr<EvaluationSpace> make_space(const SpaceParts& parts);
+
+}  // namespace perikit

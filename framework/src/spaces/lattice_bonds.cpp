@@ -1,0 +1,291 @@
+#include "spaces/lattice_bonds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+namespace perikit {
+
+namespace {
+
+/// Slots of a bond batch: batch_points lanes, chunk_points of them a slot.
+constexpr int slots_at_once = batch_points / chunk_points;
+
+/// Length of the run of adjacent chunks that starts at c, at most `most`.
+int run_length(const std::vector<LatticeChunk>& chunks, std::size_t c, std::size_t end, int most) noexcept {
+  int n = 1;
+  while (n < most && c + static_cast<std::size_t>(n) < end && chunks[c + static_cast<std::size_t>(n)].first == chunks[c].first + n * chunk_points) ++n;
+  return n;
+}
+
+}  // namespace
+
+template <int D>
+LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
+    : families_(*parts.families.lattice()), tiles_(families_.tiles), formulation_(parts.formulation), laws_(parts.laws),
+      selective_(formulation_.selective()), mean_(formulation_.base == BondBase::mean), pairs_(formulation_.pair_symmetric && parts.share),
+      two_states_(pairs_ && (selective_ || !laws_.single())), operator_(families_),
+      slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once) {
+  quiet_ = parts.quiet_blocks(tiles_.reach);
+  const Body& body = families_.body();
+  if (formulation_.order > 1) stencils_.emplace(families_, formulation_.order);
+  flux_ = body.make_field(D * D);
+  gradient_ = body.make_field(D * D);
+  scale_ = body.make_field(1);
+  for (const LatticeChunk& chunk : tiles_.chunks) std::copy_n(families_.pattern(chunk).scale_of(formulation_.weight), chunk_points, scale_.data() + chunk.first);
+  set_whole_vectors();
+  if (!formulation_.g_from_xi_only) store_corrections();
+  if (!selective_) return;
+  volume_ = body.make_field(volume_components);
+  pressure_ = body.make_field(2);
+  for (const std::int32_t p : body.internal()) volume_.component(volume_share)[p] = share_of_volume(static_cast<std::size_t>(p));
+}
+
+/// c of the selective map (maps/selective.hpp).
+template <int D>
+double LatticeBonds<D>::share_of_volume(std::size_t p) const noexcept {
+  const LatticePattern& pattern = families_.pattern_at(p);
+  return pattern.singular >> (p % chunk_points) & 1 ? 0.0 : pattern.left[p % chunk_points];
+}
+
+template <int D>
+void LatticeBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
+  for (const std::int32_t p : points) {
+    const LatticeChunk& chunk = tiles_.chunks[static_cast<std::size_t>(tiles_.chunk_of(p))];
+    if (selective_) volume_.component(volume_share)[p] = share_of_volume(static_cast<std::size_t>(p));
+    if (stencils_) stencils_->renew(chunk);
+  }
+}
+
+template <int D>
+void LatticeBonds<D>::gradients(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = tiles_.blocks[b];
+  const bool tangent = pass.work.tangent();
+  if (!pass.alone()) {
+    tiles_.clear(b, flux_);
+    if (selective_) tiles_.clear(b, pressure_);
+  }
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
+    const LatticeChunk& chunk = tiles_.chunks[c];
+    if (!pass.gradient_wanted(chunk.first)) {
+      ++c;
+      continue;
+    }
+    const int n = stencils_ || pass.near ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
+    if (stencils_) {
+      stencils_->gradient(chunk, pass.u, gradient_);
+      if (tangent) stencils_->gradient(chunk, pass.w, direction_);
+    } else {
+      operator_.gradient(&chunk, n, pass.u, gradient_.data() + chunk.first, gradient_.stride());
+      if (tangent) operator_.gradient(&chunk, n, pass.w, direction_.data() + chunk.first, direction_.stride());
+    }
+    c += static_cast<std::size_t>(n);
+  }
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end && selective_; ++c) {
+    const LatticeChunk& chunk = tiles_.chunks[c];
+    if (pass.gradient_wanted(chunk.first)) owner_volume(laws_.space(), owner_gradients(chunk, tangent), volume_.data() + chunk.first, volume_.stride());
+  }
+}
+
+template <int D>
+OwnerGradients LatticeBonds<D>::owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept {
+  return {chunk_points, gradient_.stride(), gradient_.data() + chunk.first, tangent ? direction_.data() + chunk.first : nullptr};
+}
+
+/// Volume changes of the owners, and those of the far ends after them.
+template <int D>
+void LatticeBonds<D>::point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept {
+  s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, !families_.any_weak()};
+  std::fill_n(s.volume_group, slots, chunk.first);
+  for (int k = 0; k < slots && pairs_; ++k) s.volume_group[slots + k] = chunk.first + families_.slots.shifts[slot + static_cast<std::size_t>(k)];
+}
+
+template <int D>
+void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  for (int c = 0; c < (tangent ? 2 : 1); ++c) {
+    const double* from = c == 0 ? s.pressure : s.pressure_rate;
+    double* to = pressure_.component(c) + chunk.first;
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack own = Pack::load(to + l);
+      for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
+      own.store(to + l);
+      for (int k = 0; k < slots && both_ends; ++k) {
+        const std::size_t at = slot + static_cast<std::size_t>(k);
+        add_to_cells(to + families_.slots.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pack_mask(pattern.mask[at], l));
+      }
+    }
+  }
+}
+
+/// Weights of the lanes, and their ends where a law or a sum asks for them.
+template <int D>
+void LatticeBonds<D>::weigh(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  const double* scale = pattern.scale_of(formulation_.weight);
+  for (int k = 0; k < slots; ++k) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    const double* far_scale = scale_.data() + chunk.first + families_.slots.shifts[at];
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      const Pack b = pattern.b_pack(at, l) * Pack(slot_weight_[at]);
+      (b * Pack::load(scale + l)).store(s.weight + k * chunk_points + l);
+      if (both_ends) (b * Pack::load(far_scale + l)).store(s.far_weight + k * chunk_points + l);
+    }
+  }
+}
+
+/// Stable numbers: of bonds that are evaluated once, those of their slot in the first half. whole: this batch has the slots that are
+/// numbered, one after the other.
+template <int D>
+void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept {
+  const auto of = [&](std::size_t chunk, std::size_t at) { return static_cast<std::int64_t>((chunk * slots_each() + at) * chunk_points); };
+  s.far_number = static_cast<std::int64_t>(two_states_ ? one_end() : 0);
+  s.first_number = whole ? of(index, slot) : -1;
+  const LatticePattern& pattern = families_.pattern(tiles_.chunks[index]);
+  for (int lane = 0; lane < slots * chunk_points && !whole; ++lane) {
+    const std::size_t at = slot + static_cast<std::size_t>(lane / chunk_points);
+    const int l = lane % chunk_points;
+    if (at < slots_each()) {
+      s.number[lane] = of(index, at) + l;
+    } else if (!pattern.intact(at, l)) {
+      s.number[lane] = -1;
+    } else {
+      const std::int64_t far = tiles_.chunks[index].first + l + families_.slots.shifts[at];
+      const bool same = !two_states_ || (!selective_ && laws_.same(static_cast<std::size_t>(tiles_.chunks[index].first + l), static_cast<std::size_t>(far)));
+      s.number[lane] = of(static_cast<std::size_t>(tiles_.chunk_of(far)), families_.slots.reverse(at)) + far % chunk_points + (same ? 0 : s.far_number);
+    }
+  }
+}
+
+template <int D>
+int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy) {
+  const LatticeChunk& chunk = tiles_.chunks[index];
+  const LatticePattern& pattern = families_.pattern(chunk);
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.alone();
+  const std::int64_t p = chunk.first;
+  double* const H = selective_ ? s.Ht : s.H;
+  double* const dH = selective_ ? s.dHt : s.dH;
+  if (selective_) point_to_volumes(chunk, slot, slots, s);
+  BondVectors vectors;
+  bond_vectors(chunk, slot, slots, s, vectors);
+  const int lanes = slots * chunk_points;
+  const std::int64_t* shifts = families_.slots.shifts.data() + slot;
+  const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* to) {
+    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, slots, p, vectors, u, Hbar, to);
+  };
+  const auto adjoint = [&](auto per_slot, auto of_both) {
+    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, pattern.mask.data() + slot, slots, p, vectors, s.P, pass.out, flux_);
+  };
+  // The kernels are compiled for each way of reading the bond vectors and each base.
+  const auto choose = [&](const auto& kernel, auto... arguments) {
+    using std::false_type, std::true_type;
+    if (vectors.per_slot) mean_ ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
+    else mean_ ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
+  };
+  choose(gradient, pass.u, ConstFieldView(gradient_), H);
+  if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
+  weigh(chunk, slot, slots, s, both_ends);
+  for (int k = 0; k < slots; ++k) {
+    const std::uint8_t mask = pattern.mask[slot + static_cast<std::size_t>(k)];
+    for (int l = 0; l < chunk_points && mask != 0xff; l += pack_width) {
+      const int lane = k * chunk_points + l;
+      const Pack keep = Pack::load(lane_factors()[mask] + l);
+      for (int c = 0; c < D * D; ++c) {
+        (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
+        if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
+      }
+    }
+    for (int l = 0; l < chunk_points && (!laws_.single() || sample); ++l) {
+      s.owner[k * chunk_points + l] = chunk.first + l;
+      s.far[k * chunk_points + l] = static_cast<std::int32_t>((mask >> l & 1) ? p + shifts[k] + l : p + l);
+    }
+  }
+  if (pass.work.history()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
+  const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
+  if (bad >= 0) return bad;
+  if (sample) {
+    pass.work.add_samples(lanes, s, *pass.sums);
+    return -1;
+  }
+  if (pass.only) return -1;
+  choose(adjoint);
+  if (selective_) add_pressures(chunk, slot, slots, s, both_ends, tangent);
+  return -1;
+}
+
+template <int D>
+void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = tiles_.blocks[b];
+  BatchScratch& s = scratch_.mine();
+  const std::size_t slots = pairs_ && !pass.alone() ? families_.slots.half : families_.slots.size();
+  double energy = 0;
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+    const LatticeChunk& chunk = tiles_.chunks[c];
+    if (!pass.wanted(chunk.first)) continue;
+    for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
+      const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
+      const int bad = bonds_of_chunk(c, slot, n, s, pass, &energy);
+      if (bad >= 0) return pass.report(chunk.first + bad % chunk_points);
+    }
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+/// What is left to do with the stress on Hbar once all bonds are in.
+template <int D>
+void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
+  for (std::size_t c = tiles_.blocks[b].chunk_begin; c < tiles_.blocks[b].chunk_end; ++c) {
+    const LatticeChunk& chunk = tiles_.chunks[c];
+    double* const stress = flux_.data() + chunk.first;
+    if (selective_) {
+      add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
+                       stress, flux_.stride());
+    }
+    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, chunk.first, pass.out);
+  }
+}
+
+/// Adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
+template <int D>
+void LatticeBonds<D>::divergence(Pass& pass, int number) const {
+  tiles_.colouring.for_each([&](std::size_t b) {
+    if (!quiet_.awake(b, number)) return;
+    const LatticeBlock& block = tiles_.blocks[b];
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
+    if (stencils_) return;
+    for (std::size_t r = block.row_begin; r < block.row_end; ++r) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end && families_.any_broken(); ++c)
+      operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, pass.out);
+  });
+}
+
+template <int D>
+void LatticeBonds<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  constexpr int last = 3;
+  if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
+  if (pass.alone() || pass.work.tangent()) quiet_.wake();
+  else quiet_.look(last, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+  const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
+  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) gradients(b, pass); });
+  if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
+  tiles_.colouring.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
+  parallel_for(blocks(), awake([&](std::size_t b) { finish_stress(b, pass); }));
+  if (pass.bad < 0) divergence(pass, last);
+  tiles_.clear_dead(pass.out);
+}
+
+template <int D>
+void LatticeBonds<D>::report(ModelReport& report) const {
+  report.fallbacks += stencils_ ? stencils_->fallbacks() : 0;
+  report.bytes += (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + volume_.bytes() +
+                  pressure_.bytes() + scratch_.bytes() + (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
+  report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
+  if (pairs_) report.skips.push_back(second_evaluation(families_.bonds()));
+}
+
+template class LatticeBonds<1>;
+template class LatticeBonds<2>;
+template class LatticeBonds<3>;
+
+}  // namespace perikit

@@ -1,0 +1,326 @@
+#pragma once
+/// Point gradient (order 1) and its adjoint, the divergence, on a lattice. Neighbours along a row are contiguous: packs of
+/// points are processed at once, and offsets +d, -d together, so that the owner's own value cancels in whole families.
+///
+///   S_i  = sum_s omega_s (u_{i+s} - u_i) (x) d_s          H_i = S_i K_i^-1 / spacing
+///   f_k  = sum_s omega_s Q_{k+s} d_s + Q_k m_k            Q_i = W_i P_i K_i^-1 / spacing,  m_k = sum_s omega_s d_s
+///
+/// Beside them, at little cost, the plain sums over neighbours: sum_s omega_s u_{k+s} with the gradient, f_k += sum_s omega_s v_{k+s} of
+/// a source v with the divergence.
+///
+/// Sums run along the internal axes of the lattice (d, K, Q, m); H and S have the components of the input axes.
+/// (s runs over intact bonds; dead cells hold u = 0 and Q = 0, so that free surfaces need no masks but the first moment m.)
+
+#include "families/lattice_families.hpp"
+#include "perikit/core/simd.hpp"
+#include "families/shape_tensor.hpp"
+
+namespace perikit {
+
+template <int D>
+class LatticeOperator {
+ public:
+  explicit LatticeOperator(const LatticeFamilies& families) : f_(families) {}
+
+  /// H of `count` chunks of one block, in their order: H[(a * D + b) * stride + lane], lanes from 0.
+  void gradient(const LatticeChunk* chunks, int count, ConstFieldView u, double* H, std::size_t stride) const noexcept {
+    runs<false>(chunks, count, u, H, stride, nullptr);
+  }
+  /// The same, and sums[a * stride + lane] = sum_s omega_s u_{k+s} over intact bonds.
+  void gradient_and_sums(const LatticeChunk* chunks, int count, ConstFieldView u, double* H, double* sums, std::size_t stride) const noexcept {
+    runs<true>(chunks, count, u, H, stride, sums);
+  }
+
+  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at at + lane. Also f += Q m, unless f is null.
+  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at, FieldView f) const noexcept {
+    const LatticePattern& pattern = f_.pattern(chunk);
+    const Pack scale(1.0 / f_.spacing);
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      Pack inverse[6];
+      for (int k = 0; k < symmetric_components(D); ++k) inverse[k] = Pack::load(pattern.inverse[k] + l) * scale;
+      for (int c = 0; c < D; ++c) {
+        Pack s[D];
+        for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + f_.grid.axis[e]) * s_stride + l);
+        Pack own(0.0);
+        for (int e = 0; e < D; ++e) {
+          Pack q(0.0);
+          for (int k = 0; k < D; ++k) q += s[k] * inverse[symmetric_index(D, k, e)];
+          q.store(Q.component(c * D + e) + at + l);
+          own += q * Pack::load(pattern.moment[e] + l);
+        }
+        if (f.data && chunk.pattern >= 0) (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
+      }
+    }
+  }
+
+  /// f += div Q for the target rows that the sources in `row` reach. Q of the cell row.first is at `from`; sources are read along the row,
+  /// as far as a family reaches beyond its ends.
+  void divergence(const LatticeRow& row, ConstFieldView Q, std::int64_t from, FieldView f) const noexcept {
+    for (std::int64_t k = 0; k < std::int64_t(row.chunks) * chunk_points; k += pack_width) scatter<false>(row, row.first + k, Q, from + k, {}, f);
+  }
+  /// The same and f_k += sum_s omega_s v_{k+s}; v is 0 in dead cells. Q and v are fields of the body.
+  void divergence(const LatticeRow& row, ConstFieldView Q, ConstFieldView v, FieldView f) const noexcept {
+    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter<true>(row, p, Q, p, v, f);
+  }
+
+  /// Takes what the sources in irregular lanes have sent too much along broken and weakened bonds back out of the divergence (v: null if there
+  /// was none). Q of the chunk begins at `from`.
+  void remove_broken(const LatticeChunk& chunk, ConstFieldView Q, std::int64_t from, ConstFieldView v, FieldView f) const noexcept {
+    const LatticePattern& pattern = f_.pattern(chunk);
+    for (int l = 0; l < chunk_points; ++l) {
+      if (!(pattern.irregular >> l & 1)) continue;
+      const std::int64_t p = chunk.first + l;
+      for (std::size_t s = 0; s < f_.slots.offsets.size(); ++s) {
+        const double gone = 1 - pattern.b(s, l);
+        const std::int64_t far = p + f_.slots.shifts[s];
+        if (gone == 0 || !(f_.live_bits(far) & 1)) continue;
+        for (int c = 0; c < D; ++c) {
+          double sent = v.data ? -v.component(c)[p] : 0.0;
+          for (int e = 0; e < D; ++e) sent += f_.slots.offsets[s][static_cast<std::size_t>(e)] * Q.component(c * D + e)[from + l];
+          f.component(c)[far] += gone * f_.slots.omega[s] * sent;
+        }
+      }
+    }
+  }
+
+ private:
+  template <bool with_sums>
+  void runs(const LatticeChunk* chunks, int count, ConstFieldView u, double* H, std::size_t stride, double* sums) const noexcept {
+    for (int c = 0; c < count;) {
+      const int lane = c * chunk_points;
+      double* near = with_sums ? sums + lane : nullptr;
+      const auto adjacent = [&](int n) { return count - c >= n && chunks[c + n - 1].first == chunks[c].first + (n - 1) * chunk_points; };
+      if (adjacent(4)) {
+        run<4, with_sums>(chunks + c, u, H + lane, stride, near);
+        c += 4;
+      } else if (adjacent(2)) {
+        run<2, with_sums>(chunks + c, u, H + lane, stride, near);
+        c += 2;
+      } else {
+        run<1, with_sums>(chunks + c, u, H + lane, stride, near);
+        c += 1;
+      }
+    }
+  }
+
+  template <int chunks_at_once, bool with_sums>
+  void run(const LatticeChunk* chunks, ConstFieldView u, double* H, std::size_t stride, double* sums) const noexcept {
+    constexpr int V = chunks_at_once * chunk_points / pack_width;
+    const std::int64_t p = chunks[0].first;
+    const Pack scale(1.0 / f_.spacing);
+    for (int c = 0; c < D; ++c) {
+      const double* base = u.component(c) + p;
+      Pack s[3][V], near[V];
+      if (f_.slots.own_row >= 0) {
+        const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(f_.slots.own_row)];
+        for (int k = 1; k <= profile.reach; ++k) {
+          const Pack w(profile.omega_d0[static_cast<std::size_t>(k)]);
+          const Pack plain(profile.omega[static_cast<std::size_t>(k)]);
+          for (int v = 0; v < V; ++v) {
+            const Pack ahead = Pack::load(base + v * pack_width + k), behind = Pack::load(base + v * pack_width - k);
+            s[0][v] += w * (ahead - behind);
+            if constexpr (with_sums) near[v] += plain * (ahead + behind);
+          }
+        }
+      }
+      if constexpr (D > 1) {
+        for (const RowPair& row : f_.slots.row_pairs) {
+          Pack total[V];
+          const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(row.profile)];
+          const double* w = profile.omega.data();
+          const double* wk = profile.omega_d0.data();
+          switch (profile.reach) {
+            case 0: row_sums<V, 0, with_sums>(base, row.shift, 0, w, wk, s[0], total, near); break;
+            case 1: row_sums<V, 1, with_sums>(base, row.shift, 1, w, wk, s[0], total, near); break;
+            case 2: row_sums<V, 2, with_sums>(base, row.shift, 2, w, wk, s[0], total, near); break;
+            default: row_sums<V, -1, with_sums>(base, row.shift, profile.reach, w, wk, s[0], total, near);
+          }
+          for (int v = 0; v < V; ++v) {
+            s[1][v] += Pack(row.d1) * total[v];
+            if constexpr (D > 2) s[2][v] += Pack(row.d2) * total[v];
+          }
+        }
+      }
+      for (int v = 0; v < V; ++v) {
+        const int lane = v * pack_width % chunk_points;
+        const LatticeChunk& chunk = chunks[v * pack_width / chunk_points];
+        const LatticePattern& pattern = f_.pattern(chunk);
+        if (chunk.pattern >= 0) {
+          const Pack own = Pack::load(base + v * pack_width);
+          for (int e = 0; e < D; ++e) s[e][v] -= own * Pack::load(pattern.moment[e] + lane);
+          if (pattern.irregular) replace_irregular<V, with_sums>(chunk, pattern, lane, u.component(c), s, near, v);
+        }
+        if constexpr (with_sums) near[v].store(sums + static_cast<std::size_t>(c) * stride + v * pack_width);
+        for (int e = 0; e < D; ++e) {
+          Pack h(0.0);
+          for (int k = 0; k < D; ++k) h += s[k][v] * Pack::load(pattern.inverse[symmetric_index(D, k, e)] + lane);
+          (h * scale).store(H + static_cast<std::size_t>(c * D + f_.grid.axis[e]) * stride + v * pack_width);
+        }
+      }
+    }
+  }
+
+  /// Sums over one mirrored pair of rows: along += sum omega d0 (u+ - u-), total = sum omega (u+ - u-), near += sum omega (u+ + u-).
+  template <int V, int fixed_reach, bool with_sums>
+  static void row_sums(const double* base, std::int64_t shift, int reach, const double* w, const double* wk, Pack* along, Pack* total, Pack* near) noexcept {
+    const double* plus = base + shift;
+    const double* minus = base - shift;
+    for (int v = 0; v < V; ++v) {
+      const Pack above = Pack::load(plus + v * pack_width), below = Pack::load(minus + v * pack_width);
+      total[v] = Pack(w[0]) * (above - below);
+      if constexpr (with_sums) near[v] += Pack(w[0]) * (above + below);
+    }
+    const int last = fixed_reach >= 0 ? fixed_reach : reach;
+    for (int k = 1; k <= last; ++k) {
+      const Pack omega(w[k]), omega_k(wk[k]);
+      for (int v = 0; v < V; ++v) {
+        const Pack a = Pack::load(plus + v * pack_width + k), b = Pack::load(minus + v * pack_width - k);
+        const Pack c = Pack::load(plus + v * pack_width - k), d = Pack::load(minus + v * pack_width + k);
+        const Pack ahead = a - b, behind = c - d;
+        along[v] += omega_k * (ahead - behind);
+        total[v] += omega * (ahead + behind);
+        if constexpr (with_sums) near[v] += omega * ((a + b) + (c + d));
+      }
+    }
+  }
+
+  /// Lanes with broken or weakened bonds: the sum over what is left of them, one by one.
+  template <int V, bool with_sums>
+  void replace_irregular(const LatticeChunk& chunk, const LatticePattern& pattern, int lane, const double* u, Pack (&s)[3][V], Pack (&near)[V], int v) const noexcept {
+    for (int l = lane; l < lane + pack_width; ++l) {
+      if (!(pattern.irregular >> l & 1)) continue;
+      const std::int64_t p = chunk.first + l;
+      double direct[3] = {}, plain = 0;
+      for (std::size_t k = 0; k < f_.slots.offsets.size(); ++k) {
+        if (!pattern.intact(k, l)) continue;
+        const double omega = pattern.b(k, l) * f_.slots.omega[k], w = omega * (u[p + f_.slots.shifts[k]] - u[p]);
+        for (int e = 0; e < D; ++e) direct[e] += w * f_.slots.offsets[k][static_cast<std::size_t>(e)];
+        if constexpr (with_sums) plain += omega * u[p + f_.slots.shifts[k]];
+      }
+      if constexpr (with_sums) near[v].v[l - lane] = plain;
+      for (int e = 0; e < D; ++e) s[e][v].v[l - lane] = direct[e];
+    }
+  }
+
+  /// From the sources at p, whose Q is at `from`, and their neighbours along the row.
+  template <bool with_source>
+  void scatter(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
+    // Sums and differences of mirrored neighbours along the row, used by every profile.
+    constexpr int most = 16;
+    if (f_.slots.row_reach > most) {
+      scatter_far<with_source>(row, p, Q, from, source, f);
+      return;
+    }
+    Pack difference[most + 1][D], sum1[most + 1][D], sum2[most + 1][D], sum0[most + 1][D];
+    for (int c = 0; c < D; ++c) {
+      const double* q0 = Q.component(c * D) + from;
+      for (int k = 1; k <= f_.slots.row_reach; ++k) difference[k][c] = Pack::load(q0 + k) - Pack::load(q0 - k);
+      if constexpr (D > 1) {
+        const double* q1 = Q.component(c * D + 1) + from;
+        sum1[0][c] = Pack::load(q1);
+        for (int k = 1; k <= f_.slots.row_reach; ++k) sum1[k][c] = Pack::load(q1 + k) + Pack::load(q1 - k);
+      }
+      if constexpr (D > 2) {
+        const double* q2 = Q.component(c * D + 2) + from;
+        sum2[0][c] = Pack::load(q2);
+        for (int k = 1; k <= f_.slots.row_reach; ++k) sum2[k][c] = Pack::load(q2 + k) + Pack::load(q2 - k);
+      }
+      if constexpr (with_source) {
+        const double* v = source.component(c) + p;
+        sum0[0][c] = Pack::load(v);
+        for (int k = 1; k <= f_.slots.row_reach; ++k) sum0[k][c] = Pack::load(v + k) + Pack::load(v - k);
+      }
+    }
+    if (f_.slots.own_row >= 0) {
+      const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(f_.slots.own_row)];
+      for (int c = 0; c < D; ++c) {
+        Pack a = Pack::load(f.component(c) + p);
+        for (int k = 1; k <= profile.reach; ++k) {
+          a += Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * difference[k][c];
+          if constexpr (with_source) a += Pack(profile.omega[static_cast<std::size_t>(k)]) * sum0[k][c];
+        }
+        a.store(f.component(c) + p);
+      }
+    }
+    if constexpr (D > 1) {
+      int current = -1;
+      Pack a[D], b[D], g[D], near[D];
+      for (const RowPair& pair : f_.slots.row_pairs) {
+        if (pair.profile != current) {
+          current = pair.profile;
+          const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(current)];
+          const double* w = profile.omega.data();
+          const double* wk = profile.omega_d0.data();
+          for (int c = 0; c < D; ++c) {
+            a[c] = Pack(0.0);
+            b[c] = Pack(w[0]) * sum1[0][c];
+            if constexpr (D > 2) g[c] = Pack(w[0]) * sum2[0][c];
+            if constexpr (with_source) near[c] = Pack(w[0]) * sum0[0][c];
+          }
+          for (int k = 1; k <= profile.reach; ++k) {
+            for (int c = 0; c < D; ++c) {
+              a[c] += Pack(wk[k]) * difference[k][c];
+              b[c] += Pack(w[k]) * sum1[k][c];
+              if constexpr (D > 2) g[c] += Pack(w[k]) * sum2[k][c];
+              if constexpr (with_source) near[c] += Pack(w[k]) * sum0[k][c];
+            }
+          }
+        }
+        const bool below = inside(row.k1 - pair.d1, row.k2 - pair.d2), above = inside(row.k1 + pair.d1, row.k2 + pair.d2);
+        for (int c = 0; c < D; ++c) {
+          Pack across = Pack(pair.d1) * b[c];
+          if constexpr (D > 2) across += Pack(pair.d2) * g[c];
+          const Pack even = with_source ? a[c] + near[c] : a[c];
+          double* target = f.component(c) + p;
+          if (below) (Pack::load(target - pair.shift) + (even + across)).store(target - pair.shift);
+          if (above) (Pack::load(target + pair.shift) + (even - across)).store(target + pair.shift);
+        }
+      }
+    }
+  }
+
+  /// Horizons of many cells: no buffers.
+  template <bool with_source>
+  void scatter_far(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
+    const auto sums = [&](int profile_index, int c, Pack (&out)[3]) {
+      const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(profile_index)];
+      for (int e = 0; e < D; ++e) {
+        const double* q = Q.component(c * D + e) + from;
+        out[e] = e == 0 ? Pack(0.0) : Pack(profile.omega[0]) * Pack::load(q);
+        for (int k = 1; k <= profile.reach; ++k) {
+          out[e] += e == 0 ? Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * (Pack::load(q + k) - Pack::load(q - k))
+                           : Pack(profile.omega[static_cast<std::size_t>(k)]) * (Pack::load(q + k) + Pack::load(q - k));
+        }
+      }
+      if constexpr (with_source) {   // goes where the first sum goes
+        const double* v = source.component(c) + p;
+        if (profile_index != f_.slots.own_row) out[0] += Pack(profile.omega[0]) * Pack::load(v);
+        for (int k = 1; k <= profile.reach; ++k) out[0] += Pack(profile.omega[static_cast<std::size_t>(k)]) * (Pack::load(v + k) + Pack::load(v - k));
+      }
+    };
+    for (int c = 0; c < D; ++c) {
+      Pack s[3];
+      double* target = f.component(c) + p;
+      if (f_.slots.own_row >= 0) {
+        sums(f_.slots.own_row, c, s);
+        (Pack::load(target) + s[0]).store(target);
+      }
+      int current = -1;
+      for (const RowPair& pair : f_.slots.row_pairs) {
+        if (pair.profile != current) sums(current = pair.profile, c, s);
+        Pack across = D > 1 ? Pack(pair.d1) * s[1] : Pack(0.0);
+        if (D > 2) across += Pack(pair.d2) * s[2];
+        if (inside(row.k1 - pair.d1, row.k2 - pair.d2)) (Pack::load(target - pair.shift) + (s[0] + across)).store(target - pair.shift);
+        if (inside(row.k1 + pair.d1, row.k2 + pair.d2)) (Pack::load(target + pair.shift) + (s[0] - across)).store(target + pair.shift);
+      }
+    }
+  }
+
+  bool inside(std::int64_t k1, std::int64_t k2) const noexcept {
+    return k1 >= 0 && k1 < f_.grid.extent[1] && k2 >= 0 && k2 < f_.grid.extent[2];
+  }
+
+  const LatticeFamilies& f_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,184 @@
+#include "spaces/lattice_points.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace perikit {
+
+namespace {
+
+/// Chunks of a batch: batch_points lanes.
+constexpr int chunks_at_once = batch_points / chunk_points;
+
+/// Rows of a block that are taken together: whole batches for the law where rows are short.
+std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<std::size_t>(std::max(1, chunks_at_once / row.chunks)); }
+
+}  // namespace
+
+template <int D>
+LatticePoints<D>::LatticePoints(const SpaceParts& parts)
+    : families_(*parts.families.lattice()), tiles_(families_.tiles), laws_(parts.laws), operator_(families_) {
+  quiet_ = parts.quiet_blocks(tiles_.reach);
+  gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.slots.row_reach)));
+  for (const LatticeRow& row : tiles_.rows) most_ = std::max(most_, static_cast<std::int64_t>(rows_at_once(row)) * width(row));
+}
+
+/// The law of n chunks, whose gradients are in the lanes of s. Whether all of them are admissible.
+template <int D>
+bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, double* energy) const {
+  for (int i = 0; i < n; ++i) {
+    const int lane = i * chunk_points;
+    std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
+    if (!laws_.single() || pass.alone()) {
+      for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk(index[i]).first + l;
+    }
+  }
+  if (pass.work.history()) {
+    s.first_number = index[n - 1] - index[0] == n - 1 ? std::int64_t{index[0]} * chunk_points : -1;
+    for (int l = 0; l < n * chunk_points; ++l) s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
+  }
+  const int bad = pass.work.evaluate(n * chunk_points, s, false, energy);
+  if (bad >= 0) pass.report(chunk(index[bad / chunk_points]).first + bad % chunk_points);
+  return bad < 0;
+}
+
+/// Energies or samples of points, one by one.
+template <int D>
+void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = tiles_.blocks[b];
+  BatchScratch& s = scratch_.mine();
+  double energy = 0;
+  std::int32_t index[chunks_at_once];
+  int n = 0;
+  for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+    if (pass.wanted(tiles_.chunks[c].first)) {
+      operator_.gradient(&tiles_.chunks[c], 1, pass.u, s.H + n * chunk_points, batch_points);
+      index[n++] = static_cast<std::int32_t>(c);
+    }
+    if (n == 0 || (n < chunks_at_once && c + 1 < block.chunk_end)) continue;
+    if (!evaluate(index, n, s, pass, &energy)) return;
+    if (pass.work.work() == Work::sample) {
+      // The average over one evaluation point is its value, whatever its weight.
+      for (int l = 0; l < n * chunk_points; ++l) {
+        const LatticePattern& pattern = families_.pattern(chunk(index[l / chunk_points]));
+        if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
+      }
+      pass.work.add_samples(n * chunk_points, s, *pass.sums);
+    }
+    n = 0;
+  }
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+/// Cells of a row in the memory of Q: with a gap before it and after it, zero, or Q of the chunks that families reach there.
+template <int D>
+std::int64_t LatticePoints<D>::width(const LatticeRow& row) const noexcept {
+  return std::int64_t(row.chunks) * chunk_points + 2 * gap_;
+}
+
+/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows, and then the
+/// one after their last.
+template <int D>
+void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
+  const auto zero = [&](std::int64_t from, std::int64_t to) {
+    for (int c = 0; c < D * D && to > from; ++c) std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
+  };
+  r.index.clear();
+  r.at.clear();
+  std::int64_t start = gap_;
+  for (const LatticeRow& row : rows) {
+    std::int64_t filled = start - gap_;
+    for (; next < end && row.holds(tiles_.chunks[next].first); ++next) {
+      const std::int64_t to = start + tiles_.chunks[next].first - row.first;
+      zero(filled, to);
+      filled = to + chunk_points;
+      r.index.push_back(static_cast<std::int32_t>(next));
+      r.at.push_back(to);
+    }
+    start += width(row);
+    zero(filled, start - gap_);
+  }
+  r.own = r.index.size();
+  // Where a row goes on in another block, families reach into Q of its chunks: computed here, too.
+  start = gap_;
+  for (const LatticeRow& row : rows) {
+    const auto outside = [&](std::int32_t k) {
+      const std::int32_t index = tiles_.chunk_of(row.first + k * chunk_points);
+      if (index < 0) return;
+      r.index.push_back(index);
+      r.at.push_back(start + k * chunk_points);
+    };
+    for (std::int32_t k = -row.before; k < 0; ++k) outside(k);
+    for (std::int32_t k = row.chunks; k < row.chunks + row.after; ++k) outside(k);
+    start += width(row);
+  }
+}
+
+/// Gradients of n chunks that `place` has found, in the lanes of a batch.
+template <int D>
+void LatticePoints<D>::gradients(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept {
+  for (int i = 0, next = 1; i < n; i = next++) {
+    while (next < n && index[next] == index[next - 1] + 1) ++next;
+    operator_.gradient(&chunk(index[i]), next - i, u, H + i * chunk_points, batch_points);
+  }
+}
+
+template <int D>
+void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
+  const LatticeBlock& block = tiles_.blocks[b];
+  BatchScratch& s = scratch_.mine();
+  Rows& r = rows_[static_cast<std::size_t>(thread_index())];
+  double energy = 0, of_others = 0;
+  std::size_t next = block.chunk_begin;
+  for (std::size_t first = block.row_begin; first < block.row_end;) {
+    const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
+    place(rows, next, block.chunk_end, r);
+    for (std::size_t i = 0; i < r.index.size();) {
+      const bool own = i < r.own;
+      const int n = static_cast<int>(std::min<std::size_t>(chunks_at_once, (own ? r.own : r.index.size()) - i));
+      gradients(&r.index[i], n, pass.u, s.H);
+      if (pass.work.tangent()) gradients(&r.index[i], n, pass.w, s.dH);
+      s.keep_history = own;
+      if (!evaluate(&r.index[i], n, s, pass, own ? &energy : &of_others)) return;
+      for (int k = 0; k < n; ++k, ++i)
+        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i], own ? pass.out : FieldView{});
+    }
+    std::int64_t start = gap_;
+    for (const LatticeRow& row : rows) {
+      operator_.divergence(row, r.flux, start, pass.out);
+      start += width(row);
+    }
+    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
+    first += rows.size();
+  }
+  s.keep_history = true;
+  if (pass.energies) pass.energies[b] = energy;
+}
+
+template <int D>
+void LatticePoints<D>::run(Pass& pass) {
+  scratch_.prepare(laws_);
+  if (pass.alone() || pass.work.tangent()) quiet_.wake();
+  else quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+  if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { one_by_one(b, pass); });
+  rows_.resize(static_cast<std::size_t>(thread_count()));
+  for (Rows& r : rows_)
+    if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
+  tiles_.colouring.for_each([&](std::size_t b) {
+    if (quiet_.awake(b, 1)) by_rows(b, pass);
+  });
+  tiles_.clear_dead(pass.out);
+}
+
+template <int D>
+void LatticePoints<D>::report(ModelReport& report) const {
+  report.evaluation_points += families_.body().points();
+  for (const Rows& r : rows_) report.bytes += r.flux.bytes();
+  report.bytes += scratch_.bytes();
+}
+
+template class LatticePoints<1>;
+template class LatticePoints<2>;
+template class LatticePoints<3>;
+
+}  // namespace perikit

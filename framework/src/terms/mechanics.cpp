@@ -1,0 +1,84 @@
+#include "terms/mechanics.hpp"
+
+#include <numeric>
+
+#include "assembly/bond_assembly.hpp"
+#include "assembly/element_assembly.hpp"
+#include "perikit/core/dimension.hpp"
+
+namespace perikit {
+
+Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
+  space_ = with_dimension(parts.families.body().dimension(), [&](auto d) { return make_space<d>(parts_); });
+  if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
+}
+
+BatchWork Mechanics::work(Work kind, bool energy) const noexcept { return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()}; }
+
+std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
+  const BatchWork work = this->work(Work::force, energy != nullptr);
+  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);   // summed in the order of the blocks
+  Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
+  space_->run(pass);
+  if (energy) *energy = std::accumulate(energies.begin(), energies.end(), *energy);
+  return pass.bad;
+}
+
+std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  const BatchWork work = this->work(Work::tangent, false);
+  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
+  space_->run(pass);
+  return pass.bad;
+}
+
+double Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  const Body& body = parts_.families.body();
+  std::vector<std::int32_t> points;
+  for (std::size_t p = 0; p < body.stride(); ++p)
+    if (marks[p / padding] && body.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+  GroupMarks near(marks.size(), 0);
+  parts_.families.mark(points, near);
+  const BatchWork work = this->work(Work::force, true);
+  std::vector<double> energies(space_->blocks(), 0.0);
+  Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
+  space_->run(pass);
+  return std::accumulate(energies.begin(), energies.end(), 0.0);
+}
+
+std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
+  const Body& body = parts_.families.body();
+  const int components = parts_.laws.components();
+  Field weight = body.make_field(1), energy = body.make_field(1);
+  s.H = body.make_field(components);
+  s.P = body.make_field(components);
+  s.cauchy = body.make_field(9);
+  s.von_mises = body.make_field(1);
+  const SampleSums sums{weight.data(), energy.data(), s.H.data(), s.P.data(), s.cauchy.data(), s.von_mises.data(), body.stride()};
+  const BatchWork work = this->work(Work::sample, false);
+  Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
+  space_->run(pass);
+  for (const std::int32_t index : body.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    const double inverse = weight.data()[p] > 0 ? 1.0 / weight.data()[p] : 0.0;
+    s.strain_energy_density.data()[p] += energy.data()[p] / body.volume(p);
+    for (Field* field : {&s.H, &s.P, &s.cauchy, &s.von_mises})
+      for (int c = 0; c < field->components(); ++c) field->component(c)[p] *= inverse;
+  }
+  return pass.bad;
+}
+
+int Mechanics::steps() const noexcept { return parts_.formulation.bond && parts_.formulation.base == BondBase::mean ? 3 : 2; }
+
+std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const {
+  return with_dimension(parts_.families.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> {
+    if (parts_.formulation.bond) return std::make_unique<BondAssembly<d>>(parts_, rows);
+    return std::make_unique<ElementAssembly<d>>(parts_, rows);
+  });
+}
+
+void Mechanics::report(ModelReport& report) const {
+  space_->report(report);
+  if (history_) report.bytes += history_->bytes();
+}
+
+}  // namespace perikit

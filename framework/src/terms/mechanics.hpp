@@ -1,0 +1,37 @@
+#pragma once
+#include "perikit/operators/law_history.hpp"
+#include "spaces/evaluation_space.hpp"
+#include "terms/term.hpp"
+
+namespace perikit {
+
+/// Laws at the evaluation points of a space: E = sum_q W_q psi(F_q), with the map between the gradients of the space and those of the laws.
+/// Force, tangent action, energy and samples stand here once, for every space.
+class Mechanics final : public Term {
+ public:
+  explicit Mechanics(const SpaceParts& parts);
+
+  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) override;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
+  int steps() const noexcept override;
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
+  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  void bonds_changed(std::span<const std::int32_t> points) override { space_->bonds_changed(points); }
+  const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
+  void report(ModelReport& report) const override;
+  QuietCounts quiet_counts() const noexcept override { return space_->quiet_counts(); }
+
+  /// Of the laws; null where none has one.
+  LawHistory* history() noexcept { return history_.get(); }
+  void history_restored() { space_->history_restored(); }
+
+ private:
+  BatchWork work(Work kind, bool energy) const noexcept;
+
+  SpaceParts parts_;
+  std::unique_ptr<EvaluationSpace> space_;
+  std::unique_ptr<LawHistory> history_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,272 @@
+#include "terms/pair_forces.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "perikit/core/dimension.hpp"
+#include "terms/family_point.hpp"
+#include "terms/pair_assembly.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Stiffness of the whole bonds of a family against a homogeneous stretch along each axis: 1/2 sum_j V_j w''(0) (|xi| cos^2)^2.
+template <int D>
+std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus, const FamilyArrays& family) {
+  const std::size_t n = family.size;
+  AlignedVector<double> omega(n, 0.0), rest(n, 0.0), moduli(n, modulus), stiffness(n, 0.0);
+  for (std::size_t k = 0; k < family.far.size(); ++k) omega[k] = family.whole_omega(k);
+  law.bond_law({family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
+  std::array<double, D> sum{};
+  for (std::size_t k = 0; k < family.far.size(); ++k)
+    for (std::size_t a = 0; a < D; ++a) {
+      const double extension = family.xi[a][k] * family.xi[a][k] / family.length[k];
+      sum[a] += 0.5 * family.volume[k] * stiffness[k] * extension * extension;
+    }
+  return sum;
+}
+
+/// m over what is left of the bonds, or over whole ones.
+double weighted_volume(const FamilyArrays& family, bool whole) {
+  double m = 0;
+  for (std::size_t k = 0; k < family.far.size(); ++k)
+    m += (whole ? family.whole_omega(k) : family.omega[k]) * family.length[k] * family.length[k] * family.volume[k];
+  return m;
+}
+
+/// A whole family of a regular lattice with the spacing of the body.
+template <int D>
+FamilyArrays regular_family(const Families& families) {
+  const Body& body = families.body();
+  Lattice lattice;
+  lattice.dimension = D;
+  lattice.spacing = body.spacing();
+  lattice.extent.fill(std::int64_t{1} << 20);
+  for (std::size_t a = D; a < 3; ++a) lattice.extent[a] = 1;
+  const auto offsets = family_offsets(lattice, body.horizon());
+  FamilyArrays family;
+  family.resize(D, static_cast<int>(offsets.size()));
+  std::vector<double> r, omega(offsets.size(), 1.0);
+  for (std::size_t k = 0; k < offsets.size(); ++k) {
+    double square = 0;
+    for (std::size_t a = 0; a < D; ++a) {
+      family.xi[a][k] = offsets[k][a] * body.spacing();
+      square += family.xi[a][k] * family.xi[a][k];
+    }
+    family.length[k] = std::sqrt(square);
+    family.volume[k] = body.section() * std::pow(body.spacing(), D);
+    r.push_back(std::min(1.0, family.length[k] / body.horizon()));
+  }
+  if (families.needs().influence) families.influence()->evaluate(r, omega);
+  std::copy(omega.begin(), omega.end(), family.omega.begin());
+  return family;
+}
+
+}  // namespace
+
+template <int D>
+PairForces<D>::PairForces(const PairParts& parts)
+    : families_(parts.families), body_(families_.body()), laws_(parts.laws), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
+  const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
+  loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
+  if (formulation_.dilatation) {
+    for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
+  }
+  Field modulus = body_.make_field(1);
+  FamilyArrays family;
+  families_.each_class([&](std::span<const std::int32_t> points) {
+    families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
+    set_moduli(family, points, modulus);
+  });
+  if (share_ && laws_.single() && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
+    fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
+  } else {
+    fields_.modulus = std::move(modulus);
+  }
+  if (formulation_.pair_traits.surface_correction) set_correction();
+}
+
+template <int D>
+PairPoint PairForces<D>::point(std::size_t p) const {
+  return {family_point(body_, laws_, p), 0, 1};
+}
+
+template <int D>
+void PairForces<D>::warn(const PairPoint& x, const MaterialRecord& record) {
+  if (std::find(warned_.begin(), warned_.end(), &record) != warned_.end()) return;
+  const std::string warning = law_.warning(x);
+  if (warning.empty()) return;
+  warned_.push_back(&record);
+  if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
+}
+
+template <int D>
+void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus) {
+  const double m = weighted_volume(family, false), intact = 1 - families_.damage(static_cast<std::size_t>(points[0]));
+  PairModuli moduli;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto p = static_cast<std::size_t>(points[k]);
+    if (m > 0 && (k == 0 || !laws_.single())) {
+      PairPoint x = point(p);
+      x.weighted_volume = m;
+      x.intact = intact;
+      moduli = law_.moduli(x);
+      warn(x, laws_.record_of(p));
+    }
+    // A point without bonds is a free mass: nothing to divide by, nothing stored.
+    if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
+    if (!formulation_.dilatation) continue;
+    scale_.data()[p] = m > 0 ? D / m : 0.0;
+    dilatation_modulus_.data()[p] = moduli.dilatation;
+  }
+}
+
+template <int D>
+void PairForces<D>::bonds_changed(std::span<const std::int32_t> points) {
+  FamilyArrays family;
+  for (const std::int32_t p : points) {
+    families_.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
+    set_moduli(family, {&p, 1}, fields_.modulus);
+  }
+}
+
+template <int D>
+const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
+  double least = std::numeric_limits<double>::max();
+  for (const std::int32_t p : body_.internal()) least = std::min(least, damage.onset.data()[p]);
+  return loop_->watch(least);
+}
+
+template <int D>
+double PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+  if (density_.size() == 0) density_ = body_.make_field(2);
+  if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
+  loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
+  double energy = 0;
+  for (std::size_t p = 0; p < body_.stride(); ++p) {
+    if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
+  }
+  return energy;
+}
+
+template <int D>
+void PairForces<D>::set_correction() {
+  fields_.correction = body_.make_field(D);
+  const FamilyArrays regular = regular_family<D>(families_);
+  FamilyArrays family;
+  // Pre-cracks weaken a body on purpose: the correction is that of the uncut family.
+  families_.each_class([&](std::span<const std::int32_t> points) {
+    families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
+    const auto stiffness = [&](const FamilyArrays& of, PairPoint x) {
+      x.weighted_volume = weighted_volume(of, true);
+      return axial_stiffness<D>(law_, law_.moduli(x).bond, of);
+    };
+    std::array<double, D> G;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const auto p = static_cast<std::size_t>(points[k]);
+      if (k == 0 || !laws_.single()) {
+        G.fill(1.0);
+        if (!family.far.empty()) {
+          PairPoint x = point(p);
+          if (!(x.bulk() > 0)) x.moduli = {1, 1};   // ghosts: the correction is one of shape
+          const auto own = stiffness(family, x), exact = stiffness(regular, x);
+          for (std::size_t a = 0; a < D; ++a)
+            if (own[a] > 0) G[a] = exact[a] / own[a];
+        }
+      }
+      for (int a = 0; a < D; ++a) fields_.correction.component(a)[p] = G[static_cast<std::size_t>(a)];
+    }
+  });
+}
+
+template <int D>
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
+  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
+  if (bad >= 0) return bad;
+  const bool rates = w.data != nullptr;
+  if (rates) {
+    if (rate_.size() == 0) rate_ = body_.make_field(1);
+    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr});
+  }
+  // Points in batches; padding has d/m = 0.
+  const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
+  if (energies) energies->assign(batches, 0.0);
+  parallel_for(batches, [&](std::size_t b) {
+    const std::size_t first = b * batch_points;
+    const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
+    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding, [](std::uint8_t m) { return m != 0; })) return;
+    alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
+    const double* scale = scale_.data() + first;
+    for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
+    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
+                                       energies || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    for (int l = 0; l < n; ++l) {
+      const std::size_t p = first + static_cast<std::size_t>(l);
+      q_.data()[p] = scale[l] * pressure[l];
+      if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
+      if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
+      if (energies && body_.alive(p)) (*energies)[b] += body_.volume(p) * phi[l];
+    }
+  });
+  return -1;
+}
+
+template <int D>
+std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, double* energy) {
+  std::vector<double> volumetric, bonds(energy ? loop_->blocks() : 0, 0.0);
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, {}, energy ? &volumetric : nullptr, nullptr);
+    if (bad >= 0) return bad;
+  }
+  const std::int64_t bad = loop_->run({PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr});
+  for (const std::vector<double>* parts : {&volumetric, &bonds})
+    for (const double e : *parts) *energy += e;
+  return bad;
+}
+
+template <int D>
+std::int64_t PairForces<D>::add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, w, nullptr, nullptr);
+    if (bad >= 0) return bad;
+  }
+  return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr});
+}
+
+template <int D>
+std::unique_ptr<Assembly> PairForces<D>::make_assembly(const BlockRows& rows) const {
+  return std::make_unique<PairAssembly<D>>(formulation_, PairPoints{fields_, scale_, dilatation_modulus_}, rows);
+}
+
+template <int D>
+std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples) {
+  Field volumetric = body_.make_field(1), bonds = body_.make_field(1);
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
+    if (bad >= 0) return bad;
+  }
+  const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
+  for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
+  return bad;
+}
+
+template <int D>
+void PairForces<D>::report(ModelReport& report) const {
+  report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
+  report.bytes += loop_->bytes();
+  for (const Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
+  report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
+  report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
+  if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
+  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
+}
+
+std::unique_ptr<Term> make_pair_forces(const PairParts& parts) {
+  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
+}
+
+}  // namespace perikit

@@ -1,0 +1,44 @@
+#pragma once
+/// One thing that adds to the forces, the energy and the tangent of a body. Evaluations return the internal index of the first
+/// inadmissible point, or -1; results are undefined then.
+
+#include <memory>
+#include <span>
+
+#include "assembly/assembly.hpp"
+#include "families/families.hpp"
+#include "perikit/families/quiet_counts.hpp"
+#include "perikit/operators/report.hpp"
+#include "perikit/operators/samples.hpp"
+
+namespace perikit {
+
+class Term {
+ public:
+  virtual ~Term() = default;
+  /// force += -dE/du [N]; *energy += E [J] where wanted.
+  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) = 0;
+  /// Kw += -d(force)/du w [N].
+  virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  /// Adds to the energy density, and sets what else it knows.
+  virtual std::int64_t add_samples(ConstFieldView u, PointSamples& samples) = 0;
+
+  /// Rows of the tangent that it couples are at most so many bonds apart.
+  virtual int steps() const noexcept = 0;
+  /// The rows outlive the assembly.
+  virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
+
+  // Where bonds fail.
+  /// E of what the points of the marked groups own [J].
+  virtual double energy_of(ConstFieldView u, const GroupMarks& marks) = 0;
+  /// What follows from the bonds of these points is to be computed anew.
+  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
+  /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
+  virtual const NearestFailure* watch(const BodyDamage& damage) = 0;
+
+  /// Adds bytes, counts and notes of what is left out.
+  virtual void report(ModelReport& report) const = 0;
+  virtual QuietCounts quiet_counts() const noexcept = 0;
+};
+
+}  // namespace perikit

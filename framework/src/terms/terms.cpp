@@ -1,0 +1,195 @@
+#include "perikit/terms/terms.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "assembly/block_pattern.hpp"
+#include "families/fracture.hpp"
+#include "families/lattice_families.hpp"
+#include "terms/mechanics.hpp"
+#include "terms/pair_forces.hpp"
+#include "terms/zero_energy_penalty.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Zero, a piece for each thread at a time.
+void clear(double* values, std::size_t size) {
+  constexpr std::size_t piece = std::size_t{1} << 16;
+  parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
+}
+
+}  // namespace
+
+/// One assembly for each term, over common block rows.
+struct Terms::Assemblies {
+  BlockRows rows;
+  std::vector<std::unique_ptr<Assembly>> all;
+  std::size_t version;   ///< of the bonds that they know
+  int steps = 1;
+};
+
+struct Terms::Failing {
+  Fracture fracture;
+};
+
+Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
+  const Formulation& formulation = parts_.formulation;
+  const Families& families = *parts_.families;
+  if (formulation.pairs) {
+    terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share}));
+  } else {
+    auto mechanics = std::make_unique<Mechanics>(SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share});
+    mechanics_ = mechanics.get();
+    terms_.push_back(std::move(mechanics));
+  }
+  if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
+  if (!parts_.damage) return;
+  const NearestFailure* known = nullptr;
+  for (const auto& term : terms_) {
+    const NearestFailure* of_term = term->watch(*parts_.damage);
+    if (of_term) known = of_term;
+  }
+  failing_ = std::make_unique<Failing>(Failing{Fracture(*parts_.families, *parts_.damage, parts_.skip, known)});
+}
+
+Terms::~Terms() = default;
+
+EvaluationStatus Terms::status(std::int64_t bad) const {
+  EvaluationStatus status;
+  if (bad < 0) return status;
+  const Body& body = parts_.families->body();
+  const Point x = body.position(static_cast<std::size_t>(bad));
+  status.point = body.input_of(static_cast<std::size_t>(bad));
+  status.description = fmt::format("point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
+  return status;
+}
+
+EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
+  clear(force.data, force.size());
+  if (energy) *energy = 0;
+  std::int64_t bad = -1;
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces(u, force, energy);
+  return status(bad);
+}
+
+EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  clear(Kw.data, Kw.size());
+  std::int64_t bad = -1;
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_tangent(u, w, Kw);
+  return status(bad);
+}
+
+EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
+  samples = {};
+  samples.strain_energy_density = parts_.families->body().make_field(1);
+  std::int64_t bad = -1;
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
+  return status(bad);
+}
+
+Terms::Assemblies& Terms::assemblies() {
+  if (!assemblies_) {
+    assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});
+    for (const auto& term : terms_) {
+      assemblies_->all.push_back(term->make_assembly(assemblies_->rows));
+      assemblies_->steps = std::max(assemblies_->steps, term->steps());
+    }
+  }
+  return *assemblies_;
+}
+
+EvaluationStatus Terms::assemble(ConstFieldView u, BlockMatrix& K) {
+  Assemblies& own = assemblies();
+  if (own.version != parts_.families->version()) {
+    for (const auto& assembly : own.all) assembly->bonds_changed();
+    own.version = parts_.families->version();
+  }
+  if (!K.has_pattern()) make_pattern(own.rows, own.steps, K);
+  clear(K.values.data(), K.values.size());
+  std::int64_t bad = -1;
+  for (auto assembly = own.all.begin(); assembly != own.all.end() && bad < 0; ++assembly) bad = (*assembly)->add(u, K);
+  return status(bad);
+}
+
+AssembledSize Terms::assembled_size() {
+  const Assemblies& own = assemblies();
+  const auto d = static_cast<std::size_t>(own.rows.body().dimension());
+  AssembledSize size{predict_blocks(own.rows, own.steps), own.rows.size() * 12 + own.rows.bytes()};
+  size.bytes += size.blocks * (d * d * sizeof(double) + sizeof(std::int32_t));
+  for (const auto& assembly : own.all) size.bytes += assembly->bytes();
+  return size;
+}
+
+Field Terms::shape_tensor_condition() const {
+  return has_gradients() ? condition_field(*parts_.families) : parts_.families->body().make_field(1);
+}
+
+Field Terms::damage() const { return damage_field(*parts_.families); }
+
+QuietCounts Terms::quiet_counts() const {
+  QuietCounts counts;
+  for (const auto& term : terms_) {
+    const QuietCounts of_term = term->quiet_counts();
+    counts.blocks += of_term.blocks;
+    counts.quiet += of_term.quiet;
+  }
+  return counts;
+}
+
+LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->history() : nullptr; }
+
+void Terms::history_restored() {
+  if (mechanics_) mechanics_->history_restored();
+}
+
+void Terms::bonds_changed(std::span<const std::int32_t> points) {
+  for (const auto& term : terms_) term->bonds_changed(points);
+}
+
+BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion& motion) {
+  if (!failing_) return {};
+  const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
+    double sum = 0;
+    for (const auto& term : terms_) sum += term->energy_of(at, marks);
+    return sum;
+  };
+  return failing_->fracture.update(u, time_step, motion, energy, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+}
+
+std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
+
+void Terms::restore_bonds(std::span<const BondChange> changes) {
+  if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+}
+
+BondChecks Terms::bond_checks() const { return failing_ ? failing_->fracture.checks() : BondChecks{}; }
+
+ModelReport Terms::report() const {
+  const Families& families = *parts_.families;
+  ModelReport report;
+  report.bonds = families.bonds();
+  report.broken_bonds = families.cut();
+  report.singular_families = families.singular();
+  report.bytes = families.bytes() + (failing_ ? failing_->fracture.bytes() : 0);
+  const int d = families.body().dimension();
+  const double bond_bytes = static_cast<double>(report.bonds) * 8 * (d + 1);
+  if (const LatticeFamilies* lattice = families.lattice()) {
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
+    std::size_t whole = 0;
+    const auto& chunks = lattice->tiles.chunks;
+    for (const LatticeChunk& chunk : chunks) whole += chunk.pattern < 0;
+    report.skips.push_back({"shape tensors of whole families",
+                            fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
+                            megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) * sizeof(LatticePattern))});
+  } else {
+    report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
+  }
+  if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  for (const auto& term : terms_) term->report(report);
+  return report;
+}
+
+}  // namespace perikit

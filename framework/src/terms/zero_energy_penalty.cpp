@@ -1,0 +1,41 @@
+#include "terms/zero_energy_penalty.hpp"
+
+#include "perikit/core/dimension.hpp"
+#include "terms/penalty_assembly.hpp"
+
+namespace perikit {
+
+std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, double* energy) {
+  apply(u, 1.0, force, energy);
+  return -1;
+}
+
+std::int64_t ZeroEnergyPenalty::add_tangent(ConstFieldView, ConstFieldView w, FieldView Kw) {
+  apply(w, -1.0, Kw, nullptr);
+  return -1;
+}
+
+std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samples) {
+  add_density(u, samples.strain_energy_density.data());
+  return -1;
+}
+
+std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) const {
+  return with_dimension(rows.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
+}
+
+void ZeroEnergyPenalty::report(ModelReport& report) const {
+  report.bytes += bytes();
+  if (parts_.formulation.order > 1) return;
+  report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)",
+                          "a gradient and a divergence"});
+}
+
+std::unique_ptr<Term> make_penalty(const PenaltyParts& parts) {
+  return with_dimension(parts.families.body().dimension(), [&](auto d) {
+    if (parts.formulation.order > 1) return make_stencil_penalty<d>(parts);
+    return parts.families.lattice() ? make_lattice_penalty<d>(parts) : make_cloud_penalty<d>(parts);
+  });
+}
+
+}  // namespace perikit
