@@ -11,9 +11,10 @@ set(order
     model             # what a part of each kind must be
     body              # points, cracks, partition
     families          # who is in whose family, and which bonds are whole
-    spaces            # evaluation points
+    operators/laws    # stresses and tangents of a batch of points, across the laws of a body: what maps know of operators
     maps              # what a scene puts over a kinematics
     operators         # forces, tangents, energies, samples, history
+    spaces            # evaluation points; they hand their batches to the operators
     assembly          # the tangent as a matrix
     terms             # what adds to forces, energy and tangent
     problem           # state, constraints, loads
