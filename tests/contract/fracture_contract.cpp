@@ -326,6 +326,49 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
       }
 }
 
+TEST_CASE("kinematics: bonds fail under laws with history: released energy, momentum, restoring") {
+  constexpr double step = 1e-3;
+  for (const Example& example : kinematics_examples())
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d) || formulation_of(example).pairs) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud, .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
+        const auto plain = build(scene_text(options, kinematics_table(example)));
+        stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 19);
+        const double most = quantile(stretches(plain->problem().body(), plain->problem().state().displacement()), 0.95);
+        options.conditions = fmt::format("[damage]\ntype = \"critical_stretch\"\nstretch = {:.17g}\n", most);
+        const std::string text = scene_text(options, kinematics_table(example));
+        const auto simulation = build(text), other = build(text);
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        // A small step, then one in which bonds fail, then one of the bonds that are left.
+        const auto walk = [](BodyProblem& of, std::uint64_t seed, bool stretch) {
+          if (stretch) stretch_at_random(of.body(), of.state().displacement(), seed);
+          else deform(of.body(), of.state().displacement(), seed, 0.01);
+          Response r{0, of.make_field()};
+          const EvaluationStatus status = of.evaluate_forces(of.state().displacement(), r.force, &r.energy, step);
+          REQUIRE_MESSAGE(status.ok(), status.description);
+          return r;
+        };
+        walk(problem, 18, false);
+        problem.advance(step);
+        const std::size_t before = problem.terms().changed_bonds().size();
+        const Response intact = walk(problem, 19, true);
+        const double dissipated = problem.state().energies.dissipated;
+        problem.advance(step);
+        CHECK(problem.terms().changed_bonds().size() > before);
+        Response left{0, problem.make_field()};
+        REQUIRE(problem.evaluate_forces(problem.state().displacement(), left.force, &left.energy).ok());
+        CHECK(std::abs(intact.energy - left.energy - (problem.state().energies.dissipated - dissipated)) <= 1e-11 * std::abs(intact.energy));
+        for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
+        other->problem().restore(problem.snapshot());
+        const Response next = walk(problem, 20, true), same = walk(other->problem(), 20, true);
+        CHECK(next.energy == same.energy);
+        CHECK(difference(body, next.force, same.force) == 0);
+      }
+}
+
 TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a fragment") {
   for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})

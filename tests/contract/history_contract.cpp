@@ -19,14 +19,18 @@ namespace {
 
 constexpr double step = 1e-3;  ///< length of a step [s]; the law's rates do not see it
 
-std::string rate_scene(const Example& kinematics, int dimension, bool cloud, bool mixed) {
+BodyOptions rate_body(int dimension, bool cloud, bool mixed) {
   BodyOptions body{.dimension = dimension,
                    .cloud = cloud,
                    .crack = mixed && dimension == 2,
                    .two_materials = mixed,
                    .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
   body.cells = dimension == 3 ? 6 : dimension == 2 ? 9 : 20;
-  return scene_text(body, kinematics_table(kinematics));
+  return body;
+}
+
+std::string rate_scene(const Example& kinematics, int dimension, bool cloud, bool mixed) {
+  return scene_text(rate_body(dimension, cloud, mixed), kinematics_table(kinematics));
 }
 
 /// check(problem) for every kinematics with gradients in every dimension, on lattices and clouds; half of them with a second
@@ -207,4 +211,63 @@ TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a 
                        doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
                        InputError);
   CHECK_NOTHROW(build_problem(scene, subject().registry, {}));
+}
+
+TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces and work as from both ends") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (int d = 1; d <= 3; ++d)
+      for (const bool cloud : {false, true})
+        for (const bool mixed : {false, true}) {
+          INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, d, cloud ? "cloud" : "lattice", mixed ? " two materials" : ""));
+          if (!formulation_of(example).pair_symmetric) continue;
+          BodyOptions body = rate_body(d, cloud, mixed);
+          const auto once = build(scene_text(body, kinematics_table(example)));
+          body.share = false;
+          const auto twice = build(scene_text(body, kinematics_table(example)));
+          CHECK(2 * once->problem().terms().report().evaluation_points == twice->problem().terms().report().evaluation_points);
+          CHECK_MESSAGE((mixed || formulation_of(example).selective() || kept(once->problem()).size() < 0.7 * static_cast<double>(kept(twice->problem()).size())),
+                        "both ends keep a history of their own");
+          const Response a = walk(once->problem()), b = walk(twice->problem());
+          double worst = 0;
+          for (const std::int32_t p : once->problem().body().internal())
+            for (int c = 0; c < d; ++c) worst = std::max(worst, std::abs(a.force.component(c)[p] - b.force.component(c)[p]));
+          CHECK_MESSAGE(worst <= 1e-11 * largest(once->problem().body(), a.force), "forces off by ", worst);
+          CHECK_MESSAGE(std::abs(a.energy - b.energy) <= 1e-11 * std::abs(a.energy), a.energy, " against ", b.energy);
+        }
+}
+
+TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a bit of the result changes") {
+  for (const Example& example : examples(Kind::kinematics))
+    for (int d = 1; d <= 2; ++d)
+      for (const bool cloud : {false, true}) {
+        INFO(fmt::format("{} ({}) {}D {}", example.part, example.table, d, cloud ? "cloud" : "lattice"));
+        if (!Case{example, {}}.conservative() || formulation_of(example).pairs) continue;
+        BodyOptions body = rate_body(d, cloud, false);
+        body.cells = d == 1 ? 3000 : 96;
+        const auto some = build(scene_text(body, kinematics_table(example)));
+        body.skip = false;
+        const auto all = build(scene_text(body, kinematics_table(example)));
+        // One end moves, moves on, and comes back to rest with a stress that its history keeps; then the other end.
+        const Body& points = some->problem().body();
+        const auto moved = [&](std::uint64_t seed, double lower, double upper, double size) {
+          Field u = some->problem().make_field();
+          Noise noise(seed);
+          set_field(points, u, [&](const Point& x) {
+            const double by = x[0] >= lower && x[0] < upper ? size * points.spacing() : 0.0;
+            return Point{by * noise(), by * noise(), by * noise()};
+          });
+          return u;
+        };
+        double high = 0;
+        for (const std::int32_t p : points.internal()) high = std::max(high, points.position(static_cast<std::size_t>(p))[0]);
+        for (const Field& u : {moved(71, -9, 3, 0.03), moved(72, -9, 4, 0.03), moved(73, 0, 0, 0.0), moved(74, high - 3, 2 * high, 0.03)}) {
+          const Response a = respond(some->problem(), u, step), b = respond(all->problem(), u, step);
+          CHECK_MESSAGE(same(some->problem(), a, b), "the result is another one");
+          some->problem().advance(step);
+          all->problem().advance(step);
+        }
+        CHECK(kept(some->problem()) == kept(all->problem()));
+        CHECK(some->problem().terms().quiet_counts().quiet > 0);
+        CHECK(all->problem().terms().quiet_counts().blocks == 0);
+      }
 }

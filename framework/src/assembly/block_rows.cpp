@@ -5,11 +5,11 @@
 
 namespace perikit {
 
-BlockRows::BlockRows(const Families& families) : families_(families), lists_(&lattice_lists_) {
+BlockRows::BlockRows(const Families& families) : families_(families) {
   for (std::size_t p = 0; p < body().stride(); ++p)
     if (body().alive(p)) point_.push_back(static_cast<std::int32_t>(p));
   if (const CloudFamilies* cloud = families.cloud()) {
-    lists_ = &cloud->lists();   // clouds have no padding in between: rows are field indices
+    cloud_lists_ = &cloud->lists();   // clouds have no padding in between: rows are field indices
     return;
   }
   const LatticeFamilies& f = *families.lattice();

@@ -22,7 +22,7 @@ class BlockRows {
   std::size_t point(std::size_t row) const noexcept { return static_cast<std::size_t>(point_[row]); }
   double volume(std::size_t row) const noexcept { return body().volume(point(row)); }
   /// Bonds of the set-up, failed ones too, in block rows; lists().first numbers them.
-  const FamilyLists& lists() const noexcept { return *lists_; }
+  const FamilyLists& lists() const noexcept { return cloud_lists_ ? *cloud_lists_ : lattice_lists_; }
   std::size_t first(std::size_t row) const noexcept { return static_cast<std::size_t>(lists().first[row]); }
   /// Block rows of the family, ascending, without the point itself.
   std::span<const std::int32_t> neighbours(std::size_t row) const noexcept {
@@ -36,7 +36,7 @@ class BlockRows {
 
  private:
   const Families& families_;
-  const FamilyLists* lists_;         ///< of a cloud, or those below
+  const FamilyLists* cloud_lists_ = nullptr;   ///< of a cloud, else null
   FamilyLists lattice_lists_;
   std::vector<std::int32_t> point_;
   std::vector<std::uint8_t> whole_;  ///< lattices: by row, at the set-up

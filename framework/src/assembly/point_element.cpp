@@ -26,8 +26,9 @@ void write_point(PointElement<D>& out, int q, Gradient&& gradient) {
 std::size_t element_nodes(const BlockRows& rows, std::size_t row, std::vector<std::int32_t>& nodes) {
   const auto neighbours = rows.neighbours(row);
   nodes.assign(neighbours.begin(), neighbours.end());
-  return static_cast<std::size_t>(nodes.insert(std::lower_bound(nodes.begin(), nodes.end(), static_cast<std::int32_t>(row)), static_cast<std::int32_t>(row)) -
-                                  nodes.begin());
+  const auto own = std::lower_bound(nodes.begin(), nodes.end(), static_cast<std::int32_t>(row)) - nodes.begin();
+  nodes.insert(nodes.begin() + own, static_cast<std::int32_t>(row));
+  return static_cast<std::size_t>(own);
 }
 
 template <int D>

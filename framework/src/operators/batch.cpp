@@ -29,6 +29,7 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
       const std::int64_t q = l >= n ? -1 : s.first_number >= 0 ? s.first_number + l : s.number[l];
       s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
     }
+  if (keep) std::fill(s.new_state.begin(), s.new_state.end(), 0.0);   // laws without a history leave theirs alone
   return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, history_->time_step()};
 }
 
