@@ -225,7 +225,7 @@ TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces 
           body.share = false;
           const auto twice = build(scene_text(body, kinematics_table(example)));
           CHECK(2 * once->problem().terms().report().evaluation_points == twice->problem().terms().report().evaluation_points);
-          CHECK_MESSAGE((mixed || formulation_of(example).selective() || kept(once->problem()).size() < 0.7 * static_cast<double>(kept(twice->problem()).size())),
+          CHECK_MESSAGE((d == 1 || mixed || formulation_of(example).selective() || kept(once->problem()).size() < 0.7 * static_cast<double>(kept(twice->problem()).size())),
                         "both ends keep a history of their own");
           const Response a = walk(once->problem()), b = walk(twice->problem());
           double worst = 0;
@@ -247,7 +247,7 @@ TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a b
         const auto some = build(scene_text(body, kinematics_table(example)));
         body.skip = false;
         const auto all = build(scene_text(body, kinematics_table(example)));
-        // One end moves, moves on, and comes back to rest with a stress that its history keeps; then the other end.
+        // All is at rest, one end moves, moves on, and comes back to rest with a stress that its history keeps; then the other end.
         const Body& points = some->problem().body();
         const auto moved = [&](std::uint64_t seed, double lower, double upper, double size) {
           Field u = some->problem().make_field();
@@ -260,7 +260,7 @@ TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a b
         };
         double high = 0;
         for (const std::int32_t p : points.internal()) high = std::max(high, points.position(static_cast<std::size_t>(p))[0]);
-        for (const Field& u : {moved(71, -9, 3, 0.03), moved(72, -9, 4, 0.03), moved(73, 0, 0, 0.0), moved(74, high - 3, 2 * high, 0.03)}) {
+        for (const Field& u : {moved(70, 0, 0, 0.0), moved(71, -9, 3, 0.03), moved(72, -9, 4, 0.03), moved(73, 0, 0, 0.0), moved(74, high - 3, 2 * high, 0.03)}) {
           const Response a = respond(some->problem(), u, step), b = respond(all->problem(), u, step);
           CHECK_MESSAGE(same(some->problem(), a, b), "the result is another one");
           some->problem().advance(step);

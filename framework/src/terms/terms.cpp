@@ -188,6 +188,8 @@ ModelReport Terms::report() const {
     report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
   }
   if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  if (!conservative())
+    report.warnings.push_back("local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
   for (const auto& term : terms_) term->report(report);
   return report;
 }
