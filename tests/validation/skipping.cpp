@@ -6,6 +6,7 @@
 #include <atomic>
 #include <string_view>
 
+#include "perikit/body/influence.hpp"
 #include "perikit/scene/scene.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/validation/scenes.hpp"

@@ -9,18 +9,6 @@
 
 namespace perikit {
 
-const double (&lane_factors() noexcept)[256][chunk_points] {
-  struct Table {
-    alignas(64) double value[256][chunk_points];
-    Table() {
-      for (int m = 0; m < 256; ++m)
-        for (int l = 0; l < chunk_points; ++l) value[m][l] = (m >> l & 1) ? 1.0 : 0.0;
-    }
-  };
-  static const Table table;
-  return table.value;
-}
-
 LatticeFamilies::LatticeFamilies(const Body& b, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs)
     : Families(b, std::move(influence), needs), grid(*b.lattice()), spacing(grid.spacing), volume(b.uniform_volume()),
       slots(grid, b.horizon(), needs.influence ? influence_.get() : nullptr), tiles(b, slots) {
@@ -217,7 +205,7 @@ std::vector<std::int32_t> LatticeFamilies::lower_bonds(std::span<const BondChang
     const auto bit = static_cast<std::uint8_t>(1u << lane);
     if (p.integrity.empty() && b > 0 && b < 1) {
       p.integrity.resize(slots.size() * chunk_points);
-      for (std::size_t s = 0; s < slots.size(); ++s) std::copy_n(lane_factors()[p.mask[s]], chunk_points, p.integrity.data() + s * chunk_points);
+      for (std::size_t s = 0; s < slots.size(); ++s) std::copy_n(lane_factors[p.mask[s]], chunk_points, p.integrity.data() + s * chunk_points);
     }
     if (!p.integrity.empty()) p.integrity[slot * chunk_points + lane] = b;
     if (b == 0) p.mask[slot] &= static_cast<std::uint8_t>(~bit);

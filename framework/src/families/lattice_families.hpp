@@ -34,8 +34,8 @@ struct LatticePattern {
   double b(std::size_t slot, int lane) const noexcept {
     return !intact(slot, lane) ? 0.0 : integrity.empty() ? 1.0 : integrity[slot * chunk_points + static_cast<std::size_t>(lane)];
   }
-  /// b of the lanes from l on that fill a pack.
-  Pack b_pack(std::size_t slot, int l) const noexcept;
+  /// b of the lanes of a slot, chunk_points of them.
+  const double* b_of(std::size_t slot) const noexcept;
   const double (&scale_of(BondWeight kind) const noexcept)[chunk_points] { return scale[kind == BondWeight::kernel]; }
 };
 
@@ -103,10 +103,18 @@ class LatticeFamilies final : public Families {
 };
 
 /// 1 in the lanes of a mask, 0 elsewhere: [mask][lane].
-const double (&lane_factors() noexcept)[256][chunk_points];
+struct LaneFactors {
+  alignas(64) double value[256][chunk_points]{};
+  constexpr LaneFactors() {
+    for (int m = 0; m < 256; ++m)
+      for (int l = 0; l < chunk_points; ++l) value[m][l] = (m >> l & 1) ? 1.0 : 0.0;
+  }
+  constexpr const double (&operator[](std::size_t mask) const noexcept)[chunk_points] { return value[mask]; }
+};
+inline constexpr LaneFactors lane_factors;
 
-inline Pack LatticePattern::b_pack(std::size_t slot, int l) const noexcept {
-  return Pack::load(integrity.empty() ? lane_factors()[mask[slot]] + l : integrity.data() + slot * chunk_points + static_cast<std::size_t>(l));
+inline const double* LatticePattern::b_of(std::size_t slot) const noexcept {
+  return integrity.empty() ? lane_factors[mask[slot]] : integrity.data() + slot * static_cast<std::size_t>(chunk_points);
 }
 
 }  // namespace perikit

@@ -41,7 +41,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
   for (const std::int32_t p : body.internal()) volume_.component(volume_share)[p] = share_of_volume(static_cast<std::size_t>(p));
 }
 
-/// c of the selective map (maps/selective.hpp).
+/// c of the selective map (maps/selective_map.hpp).
 template <int D>
 double LatticeBonds<D>::share_of_volume(std::size_t p) const noexcept {
   const LatticePattern& pattern = families_.pattern_at(p);
@@ -122,12 +122,14 @@ void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
 template <int D>
 void LatticeBonds<D>::weigh(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept {
   const LatticePattern& pattern = families_.pattern(chunk);
-  const double* scale = pattern.scale_of(formulation_.weight);
+  const double* const scale = pattern.scale_of(formulation_.weight);
   for (int k = 0; k < slots; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
-    const double* far_scale = scale_.data() + chunk.first + families_.slots.shifts[at];
+    const double* const far_scale = scale_.data() + chunk.first + families_.slots.shifts[at];
+    const double* const factors = pattern.b_of(at);
+    const Pack of_slot(slot_weight_[at]);
     for (int l = 0; l < chunk_points; l += pack_width) {
-      const Pack b = pattern.b_pack(at, l) * Pack(slot_weight_[at]);
+      const Pack b = Pack::load(factors + l) * of_slot;
       (b * Pack::load(scale + l)).store(s.weight + k * chunk_points + l);
       if (both_ends) (b * Pack::load(far_scale + l)).store(s.far_weight + k * chunk_points + l);
     }
@@ -189,7 +191,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
     const std::uint8_t mask = pattern.mask[slot + static_cast<std::size_t>(k)];
     for (int l = 0; l < chunk_points && mask != 0xff; l += pack_width) {
       const int lane = k * chunk_points + l;
-      const Pack keep = Pack::load(lane_factors()[mask] + l);
+      const Pack keep = Pack::load(lane_factors[mask] + l);
       for (int c = 0; c < D * D; ++c) {
         (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
         if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);

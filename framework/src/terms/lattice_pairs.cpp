@@ -144,7 +144,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         finite[v] &= bond.e == bond.e;
         if constexpr (sums) {
           Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
-          if (weakened) term *= pattern.b_pack(at, l);
+          if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           own[0][v] += term;
           if constexpr (half) {
             double* target = pass.out.data + far + l;
@@ -186,7 +186,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         for (int v = 0; v < packs; ++v) {
           const int l = v * pack_width, lane = k * chunk_points + l;
           const auto bits = static_cast<std::uint8_t>(mask >> l);
-          const Pack b = weakened ? pattern.b_pack(at, l) : Pack(1.0);
+          const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
           if (energies) stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
           if constexpr (work == PairWork::energy) continue;
           Pack t[D], T = Pack::load(s.force + lane);

@@ -132,7 +132,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         const double* M = M_.component(c) + chunk.first + l;
         Pack sum(0.0);
         for (std::size_t s = 0; s < families_.slots.offsets.size(); ++s) {
-          sum += pattern.b_pack(s, l) * Pack(families_.slots.omega[s]) * (Pack::load(M) + Pack::load(M + families_.slots.shifts[s]));
+          sum += Pack::load(pattern.b_of(s) + l) * Pack(families_.slots.omega[s]) * (Pack::load(M) + Pack::load(M + families_.slots.shifts[s]));
         }
         sum.store(B_.component(c) + chunk.first + l);
       }
@@ -210,7 +210,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         }
         Matrix::apply(M, z, t);
         for (int c = 0; c < D; ++c) product += z[c] * t[c];
-        sum += keep(lanes(pattern, s, l), pattern.b_pack(s, l) * Pack(0.5 * families_.slots.omega[s]) * product);
+        sum += keep(lanes(pattern, s, l), Pack::load(pattern.b_of(s) + l) * Pack(0.5 * families_.slots.omega[s]) * product);
       }
       sum.store(energy + l);
     }
