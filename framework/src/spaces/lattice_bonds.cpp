@@ -118,24 +118,6 @@ void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
   }
 }
 
-/// Weights of the lanes, and their ends where a law or a sum asks for them.
-template <int D>
-void LatticeBonds<D>::weigh(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept {
-  const LatticePattern& pattern = families_.pattern(chunk);
-  const double* const scale = pattern.scale_of(formulation_.weight);
-  for (int k = 0; k < slots; ++k) {
-    const std::size_t at = slot + static_cast<std::size_t>(k);
-    const double* const far_scale = scale_.data() + chunk.first + families_.slots.shifts[at];
-    const double* const factors = pattern.b_of(at);
-    const Pack of_slot(slot_weight_[at]);
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      const Pack b = Pack::load(factors + l) * of_slot;
-      (b * Pack::load(scale + l)).store(s.weight + k * chunk_points + l);
-      if (both_ends) (b * Pack::load(far_scale + l)).store(s.far_weight + k * chunk_points + l);
-    }
-  }
-}
-
 /// Stable numbers: of bonds that are evaluated once, those of their slot in the first half. whole: this batch has the slots that are
 /// numbered, one after the other.
 template <int D>
@@ -186,11 +168,18 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   };
   choose(gradient, pass.u, ConstFieldView(gradient_), H);
   if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
-  weigh(chunk, slot, slots, s, both_ends);
+  const double* const scale = pattern.scale_of(formulation_.weight);
   for (int k = 0; k < slots; ++k) {
-    const std::uint8_t mask = pattern.mask[slot + static_cast<std::size_t>(k)];
-    for (int l = 0; l < chunk_points && mask != 0xff; l += pack_width) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    const std::uint8_t mask = pattern.mask[at];
+    const double* const b = pattern.b_of(at);
+    const double* const far_scale = scale_.data() + p + shifts[k];
+    for (int l = 0; l < chunk_points; l += pack_width) {
       const int lane = k * chunk_points + l;
+      const Pack weight = Pack::load(b + l) * Pack(slot_weight_[at]);
+      (weight * Pack::load(scale + l)).store(s.weight + lane);
+      if (both_ends) (weight * Pack::load(far_scale + l)).store(s.far_weight + lane);
+      if (mask == 0xff) continue;
       const Pack keep = Pack::load(lane_factors[mask] + l);
       for (int c = 0; c < D * D; ++c) {
         (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);

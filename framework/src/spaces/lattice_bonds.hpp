@@ -28,7 +28,6 @@ class LatticeBonds final : public EvaluationSpace {
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
   int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
-  void weigh(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, bool both_ends) const noexcept;
   void number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();
