@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# compile_times.sh [BUILD [COUNT]]: seconds that the files of a build folder (build/release) took to compile when they were last compiled, their sum and the
-# slowest COUNT (25), from ninja's log. A compiler is one process, so these are processor seconds as long as no other program wants the cores.
+# compile_times.sh [BUILD [COUNT]]: seconds that the files of a build folder (build/release) took when they were last compiled, their sum
+# and the slowest COUNT (25), from ninja's log. A compiler is one process, so these are processor seconds as long as no other program
+# wants the cores.
 set -euo pipefail
 build=${1:-"$(dirname "${BASH_SOURCE[0]}")/../../build/release"}
 count=${2:-25}
