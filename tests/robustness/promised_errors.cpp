@@ -1,5 +1,8 @@
 /// Messages that a user meets, by their words: what is refused says where, what was found and what is allowed; what fails says where and when.
 
+#include <fstream>
+#include <sstream>
+
 #include "robustness/desk.hpp"
 
 using namespace perikit::test;
@@ -19,15 +22,39 @@ TEST_CASE("errors: combinations of parts that have no meaning are refused with w
   refused("--set 'kinematics={type=\"selective\",base={type=\"baqp\"}}' --set body.plane=stress",
           {"scene.toml:4:1: body: found a state of stress with kinematics \"selective\"", "allowed: plane = \"strain\""});
   refused("--set kinematics.type=selective", {"scene.toml:19:1: kinematics.base: found nothing; allowed: the name of a kinematics"});
-  refused("--set kinematics.order=2 --set 'damage={type=\"critical_stretch\",stretch=0.1}'",
-          {"damage: found with kinematics \"baqp\" of order 2, whose point gradients are made once; allowed: order 1"});
-  refused("--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}' --set 'damage={type=\"critical_stretch\",stretch=0.1}'",
-          {"damage: found with a law whose stress depends on the path; allowed: hyperelastic laws"});
+  const std::string local = "--set 'kinematics={type=\"bond_associated\",force_state=\"local\"}' ";
+  refused(local + "--set 'damage={type=\"critical_stretch\",stretch=0.1}'", {"damage: found with kinematics.force_state = \"local\"; allowed: \"variational\""});
+  refused(local + "--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}'",
+          {"material.type: found \"hypoelastic\", a law whose stress depends on the path, with force_state = \"local\"", "allowed: a material without history"});
   refused("--set 'kinematics={type=\"baqp\",stabilization=\"silling\"}'",
           {"kinematics.stabilization: found 'silling' over baqp; allowed: over kinematics with one gradient per point"});
   refused("--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}' --set 'integrator={type=\"newton\"}'",
           {"material.type: found \"hypoelastic\", a law whose stress depends on the path, with integrator \"newton\"", "allowed: an explicit integrator"});
   refused("--set kinematics.type=ordinary --set 'material={type=\"neo_hookean\",density=1,shear_modulus=1}'", {"material: found shear_modulus only; allowed: exactly 2 of youngs_modulus, poisson_ratio"});
+}
+
+TEST_CASE("damage goes with gradients of order 2 and with laws whose stress depends on the path: bonds fail and the energies balance") {
+  const Desk desk;
+  for (const std::string options : {"--set kinematics.order=2", "--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}'"}) {
+    CAPTURE(options);
+    const Result result = desk.perikit("run scene.toml --quiet -o out --set 'damage={type=\"critical_stretch\",stretch=0.02}' " + options);
+    REQUIRE_MESSAGE(result.status == 0, result.err);
+    std::ifstream history(desk.path("out/history.csv"));
+    std::string line;
+    std::vector<double> first, row;
+    std::getline(history, line);
+    CHECK(line.starts_with("step,time,time_step,strain_energy,kinetic_energy,external_work,dissipated_energy,"));
+    while (std::getline(history, line)) {
+      row.clear();
+      std::istringstream cells(line);
+      for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
+      if (first.empty()) first = row;
+    }
+    REQUIRE(row.size() >= 7);
+    const auto stored = [](const std::vector<double>& r) { return r[3] + r[4] + r[6] - r[5]; };
+    CHECK(row[6] > 0);
+    CHECK(stored(row) == doctest::Approx(stored(first)).epsilon(2e-3));
+  }
 }
 
 TEST_CASE("errors: an expression without a finite value names key and point") {
