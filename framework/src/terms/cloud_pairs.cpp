@@ -43,8 +43,6 @@ class CloudPairs final : public PairLoop {
     alignas(64) double t[3][batch_points];
   };
 
-  /// Each bond once, for both ends.
-  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass);
   /// Whether all bonds of the point had a finite positive length.
@@ -57,7 +55,7 @@ class CloudPairs final : public PairLoop {
   const FamilyLists& lists_;
   const PairKinematics& law_;
   const PairFields& fields_;
-  bool dilatation_, half_;
+  bool dilatation_;
   bool fails_ = false;
   std::size_t points_;
   const Row* position_;                        ///< {x, y, z, V}
@@ -71,8 +69,8 @@ class CloudPairs final : public PairLoop {
 
 template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
-    : families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
-      dilatation_(parts.formulation.dilatation != nullptr), half_(parts.half), points_(families_.body().points()),
+    : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
+      dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(lists_, points_);
@@ -260,18 +258,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
     if (vectors) force_[p] = Row{};
     else pass.out.data[p] = 0;
   });
-  auto block = [&](std::size_t b) {
-    if (!awake(b)) return;
-    switch (pass.work) {
-      case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
-      case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);
-      case PairWork::force: return run_block<PairWork::force>(b, pass);
-      case PairWork::tangent: return run_block<PairWork::tangent>(b, pass);
-      case PairWork::energy: return run_block<PairWork::energy>(b, pass);
-    }
-  };
-  if (at_once(pass)) colouring_.for_each(block);
-  else parallel_for(blocks(), block);
+  each_block(pass, colouring_, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
   if (pass.work == PairWork::force && fails_ && bad() < 0) nearest_.u = &u_;
   if (vectors && bad() < 0) {
     over_points([&](std::size_t p) {

@@ -18,7 +18,7 @@ template <int D>
 class LatticePairs final : public PairLoop {
  public:
   explicit LatticePairs(const PairLoopParts& parts)
-      : law_(*parts.formulation.pairs), fields_(parts.fields), dilatation_(parts.formulation.dilatation != nullptr), half_(parts.half),
+      : PairLoop(parts), law_(*parts.formulation.pairs), fields_(parts.fields), dilatation_(parts.formulation.dilatation != nullptr),
         families_(*parts.families.lattice()), squared_volume_(families_.volume * families_.volume) {
     if (parts.quiet) watch_waves(families_.tiles.reach);
     for (std::size_t s = 0; s < families_.slots.size(); ++s) {
@@ -37,25 +37,11 @@ class LatticePairs final : public PairLoop {
     reset_bad();
     look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); });
     if (!pass.only && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
-    auto block = [&](std::size_t b) {
-      if (!awake(b)) return;
-      switch (pass.work) {
-        case PairWork::dilatation: return run_block<PairWork::dilatation>(b, pass);
-        case PairWork::dilatation_rate: return run_block<PairWork::dilatation_rate>(b, pass);
-        case PairWork::force: return run_block<PairWork::force>(b, pass);
-        case PairWork::tangent: return run_block<PairWork::tangent>(b, pass);
-        case PairWork::energy: return run_block<PairWork::energy>(b, pass);
-      }
-    };
-    if (at_once(pass)) families_.tiles.colouring.for_each(block);
-    else parallel_for(blocks(), block);
+    each_block(pass, families_.tiles.colouring, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
     return bad();
   }
 
  private:
-  /// Each bond once, for both ends.
-  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
-
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass) {
     const LatticeBlock& block = families_.tiles.blocks[b];
@@ -80,7 +66,7 @@ class LatticePairs final : public PairLoop {
 
   const PairKinematics& law_;
   const PairFields& fields_;
-  bool dilatation_, half_;
+  bool dilatation_;
   const LatticeFamilies& families_;
   double squared_volume_;
   AlignedVector<double> length_, omega_;       ///< by slot, one value a lane

@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 
 #include "families/bond_monitor.hpp"
+#include "families/blocks.hpp"
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
@@ -36,8 +38,17 @@ struct PairFields {
   Field correction;               ///< by axis; empty without surface correction
 };
 
+struct PairLoopParts {
+  const Families& families;
+  const Formulation& formulation;
+  const PairFields& fields;
+  bool half;                      ///< each bond once, for both ends
+  bool quiet;                     ///< without the parts that no wave has reached
+};
+
 class PairLoop {
  public:
+  explicit PairLoop(const PairLoopParts& parts) noexcept : half_(parts.half) {}
   virtual ~PairLoop() = default;
   /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
@@ -58,7 +69,26 @@ class PairLoop {
     if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation)) quiet_.look(reach_, moves);
     else quiet_.wake();
   }
-  bool awake(std::size_t b) const noexcept { return quiet_.awake(b, reach_); }
+  /// Each bond once, for both ends.
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
+  /// block(work, b) for each block that is awake, `work` being pass.work as a constant; coloured where far ends are written.
+  template <class Block>
+  void each_block(const PairPass& pass, const Colouring& colouring, const Block& block) const {
+    const auto sweep = [&]<PairWork work>(std::integral_constant<PairWork, work> constant) {
+      auto body = [&](std::size_t b) {
+        if (quiet_.awake(b, reach_)) block(constant, b);
+      };
+      if (at_once(pass)) colouring.for_each(body);
+      else parallel_for(blocks(), body);
+    };
+    switch (pass.work) {
+      case PairWork::dilatation: return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
+      case PairWork::dilatation_rate: return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
+      case PairWork::force: return sweep(std::integral_constant<PairWork, PairWork::force>());
+      case PairWork::tangent: return sweep(std::integral_constant<PairWork, PairWork::tangent>());
+      case PairWork::energy: return sweep(std::integral_constant<PairWork, PairWork::energy>());
+    }
+  }
   void reset_bad() noexcept { bad_ = -1; }
   std::int64_t bad() const noexcept { return bad_; }
   /// Keeps the smallest index; from any thread.
@@ -68,17 +98,10 @@ class PairLoop {
   }
 
  private:
+  bool half_;
   std::atomic<std::int64_t> bad_{-1};
   QuietBlocks quiet_;
   int reach_ = 1;
-};
-
-struct PairLoopParts {
-  const Families& families;
-  const Formulation& formulation;
-  const PairFields& fields;
-  bool half;                      ///< each bond once, for both ends
-  bool quiet;                     ///< without the parts that no wave has reached
 };
 
 template <int D>
