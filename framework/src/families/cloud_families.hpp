@@ -34,7 +34,9 @@ class CloudFamilies final : public Families {
   const double* omegas() const noexcept { return omega_.data(); }   ///< the same; null where it is 1
   double omega(std::size_t bond) const noexcept { return omega_.empty() ? 1.0 : omega_[bond]; }                     ///< b omega
   double whole_omega(std::size_t bond) const noexcept { return whole_.empty() ? omega(bond) : whole_[bond]; }
+  const double* whole_omegas() const noexcept { return whole_.empty() ? omega_.data() : whole_.data(); }             ///< null where it is 1
   double b(std::size_t bond) const noexcept { return integrity_.empty() ? 1.0 : integrity_[bond]; }
+  const double* integrities() const noexcept { return integrity_.data(); }                                           ///< null where it is 1
   const double* inverse_shape(std::size_t p) const noexcept { return &inverse_[6 * p]; }                            ///< K^-1, 6 components
 
  private:

@@ -84,11 +84,12 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   const Row x = position_[p], own = u_[p], own_w = rate ? w_[p] : Row{}, own_moduli = moduli_.empty() ? Row{} : moduli_[p];
+  const std::int32_t* neighbour = lists_.neighbour.data() + begin;
+  const double *omega = families_.whole_omegas(), *integrity = families_.integrities();
   for (int l = 0; l < n; ++l) {
-    const auto k = static_cast<std::size_t>(begin + l);
-    const auto j = static_cast<std::size_t>(lists_.neighbour[k]);
+    const auto j = static_cast<std::size_t>(neighbour[l]);
     // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
-    const double b = families_.b(k);
+    const double b = integrity ? integrity[begin + l] : 1.0;
     const Row far = position_[j], xi = far - x, du = b > 0 ? u_[j] - own : Row{};
     double square = 0;
     for (int c = 0; c < D; ++c) {
@@ -99,7 +100,7 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     g.length[l] = square;
     g.far_volume[l] = b * far[3];
     if (fails_) g.integrity[l] = b;
-    g.omega[l] = families_.whole_omega(k);
+    g.omega[l] = omega ? omega[begin + l] : 1.0;
     if constexpr (rate) {
       const Row dw = w_[j] - own_w;
       for (int c = 0; c < D; ++c) g.dw[c][l] = dw[c];
