@@ -60,6 +60,13 @@ velocity = [0, 0]
 [[boundary]]
 set = "left"
 displacement = [0, "free"]
+[[symmetry]]
+axis = "x"
+at = 0.0
+[[periodic]]
+axis = "y"
+lower = 0.0
+upper = 1.0
 [[load]]
 set = "left"
 traction = [1, 0]
@@ -204,6 +211,8 @@ TEST_CASE("every key of every section of a scene, spoilt in every way, is refuse
                                                     {"crack", "crack.0"},
                                                     {"initial", "initial"},
                                                     {"boundary", "boundary.0"},
+                                                    {"symmetry", "symmetry.0"},
+                                                    {"periodic", "periodic.0"},
                                                     {"load", "load.0"},
                                                     {"output", "output"},
                                                     {"output.history", "output.history.0"},

@@ -125,6 +125,30 @@ const Fault faults[]{
      "boundary.1.velocity", "found in a quasi-static run", "displacement"},
     {"sets", "middle", "\"x > 2 && x < 3\"", "[[load]]\nset = \"middle\"\ntraction = [1, 0]\nface = \"+x\"\n", 1004, "load.face",
      "on which no point of the set \"middle\" lies", "a face of the set"},
+    // faces, symmetry, periodic sides
+    {"", "format", "1", "[[boundary]]\nface = \"-x\"\ndisplacement = [1, 0]\n", 23, "boundary.0", "found the point at (0.5, 0.5, 0) held in x",
+     "one of them"},
+    {"", "format", "1", "[[boundary]]\nface = \"+x\"\nat = 5.7\ndisplacement = [1, 0]\n", 1003, "boundary.1.at",
+     "found 5.7, which does not lie half-way between points", "6"},
+    {"", "format", "1", "[[boundary]]\nface = \"+x\"\nat = 9.0\ndisplacement = [1, 0]\n", 1003, "boundary.1.face",
+     "which no point of the set \"all\" touches", "a face of the set"},
+    {"", "format", "1", "[[boundary]]\nface = \"+x\"\nat = 3.0\ndisplacement = [1, 0]\n", 1003, "boundary.1.face",
+     "found a plane through the body, at 3", "all points on one side"},
+    {"", "format", "1", "[[boundary]]\nface = \"+x\"\nset = \"left\"\ndisplacement = [1, 0]\n", 1002, "boundary.1.face",
+     "found an image of a point on another point", "nothing beyond it"},
+    {"", "format", "1",
+     "[[boundary]]\nface = \"+x\"\ndisplacement = [1, 0]\n[[boundary]]\nface = \"+x\"\ndisplacement = [\"free\", 0]\n", 1005,
+     "boundary.2.face", "whose component y boundary.1", "each once"},
+    {"", "format", "1", "[[boundary]]\nface = \"+x\"\ndisplacement = [1, 0]\n[[symmetry]]\naxis = \"x\"\nat = 6.0\n", 1006, "symmetry.0",
+     "found a side, at 6, that boundary.1.face has too", "one of the two"},
+    {"", "format", "1", "[[symmetry]]\naxis = \"y\"\nat = 2.0\n", 1003, "symmetry.0.at", "found a plane through the body, at 2",
+     "all points on one side"},
+    {"", "format", "1", "[[periodic]]\naxis = \"y\"\n[[symmetry]]\naxis = \"y\"\n", 1002, "periodic.0.axis",
+     "found a side, at 0, that symmetry.0.axis has too", "one of the two"},
+    {"boundary", "displacement", "[\"free\", \"free\"]", "[[boundary]]\nface = \"+x\"\nvelocity = [1, 0]\n[[boundary]]\nface = \"+y\"\ndisplacement = [1, \"free\"]\n", 1003,
+     "boundary.1.velocity", "found a face with a velocity beside one with a displacement", "the same key for both"},
+    {"integrator", "type", "\"newton\"\n[constants]", "[[boundary]]\nface = \"+x\"\nvelocity = [0, 0]\n", 1003,
+     "boundary.1.velocity", "found in a quasi-static run", "displacement"},
     {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"cauchy\"\ncomponent = \"xx\"\n",
      1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
 };
@@ -173,6 +197,21 @@ TEST_CASE("scenes that cannot be built are refused with file, line, key, what wa
     CHECK_MESSAGE((allowed != std::string::npos && has(message.substr(allowed), fault.allowed)), "allowed: ", fault.allowed);
     CHECK(has(message, "found "));
   }
+}
+
+TEST_CASE("sides of points from a file must be placed") {
+  Bench bench;
+  std::string text = plate;
+  const std::size_t begin = text.find("[body.lattice]"), end = text.find("[sets]");
+  text.replace(begin, end - begin, "[body.points]\nfile = \"cloud.csv\"\n");
+  text.replace(text.find("set = \"left\""), 12, "face = \"-x\"");
+  std::ofstream csv(bench.folder.path / "cloud.csv");
+  csv << "x,y,volume\n";
+  for (int k = 0; k < 24; ++k) csv << fmt::format("{},{},1\n", k % 6 + 0.5, k / 6 + 0.5);
+  csv.close();
+  CHECK(has(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5; allowed: the coordinate of the side"));
+  text.replace(text.find("face = "), 0, "at = 0.0\n");
+  CHECK(bench.refusal(text).empty());
 }
 
 TEST_CASE("files that hold no body are refused with file, line, column and what is allowed") {

@@ -1,7 +1,12 @@
 #include "perikit/body/body.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+
+#include "perikit/body/images.hpp"
 
 namespace perikit {
 
@@ -40,17 +45,76 @@ Body::Body(const Body& whole, const std::vector<bool>& owned, const std::vector<
     place_cloud(positions, volumes);
     for (std::size_t n = 0; n < from.size(); ++n) place[static_cast<std::size_t>(from[n])] = internal_[n];
   }
-  const auto is_owned = [&](std::int32_t p) { return owned[static_cast<std::size_t>(whole.input_of(static_cast<std::size_t>(p)))]; };
-  for (const auto& [name, members] : whole.sets_)
-    for (const std::int32_t p : members)
-      if (is_owned(p)) sets_[name].push_back(place[static_cast<std::size_t>(p)]);
-      else sets_[name];
-  material_ids_.assign(stride_, ghost_material);
-  for (const std::int32_t p : whole.internal_) {
-    if (is_owned(p))
-      material_ids_[static_cast<std::size_t>(place[static_cast<std::size_t>(p)])] =
-          whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
+  for (const std::int32_t p : whole.internal_)
+    if (!owned[static_cast<std::size_t>(whole.input_of(static_cast<std::size_t>(p)))]) place[static_cast<std::size_t>(p)] = -1;
+  copy_sets(whole, place, ghost_material);
+}
+
+Body::Body(const Body& whole, const Images& images, std::uint16_t image_material)
+    : frame_(whole.frame_), points_of_all_ranks_(whole.points()) {
+  frame_.cracks = images.cracks;
+  std::vector<Point> positions;
+  for (const std::int32_t p : whole.internal_) positions.push_back(whole.position(static_cast<std::size_t>(p)));
+  positions.insert(positions.end(), images.position.begin(), images.position.end());
+  if (whole.lattice_) {
+    place_on_lattice(*whole.lattice_, whole.uniform_volume_, positions);
+  } else {
+    std::vector<double> volumes;
+    for (const std::int32_t p : whole.internal_) volumes.push_back(whole.volume(static_cast<std::size_t>(p)));
+    for (const std::int32_t source : images.source) volumes.push_back(volumes[static_cast<std::size_t>(source)]);
+    place_cloud(positions, volumes);
   }
+  std::vector<std::int32_t> place(whole.stride_, -1);
+  for (std::size_t n = 0; n < whole.points(); ++n) place[static_cast<std::size_t>(whole.internal_[n])] = internal_[n];
+  copy_sets(whole, place, image_material);
+}
+
+/// Sets and materials of the points that have a place here, by internal index of `whole`; all other points have the material `others`.
+void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others) {
+  material_ids_.assign(stride_, others);
+  for (const auto& [name, members] : whole.sets_) {
+    std::vector<std::int32_t>& own = sets_[name];
+    for (const std::int32_t p : members)
+      if (place[static_cast<std::size_t>(p)] >= 0) own.push_back(place[static_cast<std::size_t>(p)]);
+  }
+  for (const std::int32_t p : whole.internal_) {
+    const std::int32_t own = place[static_cast<std::size_t>(p)];
+    if (own >= 0) material_ids_[static_cast<std::size_t>(own)] = whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
+  }
+}
+
+/// The lattice of `old`, grown or shrunk to hold these positions, which are places of it.
+void Body::place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions) {
+  const double spacing = old.spacing;
+  const auto cell = [&](const Point& x, std::size_t a) { return std::llround((x[a] - old.lower[a]) / spacing - 0.5); };
+  std::array<std::int64_t, 3> low{}, high{};
+  for (std::size_t n = 0; n < positions.size(); ++n)
+    for (std::size_t a = 0; a < static_cast<std::size_t>(old.dimension); ++a) {
+      const std::int64_t k = cell(positions[n], a);
+      low[a] = n == 0 ? k : std::min(low[a], k);
+      high[a] = n == 0 ? k : std::max(high[a], k);
+    }
+  std::array<double, 3> lower = old.lower, upper = old.lower;
+  for (std::size_t a = 0; a < static_cast<std::size_t>(old.dimension); ++a) {
+    lower[a] += static_cast<double>(low[a]) * spacing;
+    upper[a] += static_cast<double>(high[a] + 1) * spacing;
+  }
+  const Lattice lattice = make_lattice(old.dimension, spacing, lower, upper, frame_.horizon);
+  std::vector<bool> taken(static_cast<std::size_t>(lattice.cells), false);
+  internal_.clear();
+  for (const Point& x : positions) {
+    std::array<std::int64_t, 3> k{};
+    for (int a = 0; a < old.dimension; ++a) {
+      const auto axis = static_cast<std::size_t>(lattice.axis[static_cast<std::size_t>(a)]);
+      k[static_cast<std::size_t>(a)] = cell(x, axis) - low[axis];
+    }
+    const std::int64_t index = lattice.index(k[0], k[1], k[2]);
+    if (taken[static_cast<std::size_t>(index)])
+      throw std::domain_error(fmt::format("found an image of a point on another point at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]));
+    taken[static_cast<std::size_t>(index)] = true;
+    internal_.push_back(static_cast<std::int32_t>(index));
+  }
+  number_lattice(lattice, volume);
 }
 
 /// What follows from the lattice and the cells that are kept.

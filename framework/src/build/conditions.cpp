@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "perikit/output/recorder.hpp"
 
 namespace perikit {
@@ -10,10 +12,32 @@ SpaceTimeFunction function_of(const Expression& expression, bool ramps) {
   return {expression, expression.depends_on_position(), expression.depends_on_time(), ramps && expression.is_number()};
 }
 
-Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_static) {
+namespace {
+
+/// A point at a held face that a layer holds too would be held at two places.
+void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
+                  const std::vector<std::size_t>& boundary_of) {
+  std::vector<std::uint8_t> held(body.stride(), 0);   // by point, a bit a component
+  for (const ImageTerm& term : images.terms)
+    if (term.motion >= 0) held[static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(term.surface)])] |= static_cast<std::uint8_t>(1 << term.component);
+  for (std::size_t k = 0; k < prescriptions.size(); ++k)
+    for (const std::int32_t p : prescriptions[k].points) {
+      if (!(held[static_cast<std::size_t>(p)] >> prescriptions[k].component & 1)) continue;
+      const Point x = body.position(static_cast<std::size_t>(p));
+      throw InputError(scene.boundaries[boundary_of[k]].position, fmt::format("boundary.{}", boundary_of[k]),
+                       fmt::format("found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "
+                                   "them", x[0], x[1], x[2], "xyz"[prescriptions[k].component]));
+    }
+}
+
+}  // namespace
+
+Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions, bool quasi_static) {
   std::vector<Prescription> prescriptions;
+  std::vector<std::size_t> boundary_of;
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
     const BoundaryDescription& boundary = scene.boundaries[k];
+    if (!boundary.face.empty()) continue;
     if (boundary.velocity && quasi_static)
       throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
                        "found in a quasi-static run; allowed: displacement");
@@ -21,9 +45,17 @@ Constraints build_constraints(const Scene& scene, const Body& body, bool quasi_s
       if (!boundary.components[c]) continue;
       prescriptions.push_back(
           {boundary.velocity, static_cast<int>(c), function_of(*boundary.components[c], quasi_static), body.set(boundary.set)});
+      boundary_of.push_back(k);
     }
   }
-  return Constraints(body, std::move(prescriptions));
+  refuse_twice(scene, body, images, prescriptions, boundary_of);
+  try {
+    return Constraints(body, std::move(prescriptions), images, std::move(motions));
+  } catch (const std::domain_error& error) {
+    for (std::size_t k = 0; k < scene.boundaries.size(); ++k)
+      if (scene.boundaries[k].velocity && !scene.boundaries[k].face.empty()) throw InputError(scene.boundaries[k].position, fmt::format("boundary.{}.velocity", k), error.what());
+    throw;
+  }
 }
 
 namespace {
@@ -53,7 +85,13 @@ void start_from(const std::filesystem::path& results, const Body& body, const Pa
 
 }  // namespace
 
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, State& state) {
+void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, State& state) {
+  for (const BoundaryDescription& boundary : scene.boundaries)
+    if (scene.initial_from && boundary.velocity && !boundary.face.empty())
+      throw InputError(boundary.position, "boundary", "found a face with a velocity and initial.from, which does not hold where the face is; allowed: displacement");
+  constraints.start_images([&](int c, const Point& x) {
+    return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
+  }, state.displacement());
   if (scene.initial_from) start_from(*scene.initial_from, body, partition, state);
   if (!scene.initial_displacement.empty()) fill(scene.initial_displacement, body, state.displacement());
   if (!scene.initial_velocity.empty()) fill(scene.initial_velocity, body, state.velocity());

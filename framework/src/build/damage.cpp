@@ -62,8 +62,8 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
 
 }  // namespace
 
-std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts, bool quasi_static,
-                                               bool ranks) {
+std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
+                                               const ImageMap* images, bool quasi_static, bool ranks) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
@@ -79,8 +79,8 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
   StretchLimits limits;
   bool equal = true;
-  for (std::size_t k = 0; k < body.points(); ++k) {
-    const auto p = static_cast<std::size_t>(body.internal()[k]);
+  for (std::size_t k = 0; k < body.owned().size(); ++k) {
+    const auto p = static_cast<std::size_t>(body.owned()[k]);
     if (k == 0 || !uniform) {
       at.moduli = laws.moduli(p);
       try {
@@ -97,6 +97,9 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set))
       damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
+  if (images)
+    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+      if (field->size() > 0) images->copy_from_sources(*field);
   if (equal) damage->failure = Field();
   return damage;
 }

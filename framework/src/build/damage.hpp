@@ -4,14 +4,15 @@
 #include <memory>
 
 #include "perikit/plugin/part.hpp"
+#include "perikit/problem/image_map.hpp"
 #include "perikit/scene/scene.hpp"
 #include "perikit/terms/terms.hpp"
 
 namespace perikit {
 
-/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. ranks: several share the body.
-/// Throws InputError where the criterion does not suit them or the integrator.
-std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts, bool quasi_static,
-                                               bool ranks);
+/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. images (null: none) have the
+/// limits of their sources. ranks: several share the body. Throws InputError where the criterion does not suit them or the integrator.
+std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
+                                               const ImageMap* images, bool quasi_static, bool ranks);
 
 }  // namespace perikit

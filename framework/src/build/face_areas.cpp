@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "build/face_shares.hpp"
+#include "build/materials.hpp"
 #include "families/families.hpp"
 
 namespace perikit {
@@ -43,7 +44,13 @@ Field face_areas(TermParts parts, int axis) {
   record.constants.resize(1);
   std::vector<MaterialRecord> records;
   records.push_back(std::move(record));
-  const Laws laws(body.space(), std::move(records), {}, body.stride());
+  std::vector<std::uint16_t> ids;   // images store nothing here either
+  if (body.owned().size() < body.points()) {
+    records.push_back(silent_record());
+    ids.assign(body.stride(), 1);
+    for (const std::int32_t p : body.owned()) ids[static_cast<std::size_t>(p)] = 0;
+  }
+  const Laws laws(body.space(), std::move(records), ids, body.stride());
   parts.laws = &laws;
   parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
   parts.damage = nullptr;

@@ -59,20 +59,23 @@ class Columns {
 /// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
 /// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
 /// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
-Shares on_lattice(const std::vector<std::int32_t>& points, const Face& face, const TermParts& parts) {
+Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
   const Columns columns(body, face);
   const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis) : Field();
   const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));  // that a face is felt in
   const double area = body.uniform_volume() / body.spacing();
+  const std::size_t own_points = points.size();
+  if (exact && images) images->append_images(points);   // what the evaluation points of the set have of the face beyond its edges
   Shares shares;
   double total = 0, wanted = 0;
-  for (const std::int32_t p : points) {
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const std::int32_t p = points[n];
     if (!columns.at_face(p)) continue;
-    wanted += area;
+    if (n < own_points) wanted += area;
     const std::int64_t depth = columns.depth(p, 2 * layers);
-    if (!exact || depth == 1) {
+    if (!exact || (depth == 1 && n < own_points)) {
       shares[p] += depth > 1 ? 1.5 * area : area;
       if (depth > 1) shares[columns.below(p, 1)] -= 0.5 * area;
       total += area;
@@ -122,10 +125,10 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
 
 }  // namespace
 
-Shares face_shares(const LoadDescription& load, const TermParts& parts) {
+Shares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const Face face(load);
   const std::vector<std::int32_t>& points = parts.families->body().set(load.set);
-  Shares shares = parts.families->body().lattice() ? on_lattice(points, face, parts) : on_cloud(points, face, parts.families->body());
+  Shares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts.families->body());
   if (shares.empty()) {
     throw InputError(
         load.position, "load.face",

@@ -9,10 +9,10 @@ namespace perikit {
 namespace {
 
 /// Points and shares of a load without its values, on the points of the body.
-Load distributed(const LoadDescription& description, const Body& body, const TermParts& parts) {
+Load distributed(const LoadDescription& description, const Body& body, const TermParts& parts, const ImageMap* images) {
   Load load;
   if (description.type == LoadDescription::Type::traction) {
-    for (const auto& [p, share] : face_shares(description, parts)) {
+    for (const auto& [p, share] : face_shares(description, parts, images)) {
       load.points.push_back(p);
       load.share.push_back(share);
     }
@@ -43,7 +43,7 @@ void keep_owned(const Partition& partition, const Body& part, Load& load) {
 
 }  // namespace
 
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, bool quasi_static) {
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static) {
   const Body& body = parts.families->body();
   TermParts whole = parts;
   std::unique_ptr<Families> of_whole;
@@ -54,7 +54,7 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* p
   }
   std::vector<Load> loads;
   for (const LoadDescription& description : scene.loads) {
-    Load load = distributed(description, partition ? partition->whole() : body, whole);
+    Load load = distributed(description, partition ? partition->whole() : body, whole, images);
     if (partition) keep_owned(*partition, body, load);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
@@ -63,7 +63,7 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* p
     }
     if (!load.components.empty()) loads.push_back(std::move(load));
   }
-  return Loads(body, std::move(loads));
+  return Loads(body, std::move(loads), images);
 }
 
 }  // namespace perikit

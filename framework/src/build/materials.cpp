@@ -9,8 +9,8 @@ namespace perikit {
 
 namespace {
 
-/// Ghosts store nothing: the energy of their evaluation points is that of the rank that owns them.
-class GhostMaterial final : public Material {
+/// Ghosts and images store nothing: the energy of their evaluation points is that of the rank that owns them, or of their sources.
+class SilentMaterial final : public Material {
  public:
   MaterialTraits traits() const noexcept override { return {.constant_tangent = true}; }
   void constants(const MaterialInput&, double*) const override {}
@@ -28,14 +28,6 @@ class GhostMaterial final : public Material {
     return {};
   }
 };
-
-MaterialRecord ghost_record() {
-  MaterialRecord record;
-  record.material = std::make_shared<GhostMaterial>();
-  record.traits = record.material->traits();
-  record.constants.resize(1);
-  return record;
-}
 
 /// The numbers and expressions of a part by key.
 using Values = std::map<std::string, Expression, std::less<>>;
@@ -117,10 +109,18 @@ std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene) {
   return parts;
 }
 
-std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool ghosts) {
+MaterialRecord silent_record() {
+  MaterialRecord record;
+  record.material = std::make_shared<SilentMaterial>();
+  record.traits = record.material->traits();
+  record.constants.resize(1);
+  return record;
+}
+
+std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool others) {
   std::vector<MaterialRecord> records;
   for (const auto& part : materials(scene)) records.push_back(build_record(*part, scene, factory, body, records.size()));
-  if (ghosts) records.push_back(ghost_record());
+  if (others) records.push_back(silent_record());
   return std::make_unique<Laws>(body.space(), std::move(records), body.material_ids(), body.stride());
 }
 

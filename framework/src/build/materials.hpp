@@ -16,9 +16,12 @@ namespace perikit {
 /// The materials of the scene in the order of Body::material_ids: [material], then those of the regions.
 std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene);
 
-/// Their laws, with constants at the points of `body`. ghosts: one more, which stores nothing, for the ghosts of the body. Throws
+/// Their laws, with constants at the points of `body`. others: one more, which stores nothing, for ghosts and images. Throws
 /// InputError.
-std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool ghosts);
+std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool others);
+
+/// A law that stores nothing.
+MaterialRecord silent_record();
 
 /// What to say of the first point without a density; nothing where all have one.
 std::optional<InputError> missing_density(const Scene& scene, const Body& body, const Laws& laws);

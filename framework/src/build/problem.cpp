@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
+#include "build/image_planes.hpp"
 #include "build/materials.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
@@ -15,15 +17,45 @@ namespace perikit {
 
 namespace {
 
+/// The number of the material of ghosts and images, after those of the scene.
+std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint16_t>(scene.regions.size() + 1); }
+
+/// What lies beyond held faces, planes of symmetry and periodic sides.
+struct Beyond {
+  Images images;
+  std::vector<FaceMotion> motions;
+};
+
+Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
+  ScenePlanes planes = build_planes(scene, body, quasi_static);
+  if (planes.planes.empty()) return {};
+  const ScenePlanes::Origin& any = planes.origins.front();
+  if (communicator().size() > 1) throw InputError(any.position, any.key, "found with several ranks; allowed: one rank");
+  // Gradients of the far ends of bonds need their whole families: two horizons.
+  Images images = make_images(body, planes.planes, 2 * body.horizon() * (1 + 1e-9));
+  try {
+    body = Body(body, images, image_material(scene));
+  } catch (const std::domain_error& error) {
+    // Only sides of parts of a body can have something beyond them.
+    const auto of_part = std::ranges::find_if(planes.origins, [](const auto& origin) { return origin.set != "all"; });
+    const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? any : *of_part;
+    throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
+  }
+  return {std::move(images), std::move(planes.motions)};
+}
+
 /// The bodies of this rank and, where there are several, of all of them.
-void place_points(const Scene& scene, ProblemParts& parts) {
+Beyond place_points(const Scene& scene, ProblemParts& parts, bool quasi_static) {
   Body whole = build_body(scene);
+  Beyond beyond = place_images(scene, whole, quasi_static);
   if (communicator().size() == 1) {
     parts.body = std::make_unique<const Body>(std::move(whole));
-    return;
+    if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
+    return beyond;
   }
   parts.partition = std::make_unique<const Partition>(std::move(whole), communicator().rank(), communicator().size());
-  parts.body = std::make_unique<const Body>(parts.partition->part(static_cast<std::uint16_t>(scene.regions.size() + 1)));
+  parts.body = std::make_unique<const Body>(parts.partition->part(image_material(scene)));
+  return beyond;
 }
 
 void refuse_stress(const Scene& scene, const Body& body, const Formulation& formulation) {
@@ -79,31 +111,32 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
 std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator) {
   const bool quasi_static = integrator.quasi_static;
   ProblemParts parts;
-  place_points(scene, parts);
+  Beyond beyond = place_points(scene, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
+  const bool others = partition || parts.images;   // points that store nothing
 
   TermParts of_terms{.formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
   refuse_stress(scene, body, of_terms.formulation);
-  parts.laws = build_laws(scene, factory, body, partition != nullptr);
+  parts.laws = build_laws(scene, factory, body, others);
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, quasi_static, partition != nullptr));
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), quasi_static, partition != nullptr));
   of_terms.damage = parts.fracture.damage();
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
-  if (partition) parts.materials.push_back(scene.material->type);  // of ghosts
+  if (others) parts.materials.push_back(scene.material->type);
 
+  Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
-  set_initial_state(scene, body, partition, state);
-  Constraints constraints = build_constraints(scene, body, quasi_static);
-  Loads loads = build_loads(scene, of_terms, partition, quasi_static);
+  set_initial_state(scene, body, partition, constraints, state);
+  Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
-  ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads)};
+  ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }
 

@@ -69,7 +69,7 @@ int PointFields::column(const std::string& name, const std::string& component) {
 }
 
 std::vector<double> PointFields::vector(ConstFieldView field, bool per_volume) const {
-  const auto internal = problem_.body().internal();
+  const std::vector<std::int32_t>& internal = problem_.body().owned();
   std::vector<double> out(3 * internal.size(), 0.0);
   for (std::size_t p = 0; p < internal.size(); ++p) {
     const auto i = static_cast<std::size_t>(internal[p]);
@@ -81,14 +81,14 @@ std::vector<double> PointFields::vector(ConstFieldView field, bool per_volume) c
 }
 
 std::vector<double> PointFields::scalar(ConstFieldView field) const {
-  const auto internal = problem_.body().internal();
+  const std::vector<std::int32_t>& internal = problem_.body().owned();
   std::vector<double> out(internal.size());
   for (std::size_t p = 0; p < internal.size(); ++p) out[p] = field.data[internal[p]];
   return out;
 }
 
 std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) const {
-  const auto internal = problem_.body().internal();
+  const std::vector<std::int32_t>& internal = problem_.body().owned();
   const auto d = static_cast<std::size_t>(problem_.dimension());
   std::vector<double> out(9 * internal.size(), 0.0);
   for (std::size_t p = 0; p < internal.size(); ++p) {
@@ -104,7 +104,7 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
 }
 
 const PointSamples& PointFields::samples() {
-  if (!samples_) problem_.terms().sample(problem_.state().displacement(), samples_.emplace());
+  if (!samples_) problem_.sample(samples_.emplace());
   return *samples_;
 }
 
@@ -135,7 +135,7 @@ std::vector<double> PointFields::jacobian() {
 
 std::vector<double> PointFields::material_id() const {
   const auto ids = problem_.body().material_ids();
-  const auto internal = problem_.body().internal();
+  const std::vector<std::int32_t>& internal = problem_.body().owned();
   std::vector<double> out(internal.size());
   for (std::size_t p = 0; p < out.size(); ++p) out[p] = ids.empty() ? 0.0 : ids[static_cast<std::size_t>(internal[p])];
   return out;

@@ -104,6 +104,17 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
   }
   const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
   if (bad >= 0) return bad % lanes;
+  if (!laws_.single()) {
+    // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks for them.
+    const auto tidy = [](double* x, int lanes_of) {
+      for (int l = 0; l < lanes_of; l += pack_width) {
+        const Pack value = Pack::load(x + l);
+        select(value == value, value, Pack(0.0)).store(x + l);
+      }
+    };
+    tidy(s.growth, ends * lanes);
+    tidy(s.inverse, lanes);
+  }
   if (energy_) {
     *energy += weighted_energy(n, s.weight, s.psi);
     if (ends == 2) *energy += weighted_energy(n, s.far_weight, s.psi + lanes);

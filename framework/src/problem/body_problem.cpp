@@ -6,6 +6,7 @@
 
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "perikit/problem/motion.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
@@ -14,21 +15,6 @@
 namespace perikit {
 
 namespace {
-
-/// u with the values of ghosts, in `memory`; u itself where there are none.
-ConstFieldView filled(const std::optional<Ghosts>& ghosts, ConstFieldView u, Field& memory) {
-  if (!ghosts) return u;
-  std::copy_n(u.data, u.size(), memory.data());
-  ghosts->forward(memory);
-  return memory;
-}
-
-/// Ends an evaluation: forces on ghosts go to their owners; one status for all ranks.
-void finish(const std::optional<Ghosts>& ghosts, FieldView force, EvaluationStatus& status) {
-  if (!ghosts) return;
-  if (communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return ghosts->accumulate(force);
-  if (status.ok()) status = {0, "inadmissible deformation on another rank"};
-}
 
 void refuse_ranks(const ProblemParts& parts) {
   if (parts.partition)
@@ -40,10 +26,10 @@ void refuse_ranks(const ProblemParts& parts) {
 
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
     : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
-  if (!parts_.partition) return;
-  ghosts_.emplace(*parts_.partition, body());
-  with_ghosts_ = make_field();
-  direction_with_ghosts_ = make_field();
+  if (parts_.partition) ghosts_.emplace(*parts_.partition, body());
+  if (!parts_.partition && !parts_.images) return;
+  seen_ = make_field();
+  seen_direction_ = make_field();
 }
 
 BodyProblem::~BodyProblem() = default;
@@ -52,10 +38,35 @@ ProblemParts::ProblemParts() = default;
 ProblemParts::ProblemParts(ProblemParts&&) noexcept = default;
 ProblemParts::~ProblemParts() = default;
 
+ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) const {
+  if (!ghosts_ && !images()) return u;
+  copy(u, memory);
+  if (ghosts_) ghosts_->forward(memory);
+  if (images()) images()->extend(memory);
+  return memory;
+}
+
+void BodyProblem::finish(FieldView force, EvaluationStatus& status) const {
+  if (images() && status.ok()) images()->fold(force);
+  if (!ghosts_) return;
+  if (communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return ghosts_->accumulate(force);
+  if (status.ok()) status = {0, "inadmissible deformation on another rank"};
+}
+
+template <class Fill>
+void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const {
+  if (!images()) return fill(K);
+  full.convex = K.convex;
+  fill(full);
+  images()->fold(full, K);
+}
+
+EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
+
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
-  EvaluationStatus status = terms().forces(filled(ghosts_, u, with_ghosts_), force, energy);
+  EvaluationStatus status = terms().forces(seen(u, seen_), force, energy);
   if (energy) *energy = communicator().sum(*energy);
   if (history) history->set_time_step(0);
   if (!status.ok()) {
@@ -65,33 +76,35 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
                                      terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
                                      status.description, parts_.kinematics, parts_.materials[id]);
   }
-  finish(ghosts_, force, status);
+  finish(force, status);
   return status;
 }
 
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const ConstFieldView at = filled(ghosts_, u, with_ghosts_), along = filled(ghosts_, w, direction_with_ghosts_);
-  EvaluationStatus status = terms().tangent(at, along, Kw);
-  finish(ghosts_, Kw, status);
+  EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
+  finish(Kw, status);
   return status;
 }
 
 EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
   refuse_ranks(parts_);
-  const EvaluationStatus status = terms().assemble(u, K);
+  EvaluationStatus status;
+  over_own(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(seen(u, seen_), of_terms); });
   if (status.ok()) hold_loose_points(terms().changed_bonds(), K);
   return status;
 }
 
 AssembledSize BodyProblem::assembled_size() {
   refuse_ranks(parts_);
-  return terms().assembled_size();
+  AssembledSize size = terms().assembled_size();
+  if (images()) size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);   // it is there twice
+  return size;
 }
 
 void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K) {
   refuse_ranks(parts_);
   if (!companion_) companion_ = std::make_unique<Companion>(*parts_.families, laws());
-  companion_->assemble(u, K);
+  over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) { companion_->assemble(seen(u, seen_), of_terms); });
 }
 
 bool BodyProblem::constant_stiffness() const noexcept {
@@ -100,8 +113,12 @@ bool BodyProblem::constant_stiffness() const noexcept {
 
 bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
   if (terms().history()) terms().history()->advance();
-  const Motion half_step = [&](FieldView end) { middle_of_next_step(*this, time_step, velocity, end); };
-  return parts_.fracture.update(terms(), state(), time_step, velocity.data ? half_step : Motion());
+  const Motion half_step = [&](FieldView end) {
+    middle_of_next_step(*this, time_step, velocity, end);
+    if (images()) images()->extend(end);
+  };
+  if (!parts_.fracture.damage()) return false;
+  return parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step, velocity.data ? half_step : Motion());
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "problem/snapshot.hpp"
 
 namespace perikit {
 
-Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptions) : body_(&body) {
+Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptions, const Images& images, std::vector<FaceMotion> motions)
+    : body_(&body), motions_(std::move(motions)) {
   const std::size_t stride = body.stride();
   std::vector<std::int32_t> governor(stride * static_cast<std::size_t>(body.dimension()), -1);
   const auto governor_of = [&](const Prescription& p, std::int32_t point) -> std::int32_t& {
@@ -27,6 +29,48 @@ Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptio
   }
   for (std::size_t dof = 0; dof < governor.size(); ++dof)
     if (governor[dof] >= 0) dofs_.push_back(static_cast<std::int64_t>(dof));
+  add_images(images);
+}
+
+void Constraints::add_images(const Images& images) {
+  const std::size_t real = body_->points() - images.size();
+  for (const ImageTerm& term : images.terms) {
+    const std::int64_t dof = term.component * static_cast<std::int64_t>(body_->stride()) + body_->internal()[real + static_cast<std::size_t>(term.image)];
+    // Terms of one component of an image follow each other.
+    if (image_dofs_.empty() || image_dofs_.back().dof != dof) {
+      image_dofs_.push_back({dof, false, false, shares_.size(), shares_.size()});
+      dofs_.push_back(dof);
+    }
+    if (term.motion < 0) continue;
+    const FaceMotion& motion = motions_[static_cast<std::size_t>(term.motion)];
+    ImageDof& image = image_dofs_.back();
+    if (image.first < image.last && image.velocity != motion.velocity)
+      throw std::domain_error("found a face with a velocity beside one with a displacement, which it meets; allowed: the same key for both");
+    image.velocity = motion.velocity;
+    image.depends_on_time = image.depends_on_time || motion.value.depends_on_time;
+    shares_.push_back({term.motion, term.factor, term.at, motion.value.depends_on_time ? 0.0 : motion.value.value(term.at, 0.0)});
+    image.last = shares_.size();
+  }
+  std::ranges::sort(dofs_);
+}
+
+double Constraints::value(const ImageDof& image, double t) const {
+  double sum = 0;
+  for (std::size_t k = image.first; k < image.last; ++k) {
+    const Share& share = shares_[k];
+    const SpaceTimeFunction& function = motions_[static_cast<std::size_t>(share.motion)].value;
+    sum += share.factor * (function.depends_on_time ? function.value(share.at, t) : function.ramps ? t * share.fixed : share.fixed);
+  }
+  return sum;
+}
+
+template <class Visit>
+void Constraints::each(Visit&& visit) const {
+  for (const Governed& governed : governed_)
+    for (std::size_t k = 0; k < governed.points.size(); ++k)
+      visit(static_cast<std::int64_t>(governed.component) * static_cast<std::int64_t>(body_->stride()) + governed.points[k], governed.velocity,
+            governed.value.depends_on_time, [&](double t) { return value(governed, k, t); });
+  for (const ImageDof& image : image_dofs_) visit(image.dof, image.velocity, image.depends_on_time, [&](double t) { return value(image, t); });
 }
 
 double Constraints::value(const Governed& governed, std::size_t k, double t) const {
@@ -53,50 +97,42 @@ std::size_t Constraints::points_held_at_rest() const {
 }
 
 void Constraints::prescribe_displacement(double t, FieldView u) const {
-  for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.points.size(); ++k)
-      u.component(governed.component)[governed.points[k]] = value(governed, k, t);
+  each([&](std::int64_t dof, bool, bool, auto&& value) { u.data[dof] = value(t); });
+}
+
+void Constraints::start_images(const std::function<double(int, const Point&)>& initial, FieldView u) const {
+  for (const ImageDof& image : image_dofs_) {
+    double sum = image.velocity ? 0.0 : value(image, 0);
+    for (std::size_t k = image.first; k < image.last && image.velocity; ++k)
+      sum += shares_[k].factor * initial(static_cast<int>(image.dof / static_cast<std::int64_t>(u.stride)), shares_[k].at);
+    u.data[image.dof] = sum;
+  }
 }
 
 void Constraints::prescribe_half_step_velocity(double t_begin, double t_end, ConstFieldView u, FieldView v) {
   last_step_ = t_end - t_begin;
-  for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.points.size(); ++k) {
-      const std::int32_t p = governed.points[k];
-      v.component(governed.component)[p] =
-          governed.velocity ? value(governed, k, 0.5 * (t_begin + t_end))
-                            : (value(governed, k, t_end) - u.component(governed.component)[p]) / (t_end - t_begin);
-    }
+  each([&](std::int64_t dof, bool velocity, bool, auto&& value) {
+    v.data[dof] = velocity ? value(0.5 * (t_begin + t_end)) : (value(t_end) - u.data[dof]) / (t_end - t_begin);
+  });
 }
 
 void Constraints::prescribe_velocity(double t, FieldView v) const {
   const double h = 1e-3 * std::max(last_step_, 1e-9 * std::abs(t));
-  for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.points.size(); ++k) {
-      double& velocity = v.component(governed.component)[governed.points[k]];
-      if (governed.velocity)
-        velocity = value(governed, k, t);
-      else if (governed.value.depends_on_time && h > 0)
-        velocity = (value(governed, k, t + h) - value(governed, k, t - h)) / (2 * h);
-      else
-        velocity = 0.0;
-    }
+  each([&](std::int64_t dof, bool velocity, bool depends_on_time, auto&& value) {
+    if (velocity) v.data[dof] = value(t);
+    else if (depends_on_time && h > 0) v.data[dof] = (value(t + h) - value(t - h)) / (2 * h);
+    else v.data[dof] = 0.0;
+  });
 }
 
 void Constraints::prescribe_acceleration(double t, FieldView a) const {
   // Differences over whole steps: over a small part of one, rounding would grow with the square of the number of steps.
   const double h = last_step_;
-  for (const Governed& governed : governed_)
-    for (std::size_t k = 0; k < governed.points.size(); ++k) {
-      const auto at = [&](double time) { return value(governed, k, time); };
-      double& acceleration = a.component(governed.component)[governed.points[k]];
-      if (!governed.value.depends_on_time || h <= 0)
-        acceleration = 0.0;
-      else if (governed.velocity)
-        acceleration = (at(t + h / 2) - at(t - h / 2)) / h;
-      else
-        acceleration = (at(t + h) - 2 * at(t) + at(t - h)) / (h * h);
-    }
+  each([&](std::int64_t dof, bool velocity, bool depends_on_time, auto&& value) {
+    if (!depends_on_time || h <= 0) a.data[dof] = 0.0;
+    else if (velocity) a.data[dof] = (value(t + h / 2) - value(t - h / 2)) / h;
+    else a.data[dof] = (value(t + h) - 2 * value(t) + value(t - h)) / (h * h);
+  });
 }
 
 void Constraints::write(ByteWriter& out) const {

@@ -4,7 +4,7 @@
 
 namespace perikit {
 
-Loads::Loads(const Body& body, std::vector<Load> loads) : body_(&body), loads_(std::move(loads)) {}
+Loads::Loads(const Body& body, std::vector<Load> loads, const ImageMap* images) : body_(&body), loads_(std::move(loads)), images_(images) {}
 
 bool Loads::depend_on_time() const noexcept {
   return std::ranges::any_of(loads_, [](const Load& load) {
@@ -24,6 +24,7 @@ void Loads::evaluate(double t, FieldView force) const {
         f[p] += load.share[k] * (everywhere ? common : component.value(body_->position(static_cast<std::size_t>(p)), t));
       }
     }
+  if (images_) images_->fold(force);
 }
 
 }  // namespace perikit

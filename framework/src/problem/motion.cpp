@@ -46,6 +46,7 @@ Field reactions(Problem& problem, bool dynamic, double t) {
     r.data()[dof] = -internal.data[dof] - (external.data ? external.data[dof] : 0.0);
     if (dynamic) r.data()[dof] += problem.masses().by_point()[static_cast<std::size_t>(dof) % r.stride()] * a.data()[dof];
   }
+  if (problem.images()) problem.images()->gather(r);
   return r;
 }
 

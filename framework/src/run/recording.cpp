@@ -50,8 +50,8 @@ std::string earlier_run(const std::filesystem::path& folder) {
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.body();
   ReferenceData data;
-  for (std::size_t p = 0; p < body.points(); ++p) {
-    const auto i = static_cast<std::size_t>(body.internal()[p]);
+  for (std::size_t p = 0; p < body.owned().size(); ++p) {
+    const auto i = static_cast<std::size_t>(body.owned()[p]);
     const Point x = body.position(i);
     data.position.insert(data.position.end(), x.begin(), x.end());
     data.volume.push_back(body.volume(i));

@@ -42,8 +42,9 @@ void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer)
 std::string Simulation::summary() {
   const Body& body = problem_->body();
   const ModelReport report = problem_->terms().report();
-  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points(),
+  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.owned().size(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
+  if (problem_->images()) text += fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
@@ -58,7 +59,7 @@ std::string Simulation::summary() {
   if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
-  text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.points()));
+  text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.owned().size()));
   const std::string plan = integrator_->plan(*problem_);
   if (!plan.empty()) text += fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
   return text;

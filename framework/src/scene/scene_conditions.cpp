@@ -1,4 +1,4 @@
-// [initial], [[boundary]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
+// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -36,6 +36,18 @@ void SceneReader::read_boundaries(const toml::table& root) {
     writer_.lines(table, values);
     BoundaryDescription description;
     description.set = set_of(values);
+    if (values.has("face")) {
+      description.face = values.text("face");
+      check_axis(description.face[1], values, "face");
+      description.face_position = values.position(values.has("at") ? "at" : "face");
+      if (!values.has("set")) description.set = "all";
+    } else if (!values.has("set")) {
+      reader_.errors.add(reader_.position(*boundary), values.path() + ".set", "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
+    }
+    if (values.has("at")) {
+      description.at = values.number("at");
+      if (!values.has("face")) reader_.errors.add(values.position("at"), values.path() + ".at", "found it without face; allowed: only with face");
+    }
     description.velocity = values.has("velocity");
     for (const char* key : {"displacement", "velocity"}) {
       if (values.has(key)) description.components = components(values, key);
@@ -43,6 +55,34 @@ void SceneReader::read_boundaries(const toml::table& root) {
     description.position = values.position(description.velocity ? "velocity" : "displacement");
     scene_.boundaries.push_back(std::move(description));
   }
+}
+
+void SceneReader::check_axis(char axis, const ParameterValues& values, const char* key) {
+  if (reader_.dimension <= 0 || axis - 'x' < reader_.dimension) return;
+  reader_.errors.add(values.position(key), join_path(values.path(), key),
+                     fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", values.text(key), reader_.dimension));
+}
+
+void SceneReader::read_planes(const toml::table& root) {
+  const auto number = [](const ParameterValues& values, const char* key) {
+    return values.has(key) ? std::optional(values.number(key)) : std::nullopt;
+  };
+  const auto read = [&](const char* key, const ParameterTable& table, std::size_t count, auto&& add) {
+    for (const toml::table* section : sections(root, key, key)) {
+      const ParameterValues values = reader_.read(*section, table, fmt::format("{}.{}", key, count++));
+      writer_.header(key, true);
+      writer_.lines(table, values);
+      if (!values.has("axis")) continue;
+      check_axis(values.text("axis")[0], values, "axis");
+      add(values, values.text("axis")[0] - 'x');
+    }
+  };
+  read("symmetry", symmetry_parameters(), 0, [&](const ParameterValues& values, int axis) {
+    scene_.symmetries.push_back({axis, number(values, "at"), values.position(values.has("at") ? "at" : "axis")});
+  });
+  read("periodic", periodic_parameters(), 0, [&](const ParameterValues& values, int axis) {
+    scene_.periodics.push_back({axis, number(values, "lower"), number(values, "upper"), values.position("axis")});
+  });
 }
 
 void SceneReader::read_loads(const toml::table& root) {
@@ -71,10 +111,8 @@ void SceneReader::read_loads(const toml::table& root) {
       if (!load->contains("traction")) {
         reader_.errors.add(values.position("face"), path + ".face",
                            fmt::format("found \"{}\" without traction; allowed: only with traction", description.face));
-      } else if (reader_.dimension > 0 && description.face[1] - 'x' >= reader_.dimension) {
-        reader_.errors.add(values.position("face"), path + ".face",
-                           fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", description.face,
-                                       reader_.dimension));
+      } else {
+        check_axis(description.face[1], values, "face");
       }
     }
     scene_.loads.push_back(std::move(description));

@@ -16,7 +16,7 @@ namespace {
 
 const std::vector<std::string> section_names{"constants", "body",   "sets",       "family", "kinematics",
                                              "material",  "region", "damage",     "crack",  "initial",
-                                             "boundary",  "load",   "integrator", "output", "run"};
+                                             "boundary",  "symmetry", "periodic", "load", "integrator", "output", "run"};
 
 bool identifier(std::string_view name) {
   return !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
@@ -42,6 +42,7 @@ void SceneReader::read(toml::table& root) {
   read_cracks(root);
   read_initial(root);
   read_boundaries(root);
+  read_planes(root);
   read_loads(root);
   read_output(root);
   read_run(root);
@@ -58,7 +59,7 @@ void SceneReader::refuse_reserved(toml::table& root) {
     reader_.refuse(node, path, fmt::format("found {}; the word \"{}\" is reserved for a later version", found(node), key));
     table.erase(key);
   };
-  for (const char* word : {"contact", "stage", "periodic", "symmetry"}) {
+  for (const char* word : {"contact", "stage"}) {
     if (root.contains(word)) refuse(root, word, word);
   }
   if (auto* bodies = root["body"].as_array()) {

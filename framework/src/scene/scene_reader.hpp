@@ -31,6 +31,8 @@ class SceneReader {
   void read_cracks(const toml::table& root);
   void read_initial(const toml::table& root);
   void read_boundaries(const toml::table& root);
+  /// [[symmetry]] and [[periodic]].
+  void read_planes(const toml::table& root);
   void read_loads(const toml::table& root);
   void read_output(const toml::table& root);
   void read_history(const toml::table& output);
@@ -42,6 +44,8 @@ class SceneReader {
   std::vector<const toml::table*> sections(const toml::table& parent, const std::string& key, const std::string& path);
   /// An error unless `name` is a set.
   void check_set(const std::string& name, const SourcePosition& position, const std::string& key);
+  /// An error unless the body has this axis.
+  void check_axis(char axis, const ParameterValues& values, const char* key);
   /// The set that `values` names, checked.
   std::string set_of(const ParameterValues& values);
   std::vector<Expression> expressions(const ParameterValues& values, const std::string& key, bool with_time) const;

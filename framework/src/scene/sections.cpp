@@ -9,6 +9,8 @@ namespace {
 
 constexpr auto unbounded = std::numeric_limits<std::size_t>::max();
 
+std::vector<std::string> faces() { return {"+x", "-x", "+y", "-y", "+z", "-z"}; }
+
 }  // namespace
 
 ParameterTable head_parameters() {
@@ -113,10 +115,27 @@ ParameterTable initial_parameters() {
 
 ParameterTable boundary_parameters() {
   ParameterTable table;
-  table.string("set", "The points whose motion is prescribed.").require();
+  table.string("set", "The points whose motion is prescribed; with `face` those whose side it is, default: all. Needed without `face`.");
+  table.choice("face", faces(), "Prescribe the motion of this side of the set instead of that of its points.");
+  table.number("at", "m", "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
   table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
   table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
   table.exactly(1, {"displacement", "velocity"});
+  return table;
+}
+
+ParameterTable symmetry_parameters() {
+  ParameterTable table;
+  table.choice("axis", {"x", "y", "z"}, "Normal of the plane, of which the body is one half.").require();
+  table.number("at", "m", "Where the plane lies; without it half a spacing below the lowest points. Needed where points come from a file.");
+  return table;
+}
+
+ParameterTable periodic_parameters() {
+  ParameterTable table;
+  table.choice("axis", {"x", "y", "z"}, "Along which the body continues with itself.").require();
+  table.number("lower", "m", "Where the body begins; without it half a spacing below the lowest points. Needed where points come from a file.");
+  table.number("upper", "m", "Where it ends and begins again, likewise.");
   return table;
 }
 
@@ -126,7 +145,7 @@ ParameterTable load_parameters() {
   table.add(ParameterType::expressions, "force", "N", "Total force on the set, shared by volume.").with_time().one_per_axis();
   table.add(ParameterType::expressions, "body_force", "N/m^3", "Force per volume.").with_time().one_per_axis();
   table.add(ParameterType::expressions, "traction", "Pa", "Force per area on `face`.").with_time().one_per_axis();
-  table.choice("face", {"+x", "-x", "+y", "-y", "+z", "-z"}, "With traction: the side of the set that carries it.");
+  table.choice("face", faces(), "With traction: the side of the set that carries it.");
   table.exactly(1, {"force", "body_force", "traction"});
   return table;
 }
@@ -205,6 +224,8 @@ const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
                                                                {"crack", crack_parameters()},
                                                                {"initial", initial_parameters()},
                                                                {"boundary", boundary_parameters()},
+                                                               {"symmetry", symmetry_parameters()},
+                                                               {"periodic", periodic_parameters()},
                                                                {"load", load_parameters()},
                                                                {"output", output_parameters()},
                                                                {"output.history", history_parameters()},

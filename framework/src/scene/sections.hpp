@@ -16,6 +16,8 @@ ParameterTable region_parameters();
 ParameterTable crack_parameters();
 ParameterTable initial_parameters();
 ParameterTable boundary_parameters();
+ParameterTable symmetry_parameters();
+ParameterTable periodic_parameters();
 ParameterTable load_parameters();
 ParameterTable output_parameters();
 ParameterTable history_parameters();

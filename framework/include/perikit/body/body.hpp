@@ -27,11 +27,14 @@ class Crack {
   bool cuts(const Point& a, const Point& b) const noexcept;
   /// Whether a bond of this length from x could be cut at all.
   bool near(const Point& x, double length) const noexcept;
+  const std::vector<Point>& vertices() const noexcept { return vertices_; }
 
  private:
   std::vector<Point> vertices_;
   Point lower_{}, upper_{}, normal_{};
 };
+
+struct Images;
 
 /// What a body is beside its points.
 struct BodyFrame {
@@ -53,6 +56,10 @@ class Body {
   /// owned points.
   Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material);
 
+  /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws std::domain_error
+  /// where two points of a lattice would be one.
+  Body(const Body& whole, const Images& images, std::uint16_t image_material);
+
   /// members: internal indices, each once, in the order that the set shall have. "all" exists from the beginning.
   void add_set(const std::string& name, std::vector<std::int32_t> members) { sets_[name] = std::move(members); }
   /// By internal index; see material_ids().
@@ -61,7 +68,7 @@ class Body {
   int dimension() const noexcept { return perikit::dimension(frame_.space); }
   Space space() const noexcept { return frame_.space; }
   double section() const noexcept { return frame_.section; }
-  std::size_t points() const noexcept { return internal_.size(); }   ///< with ghosts
+  std::size_t points() const noexcept { return internal_.size(); }   ///< with ghosts and images
   /// Of the body on all ranks, each once.
   std::size_t points_of_all_ranks() const noexcept { return points_of_all_ranks_; }
   std::size_t stride() const noexcept { return stride_; }
@@ -85,7 +92,7 @@ class Body {
   /// Bit p % 8 of byte p / 8.
   std::span<const std::uint8_t> alive_bits() const noexcept { return alive_; }
 
-  /// Points that belong to this body alone: all of them, but for ghosts.
+  /// Points that belong to this body alone: all of them, but for ghosts and images.
   const std::vector<std::int32_t>& owned() const noexcept { return sets_.at("all"); }
   /// Internal indices in input order. "all" exists.
   const std::vector<std::int32_t>& set(const std::string& name) const { return sets_.at(name); }
@@ -98,6 +105,8 @@ class Body {
 
  private:
   void number_lattice(const Lattice& lattice, double volume);
+  void copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others);
+  void place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions);
   void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
 
   BodyFrame frame_;

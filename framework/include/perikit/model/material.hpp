@@ -21,8 +21,8 @@ struct MaterialTraits {
 struct Moduli {
   double lambda = 0, mu = 0;
   double bulk() const noexcept { return lambda + 2.0 * mu / 3.0; }
-  double youngs() const noexcept { return mu * (3 * lambda + 2 * mu) / (lambda + mu); }
-  double poisson() const noexcept { return lambda / (2 * (lambda + mu)); }
+  double youngs() const noexcept { return mu == 0 ? 0 : mu * (3 * lambda + 2 * mu) / (lambda + mu); }   // points that store nothing have neither
+  double poisson() const noexcept { return lambda == 0 ? 0 : lambda / (2 * (lambda + mu)); }
 };
 
 /// n evaluation points. Arrays are component-major: component c at point p is x[c * stride + p]; components as in Space.

@@ -15,6 +15,7 @@ namespace perikit {
 
 class Companion;
 class Families;
+struct PointSamples;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
 struct ProblemParts {
@@ -22,7 +23,8 @@ struct ProblemParts {
   ProblemParts(ProblemParts&&) noexcept;
   ~ProblemParts();
   std::unique_ptr<const Partition> partition;   ///< null where one rank has the whole body
-  std::unique_ptr<const Body> body;             ///< of this rank
+  std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
+  std::unique_ptr<const ImageMap> images;       ///< null without
   std::unique_ptr<Laws> laws;
   std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
   FractureRecord fracture;
@@ -43,6 +45,8 @@ class BodyProblem final : public Problem {
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
   AssembledSize assembled_size() override;
   void assemble_companion(ConstFieldView u, BlockMatrix& K) override;
+  /// Of the present state.
+  EvaluationStatus sample(PointSamples& samples);
   bool constant_stiffness() const noexcept override;
   bool advance(double time_step, ConstFieldView velocity = {}) override;
   std::vector<std::byte> bonds() const override;
@@ -64,7 +68,16 @@ class BodyProblem final : public Problem {
   ProblemParts parts_;
   ProblemValues values_;
   std::optional<Ghosts> ghosts_;
-  Field with_ghosts_, direction_with_ghosts_;
+  /// u as the terms see it: with the values of ghosts and images, in `memory`; u itself where there are none.
+  ConstFieldView seen(ConstFieldView u, Field& memory) const;
+  /// Ends an evaluation: forces on ghosts and images go to where they belong; one status for all ranks.
+  void finish(FieldView force, EvaluationStatus& status) const;
+  /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
+  template <class Fill>
+  void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
+
+  Field seen_, seen_direction_;
+  BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "perikit/problem/image_map.hpp"
 #include "perikit/problem/space_time_function.hpp"
 
 namespace perikit {
@@ -21,8 +22,8 @@ struct Load {
 
 class Loads {
  public:
-  /// `body` must outlive the loads.
-  Loads(const Body& body, std::vector<Load> loads);
+  /// `body` and `images` (null: none) must outlive the loads. What falls on images acts on their sources too, with their sign.
+  Loads(const Body& body, std::vector<Load> loads, const ImageMap* images = nullptr);
 
   bool any() const noexcept { return !loads_.empty(); }
   bool depend_on_time() const noexcept;
@@ -32,6 +33,7 @@ class Loads {
  private:
   const Body* body_;
   std::vector<Load> loads_;
+  const ImageMap* images_;
 };
 
 }  // namespace perikit

@@ -7,6 +7,7 @@
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/problem/constraints.hpp"
+#include "perikit/problem/image_map.hpp"
 #include "perikit/problem/loads.hpp"
 #include "perikit/problem/masses.hpp"
 #include "perikit/problem/state.hpp"
@@ -20,6 +21,7 @@ struct ProblemValues {
   Masses masses;
   Constraints constraints;
   Loads loads;
+  const ImageMap* images = nullptr;   ///< null: the body has none. They are not owned; their displacements are constrained
 };
 
 /// Values are the same for all who look at a problem; operations may be wrapped by those who look on or interfere.
@@ -35,6 +37,7 @@ class Problem {
   const Masses& masses() const noexcept { return values_.masses; }
   Constraints& constraints() noexcept { return values_.constraints; }
   const Loads& loads() const noexcept { return values_.loads; }
+  const ImageMap* images() const noexcept { return values_.images; }
   int dimension() const noexcept { return body().dimension(); }
   /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
   Field make_field() const { return body().make_field(dimension()); }

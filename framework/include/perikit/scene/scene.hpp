@@ -58,9 +58,23 @@ struct CrackDescription {                    ///< 2 vertices: segment; more: pol
 /// One component of a prescribed motion: nullopt where "free". A plain number ramps linearly in quasi-static runs.
 struct BoundaryDescription {
   std::string set;
+  std::string face;                          ///< "+x" ... "-z": of the set, is held; empty: the points of the set are
+  std::optional<double> at;                  ///< where the face lies [m]
   bool velocity = false;                     ///< else displacement
   std::vector<std::optional<Expression>> components;
-  SourcePosition position;                   ///< of the key
+  SourcePosition position, face_position;    ///< of the displacement or velocity; of `at`, else of the face
+};
+
+struct SymmetryDescription {
+  int axis = 0;
+  std::optional<double> at;                  ///< of the plane [m]; else below the lowest points
+  SourcePosition position;
+};
+
+struct PeriodicDescription {
+  int axis = 0;
+  std::optional<double> lower, upper;        ///< [m]; else the ends of the body
+  SourcePosition position;
 };
 
 struct LoadDescription {
@@ -107,6 +121,8 @@ struct Scene {
   std::optional<std::filesystem::path> initial_from;
   SourcePosition initial_velocity_position;
   std::vector<BoundaryDescription> boundaries;
+  std::vector<SymmetryDescription> symmetries;
+  std::vector<PeriodicDescription> periodics;
   std::vector<LoadDescription> loads;
   OutputDescription output;
   bool skip = true;                          ///< [run]: leave out work whose result is known

@@ -1,0 +1,51 @@
+#pragma once
+/// Image points: what lies beyond held faces, planes of symmetry and periodic sides, for the families of points near them. The
+/// displacement of an image is sign * u(source) and what faces prescribe; it stores nothing of its own, and forces on it go back to
+/// its source.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "perikit/body/body.hpp"
+
+namespace perikit {
+
+/// Points in front of a plane across `axis` have images behind it: mirrored, or (period > 0) those within reach of the opposite side
+/// shifted by the period.
+struct ImagePlane {
+  int axis = 0;
+  double at = 0;                               ///< coordinate [m]
+  double outward = 1;                          ///< images lie above (1) or below (-1)
+  double period = 0;                           ///< [m]; 0: a mirror
+  std::array<bool, 3> odd{};                   ///< components whose mirrored displacement has the other sign
+  std::array<int, 3> motion{-1, -1, -1};       ///< which motion an odd component has at the plane; -1: none, it is 0 there
+  std::vector<std::int32_t> surface;           ///< by input number: the point at the plane below which it lies, -1: it has no image
+};
+
+/// A share of an image's displacement: factor times the motion at a place of a plane (-1: 0). What the image exerts on the plane counts for the
+/// point `surface`.
+struct ImageTerm {
+  std::int32_t image;                          ///< number among the images
+  int component, motion;
+  double factor;
+  Point at;
+  std::int32_t surface;                        ///< input number
+};
+
+struct Images {
+  std::vector<Point> position;
+  std::vector<std::int32_t> source;            ///< input numbers
+  std::vector<std::array<std::int8_t, 3>> sign;
+  std::vector<ImageTerm> terms;                ///< ascending by image
+  std::vector<Crack> cracks;                   ///< of the body, and their images
+
+  std::size_t size() const noexcept { return source.size(); }
+};
+
+/// Images of the points that lie less than `reach` from planes, axis after axis, so that edges and corners have images of images.
+/// Throws std::domain_error where they would lie among the points of the body.
+Images make_images(const Body& body, std::span<const ImagePlane> planes, double reach);
+
+}  // namespace perikit

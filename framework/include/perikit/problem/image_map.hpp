@@ -1,0 +1,44 @@
+#pragma once
+/// The linear map between the displacements that a problem has and those that its terms see. An image's entry of the former holds what
+/// faces prescribe of it, a constrained component like any other, and u(image) = sign * u(source) + that entry. Forces go the other way:
+/// the source gets sign * force, and the image keeps its own, from which reactions follow.
+
+#include <cstdint>
+#include <vector>
+
+#include "perikit/body/images.hpp"
+#include "perikit/core/block_matrix.hpp"
+
+namespace perikit {
+
+class ImageMap {
+ public:
+  /// `body` has these images.
+  ImageMap(const Body& body, const Images& images);
+
+  std::size_t size() const noexcept { return image_.size(); }
+  /// u of the problem -> u of the terms.
+  void extend(FieldView u) const;
+  /// Forces of the terms -> forces of the problem.
+  void fold(FieldView force) const;
+  /// K <- T^t full T, T being `extend`, over the same block rows. The pattern is made where K has none.
+  void fold(const BlockMatrix& full, BlockMatrix& K) const;
+  /// field(image) <- field(source).
+  void copy_from_sources(FieldView field) const;
+  /// Appends the images of the points, internal indices.
+  void append_images(std::vector<std::int32_t>& points) const;
+  /// Reactions of images, by component, go to the points at the planes: what holds the planes in place [N].
+  void gather(FieldView reaction) const;
+
+ private:
+  struct Share {
+    std::int64_t image, surface;               ///< components of points
+    double factor;
+  };
+  std::vector<std::int32_t> image_, source_;   ///< internal indices
+  std::vector<std::array<double, 3>> sign_;
+  std::vector<Share> shares_;
+  std::vector<std::int32_t> map_;              ///< by internal index: number of the image, -1
+};
+
+}  // namespace perikit

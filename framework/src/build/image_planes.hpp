@@ -1,0 +1,26 @@
+#pragma once
+/// From [[boundary]] with face, [[symmetry]] and [[periodic]] to the planes that points have images behind.
+
+#include <string>
+#include <vector>
+
+#include "perikit/body/images.hpp"
+#include "perikit/problem/constraints.hpp"
+#include "perikit/scene/scene.hpp"
+
+namespace perikit {
+
+struct ScenePlanes {
+  struct Origin {
+    std::string key, set;                ///< what asks for it in the scene, and whose side it is
+    SourcePosition position;
+  };
+  std::vector<ImagePlane> planes;
+  std::vector<Origin> origins;           ///< of the planes
+  std::vector<FaceMotion> motions;       ///< what ImagePlane::motion numbers
+};
+
+/// Throws InputError for faces without points, planes through the body, faces held twice.
+ScenePlanes build_planes(const Scene& scene, const Body& body, bool quasi_static);
+
+}  // namespace perikit

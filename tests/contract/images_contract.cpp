@@ -1,0 +1,265 @@
+/// Faces, planes of symmetry and periodic sides. What holds a face is a displacement like any other, so that forces, reactions and tangents are
+/// derivatives over it too; a homogeneous stress between held faces is in equilibrium; half a body and its image are the whole.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "perikit/core/parallel.hpp"
+#include "perikit/problem/motion.hpp"
+#include "tests/contract/fixture.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+std::string held(const char* face, const char* displacement) {
+  return fmt::format("[[boundary]]\nface = \"{}\"\ndisplacement = {}\n", face, displacement);
+}
+std::string symmetric(char axis) { return fmt::format("[[symmetry]]\naxis = \"{}\"\n", axis); }
+std::string periodic(char axis) { return fmt::format("[[periodic]]\naxis = \"{}\"\n", axis); }
+
+/// Every kinematics between faces of all sorts, on lattices and clouds, in two mixtures a dimension; a cracked body of two materials among them.
+std::vector<Case> cases_with_images() {
+  const std::array<std::array<std::string, 2>, 3> mixtures{{
+      {held("-x", "[0.0]"), periodic('x')},
+      {held("-x", "[0.1, \"0.1*y\"]") + symmetric('y'), held("-y", "[\"free\", 0.2]") + held("+y", "[0.1, \"free\"]") + periodic('x')},
+      {held("-x", "[0.1, 0.0, \"0.1*z\"]") + symmetric('y') + periodic('z'), held("+z", "[0.1, \"free\", 0.0]") + held("-y", "[0.0, 0.1, 0.0]")},
+  }};
+  std::vector<Case> all;
+  for (const Example& example : kinematics_examples())
+    for (int d = 1; d <= 3; ++d)
+      for (int k = 0; k < 2; ++k)
+        for (const bool cloud : {false, true}) {
+          if (d == 3 && cloud == (k == 0)) continue;   // in 3D, where they take the longest, one of each
+          BodyOptions body;
+          body.dimension = d;
+          body.cloud = cloud;
+          body.cells = d == 3 ? 6 : d == 2 ? 9 : 20;
+          body.crack = body.two_materials = k == 1 && d > 1;
+          body.conditions = mixtures[static_cast<std::size_t>(d - 1)][static_cast<std::size_t>(k)];
+          all.push_back({example, body});
+        }
+  return all;
+}
+
+/// From displacements of all points, images too, to those of the problem.
+void to_problem(const BodyProblem& problem, FieldView u) {
+  Field of_sources = problem.make_field();
+  for (int c = 0; c < u.components; ++c)
+    for (const std::int32_t p : problem.body().owned()) of_sources.component(c)[p] = u.component(c)[p];
+  problem.images()->extend(of_sources);
+  for (std::size_t n = problem.body().owned().size(); n < problem.body().points(); ++n)
+    for (int c = 0; c < u.components; ++c) u.component(c)[problem.body().internal()[n]] -= of_sources.component(c)[problem.body().internal()[n]];
+}
+
+Field force_of(BodyProblem& problem, ConstFieldView u, double* energy = nullptr) {
+  Field f = problem.make_field();
+  f.fill(std::numeric_limits<double>::quiet_NaN());
+  const EvaluationStatus status = problem.evaluate_forces(u, f, energy);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return f;
+}
+
+double energy_of(BodyProblem& problem, ConstFieldView u) {
+  double energy = 0;
+  force_of(problem, u, &energy);
+  return energy;
+}
+
+Field sum(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
+  Field v = problem.make_field();
+  for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
+  return v;
+}
+
+Field random_field(const BodyProblem& problem, std::uint64_t seed) {
+  Field w = problem.make_field();
+  Noise random(seed);
+  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
+  return w;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the tangent is their derivative, symmetric, and the assembled one") {
+  for (const Case& c : cases_with_images()) {
+    INFO(c.label(), "\n", c.body.conditions);
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    REQUIRE(problem.images());
+    REQUIRE(body.points() > body.owned().size());
+    const FieldView u = problem.state().displacement();
+    deform(body, u, 101, 0.02);
+    to_problem(problem, u);
+    const Field w = random_field(problem, 102), v = random_field(problem, 103), f = force_of(problem, u);
+    const double scale = largest(body, f) * static_cast<double>(body.points()), h = 1e-3 * body.spacing();
+    const auto difference = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
+    const double slope = difference([&](double s) { return energy_of(problem, sum(problem, u, w, s)); });
+    if (c.conservative()) CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
+    Field Kw = problem.make_field(), Kv = problem.make_field();
+    REQUIRE(problem.tangent_action(u, w, Kw).ok());
+    REQUIRE(problem.tangent_action(u, v, Kv).ok());
+    const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
+    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, sum(problem, u, w, s)), v); });
+    CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
+    if (c.conservative()) CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
+    BlockMatrix K;
+    const EvaluationStatus status = problem.assemble_tangent(u, K);
+    REQUIRE_MESSAGE(status.ok(), status.description);
+    const auto d = static_cast<std::size_t>(K.dimension);
+    double worst = 0;
+    for (std::size_t r = 0; r < K.rows(); ++r)
+      for (std::size_t a = 0; a < d; ++a) {
+        double product = 0;
+        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+          for (std::size_t e = 0; e < d; ++e)
+            product += K.values[(b * d + a) * d + e] * w.component(static_cast<int>(e))[K.point[static_cast<std::size_t>(K.column[b])]];
+        worst = std::max(worst, std::abs(product - Kw.component(static_cast<int>(a))[K.point[r]]));
+      }
+    CHECK_MESSAGE(worst <= 1e-12 * largest(body, Kw), "the assembled tangent is off by ", worst / largest(body, Kw));
+  }
+}
+
+TEST_CASE("kinematics: forces and reactions between faces sum to zero, the same bits for 1, 2 and 3 threads") {
+  for (const Case& c : cases_with_images()) {
+    INFO(c.label(), "\n", c.body.conditions);
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    const FieldView u = problem.state().displacement();
+    deform(body, u, 111, 0.02);
+    to_problem(problem, u);
+    const int threads = thread_count();
+    set_thread_count(1);
+    double energy = 0;
+    const Field f = force_of(problem, u, &energy);
+    for (const int n : {2, 3}) {
+      set_thread_count(n);
+      double other = 0;
+      const Field g = force_of(problem, u, &other);
+      bool same = other == energy;
+      for (const std::int32_t p : body.internal())
+        for (int a = 0; a < body.dimension(); ++a) same = same && f.component(a)[p] == g.component(a)[p];
+      CHECK_MESSAGE(same, n, " threads give other bits");
+    }
+    set_thread_count(threads);
+    // All moves by 1 along an axis, faces with it: that needs no work.
+    for (int a = 0; a < body.dimension(); ++a) {
+      Field shift = problem.make_field();
+      set_field(body, shift, [&](const Point&) { return Point{a == 0 ? 1.0 : 0.0, a == 1 ? 1.0 : 0.0, a == 2 ? 1.0 : 0.0}; });
+      to_problem(problem, shift);
+      const double total = dot(body, f, shift);
+      CHECK_MESSAGE(std::abs(total) <= 1e-11 * largest(body, f), "forces and reactions along ", "xyz"[a], " sum to ", total);
+    }
+  }
+}
+
+TEST_CASE("kinematics: a homogeneous stress between held faces of a lattice is in equilibrium, and the reaction is stress times area") {
+  for (const Example& example : kinematics_examples())
+    for (int d = 1; d <= 3; ++d) {
+      BodyOptions options;
+      options.dimension = d;
+      options.cells = d == 3 ? 6 : 9;
+      const std::array<const char*, 3> displacement{"[0.0]", "[0.0, 0.0]", "[0.0, 0.0, 0.0]"};
+      options.conditions = held("-x", displacement[static_cast<std::size_t>(d - 1)]) + held("+x", displacement[static_cast<std::size_t>(d - 1)]);
+      for (int a = 1; a < d; ++a) options.conditions += periodic("xyz"[a]);
+      INFO(Case{example, options}.label());
+      const auto simulation = build(scene_text(options, kinematics_table(example)));
+      BodyProblem& problem = simulation->problem();
+      if (!problem.terms().conservative()) continue;
+      const Body& body = problem.body();
+      const Point stretch{0.05, 0.03, -0.02};
+      const FieldView u = problem.state().displacement();
+      set_field(body, u, [&](const Point& x) { return Point{stretch[0] * x[0], stretch[1] * x[0], stretch[2] * x[0]}; });
+      to_problem(problem, u);
+      REQUIRE(problem.evaluate_forces(u, problem.state().internal_force(), nullptr).ok());
+      const ConstFieldView f = problem.state().internal_force();
+      double out_of_balance = 0, largest_force = 0;
+      for (const std::int32_t p : body.owned())
+        for (int a = 0; a < d; ++a) out_of_balance = std::max(out_of_balance, std::abs(f.component(a)[p]));
+      const Field r = reactions(problem, false, 0);
+      Point lower{}, upper{};
+      double volume = 0, middle = 0;
+      for (const std::int32_t p : body.owned()) {
+        volume += body.volume(static_cast<std::size_t>(p));
+        middle += body.position(static_cast<std::size_t>(p))[0] / static_cast<double>(body.owned().size());
+      }
+      for (const std::int32_t p : body.owned())
+        for (int a = 0; a < d; ++a) {
+          largest_force = std::max(largest_force, std::abs(r.component(a)[p]));
+          (body.position(static_cast<std::size_t>(p))[0] < middle ? lower : upper)[static_cast<std::size_t>(a)] += r.component(a)[p];
+        }
+      REQUIRE(largest_force > 0);
+      CHECK_MESSAGE(out_of_balance <= 1e-11 * largest_force, "out of balance by ", out_of_balance / largest_force, " of the largest reaction");
+      const double length = 2 * middle, area = volume / length;
+      for (std::size_t a = 0; a < static_cast<std::size_t>(d); ++a) {
+        CHECK_MESSAGE(std::abs(lower[a] + upper[a]) <= 1e-10 * std::abs(upper[0]), "the reactions of both faces are ", lower[a], " and ", upper[a]);
+        if (!problem.terms().has_gradients()) continue;
+        PointSamples samples;
+        REQUIRE(problem.sample(samples).ok());
+        const double stress = samples.P.component(static_cast<int>(a) * d)[body.owned().front()];
+        CHECK_MESSAGE(std::abs(upper[a] - stress * area) <= 1e-10 * std::abs(upper[0]), "the reaction is ", upper[a], ", stress times area ", stress * area);
+      }
+    }
+}
+
+TEST_CASE("kinematics: half a lattice and its image are the whole") {
+  for (const Example& example : kinematics_examples())
+    for (int d = 1; d <= 3; ++d) {
+      BodyOptions options;
+      options.dimension = d;
+      options.cells = d == 3 ? 5 : 8;
+      options.two_materials = d > 1;
+      const std::string whole_text = scene_text(options, kinematics_table(example));
+      options.conditions = symmetric('x');
+      const std::string half_text = scene_text(options, kinematics_table(example));
+      INFO(Case{example, options}.label());
+      const auto half = build(half_text);
+      BodyProblem& of_half = half->problem();
+      double high = 0;
+      for (const std::int32_t p : of_half.body().owned()) high = std::max(high, of_half.body().position(static_cast<std::size_t>(p))[0]);
+      const std::int64_t cells = std::llround(high + 0.5);
+      // The whole extends as far below 0, and so does its set.
+      std::string text = whole_text;
+      const auto replace = [&](const std::string& from, const std::string& to) {
+        const auto at = text.find(from);
+        REQUIRE(at != std::string::npos);
+        text.replace(at, from.size(), to);
+      };
+      replace("lower = [0", fmt::format("lower = [-{}", cells));
+      replace("\"x < ", "\"abs(x) < ");
+      const auto whole = build(text);
+      BodyProblem& of_whole = whole->problem();
+      REQUIRE(of_whole.body().points() == 2 * of_half.body().owned().size());
+      const auto motion = [&](const Point& x) {
+        const double s = x[0] < 0 ? -1 : 1, a = std::abs(x[0]);
+        const double n = std::sin(7 * a + 3 * x[1] + 5 * x[2]);
+        return Point{s * (0.05 * a + 0.02 * n), 0.03 * x[1] + 0.02 * std::cos(5 * a + x[1] - x[2]), 0.02 * n};
+      };
+      for (BodyProblem* problem : {&of_half, &of_whole}) {
+        for (const std::int32_t p : problem->body().owned()) {
+          const Point v = motion(problem->body().position(static_cast<std::size_t>(p)));
+          for (int a = 0; a < d; ++a) problem->state().displacement().component(a)[p] = v[static_cast<std::size_t>(a)];
+        }
+      }
+      double energy = 0, whole_energy = 0;
+      const Field f = force_of(of_half, of_half.state().displacement(), &energy), g = force_of(of_whole, of_whole.state().displacement(), &whole_energy);
+      if (!of_whole.terms().conservative()) continue;
+      CHECK_MESSAGE(std::abs(2 * energy - whole_energy) <= 1e-12 * whole_energy, "twice ", energy, " against ", whole_energy);
+      double worst = 0;
+      std::map<std::array<std::int64_t, 3>, std::int32_t> at;
+      const auto cell = [](const Point& x) { return std::array<std::int64_t, 3>{std::llround(2 * x[0]), std::llround(2 * x[1]), std::llround(2 * x[2])}; };
+      for (const std::int32_t p : of_whole.body().owned()) at[cell(of_whole.body().position(static_cast<std::size_t>(p)))] = p;
+      for (const std::int32_t p : of_half.body().owned()) {
+        const std::int32_t q = at.at(cell(of_half.body().position(static_cast<std::size_t>(p))));
+        for (int a = 0; a < d; ++a) worst = std::max(worst, std::abs(f.component(a)[p] - g.component(a)[q]));
+      }
+      CHECK_MESSAGE(worst <= 1e-12 * largest(of_whole.body(), g), "forces differ by ", worst / largest(of_whole.body(), g));
+    }
+}
