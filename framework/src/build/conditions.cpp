@@ -85,13 +85,13 @@ void start_from(const std::filesystem::path& results, const Body& body, const Pa
 
 }  // namespace
 
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, State& state) {
+void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, bool quasi_static, State& state) {
   for (const BoundaryDescription& boundary : scene.boundaries)
-    if (scene.initial_from && boundary.velocity && !boundary.face.empty())
-      throw InputError(boundary.position, "boundary", "found a face with a velocity and initial.from, which does not hold where the face is; allowed: displacement");
+    if (scene.initial_from && (boundary.velocity || quasi_static) && !boundary.face.empty())
+      throw InputError(boundary.position, "boundary", "found a face together with initial.from, whose results do not say where the face was; allowed: in explicit runs a face with a displacement");
   constraints.start_images([&](int c, const Point& x) {
     return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
-  }, state.displacement());
+  }, !quasi_static, state.displacement());
   if (scene.initial_from) start_from(*scene.initial_from, body, partition, state);
   if (!scene.initial_displacement.empty()) fill(scene.initial_displacement, body, state.displacement());
   if (!scene.initial_velocity.empty()) fill(scene.initial_velocity, body, state.velocity());

@@ -133,7 +133,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
 
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
-  set_initial_state(scene, body, partition, constraints, state);
+  set_initial_state(scene, body, partition, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};

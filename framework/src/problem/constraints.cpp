@@ -100,10 +100,11 @@ void Constraints::prescribe_displacement(double t, FieldView u) const {
   each([&](std::int64_t dof, bool, bool, auto&& value) { u.data[dof] = value(t); });
 }
 
-void Constraints::start_images(const std::function<double(int, const Point&)>& initial, FieldView u) const {
+void Constraints::start_images(const std::function<double(int, const Point&)>& initial, bool dynamic, FieldView u) const {
   for (const ImageDof& image : image_dofs_) {
-    double sum = image.velocity ? 0.0 : value(image, 0);
-    for (std::size_t k = image.first; k < image.last && image.velocity; ++k)
+    const bool prescribed = dynamic && !image.velocity;
+    double sum = prescribed ? value(image, 0) : 0.0;
+    for (std::size_t k = image.first; k < image.last && !prescribed; ++k)
       sum += shares_[k].factor * initial(static_cast<int>(image.dof / static_cast<std::int64_t>(u.stride)), shares_[k].at);
     u.data[image.dof] = sum;
   }

@@ -115,7 +115,7 @@ void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::
       x.weighted_volume = m;
       x.intact = intact;
       moduli = law_.moduli(x);
-      warn(x, laws_.record_of(p));
+      if (x.bulk() > 0) warn(x, laws_.record_of(p));   // not of ghosts and images
     }
     // A point without bonds is a free mass: nothing to divide by, nothing stored.
     if (modulus.size() > 0) modulus.data()[p] = moduli.bond;

@@ -47,8 +47,9 @@ class Constraints {
   /// All overwrite the prescribed components of their last argument and nothing else.
   /// Quasi-static runs; t the load parameter.
   void prescribe_displacement(double t, FieldView u) const;
-  /// Images at the start of a run: faces are where they are prescribed, and those with a velocity where `initial` has component c at x.
-  void start_images(const std::function<double(int c, const Point& x)>& initial, FieldView u) const;
+  /// Images at the start of a run: faces are where `initial` has component c at x, in dynamic runs those with a displacement where that puts
+  /// them at t = 0.
+  void start_images(const std::function<double(int c, const Point& x)>& initial, bool dynamic, FieldView u) const;
   /// The velocity that takes the displacement u at t_begin to the prescribed one at t_end. Later differences are taken over this step.
   void prescribe_half_step_velocity(double t_begin, double t_end, ConstFieldView u, FieldView v);
   /// Velocity at t: central differences of prescribed displacements.
