@@ -12,7 +12,7 @@ resume=--resume
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 export OMP_WAIT_POLICY=passive
 
-studies="pulse bar cook cantilever twist"
+studies="pulse bar cook cantilever cantilever_faces twist"
 docs=framework/docs
 [ -n "$small" ] && docs=$out/docs
 mkdir -p "$out" "$docs/images"
