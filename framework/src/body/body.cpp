@@ -69,9 +69,11 @@ Body::Body(const Body& whole, const Images& images, std::uint16_t image_material
   copy_sets(whole, place, image_material);
 }
 
-/// Sets and materials of the points that have a place here, by internal index of `whole`; all other points have the material `others`.
+/// Sets and materials of the points that have a place here, by internal index of `whole`; all other points have the material `others`. Dead
+/// cells look like points of the first one, so that most groups of eight have one law.
 void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others) {
-  material_ids_.assign(stride_, others);
+  material_ids_.assign(stride_, 0);
+  for (const std::int32_t p : internal_) material_ids_[static_cast<std::size_t>(p)] = others;
   for (const auto& [name, members] : whole.sets_) {
     std::vector<std::int32_t>& own = sets_[name];
     for (const std::int32_t p : members)

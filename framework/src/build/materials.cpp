@@ -112,6 +112,7 @@ std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene) {
 MaterialRecord silent_record() {
   MaterialRecord record;
   record.material = std::make_shared<SilentMaterial>();
+  record.silent = true;
   record.traits = record.material->traits();
   record.constants.resize(1);
   return record;

@@ -1,6 +1,9 @@
 #include "perikit/operators/laws.hpp"
 
 #include <algorithm>
+#include <limits>
+
+#include "perikit/core/simd.hpp"
 
 namespace perikit {
 
@@ -71,12 +74,40 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   return record.material->evaluate(space_, call);
 }
 
+Status Laws::evaluate_among_silent(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept {
+  const Status status = evaluate_one(record, batch, scratch);
+  if (!status.ok()) return status;
+  alignas(64) double stores[batch_points];
+  const std::size_t silent = records_.size() - 1;
+  for (int l = 0; l < batch.n; ++l) stores[l] = ids_[static_cast<std::size_t>(batch.points[l])] == silent ? 0.0 : 1.0;
+  for (int l = batch.n; l < static_cast<int>(padded(static_cast<std::size_t>(batch.n))); ++l) stores[l] = 1.0;
+  const auto keep = [&](double* x, int rows) {
+    for (int r = 0; x && r < rows; ++r)
+      for (int l = 0; l < batch.n; l += pack_width) (Pack::load(x + r * batch_points + l) * Pack::load(stores + l)).store(x + r * batch_points + l);
+  };
+  keep(batch.psi, 1);
+  keep(batch.P, components());
+  keep(batch.dP, components());
+  keep(batch.A, components() * components());
+  return status;
+}
+
 Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept {
   if (ids_.empty()) return evaluate_one(records_[0], batch, scratch);
-  const std::uint16_t first = ids_[static_cast<std::size_t>(batch.points[0])];
-  const auto mixed = std::any_of(batch.points, batch.points + batch.n,
-                                 [&](std::int32_t p) { return ids_[static_cast<std::size_t>(p)] != first; });
-  if (!mixed) return evaluate_one(records_[first], batch, scratch);
+  const std::uint16_t silent = records_.back().silent ? static_cast<std::uint16_t>(records_.size() - 1) : std::numeric_limits<std::uint16_t>::max();
+  std::uint16_t only = silent;   // the one law of all lanes that store something
+  bool mixed = false, any_silent = false;
+  for (int l = 0; l < batch.n; ++l) {
+    const std::uint16_t id = ids_[static_cast<std::size_t>(batch.points[l])];
+    any_silent |= id == silent;
+    mixed |= id != silent && only != silent && id != only;
+    if (id != silent) only = id;
+  }
+  if (!mixed && (!any_silent || only == silent)) return evaluate_one(records_[only], batch, scratch);
+  if (!mixed) {
+    const Status status = evaluate_among_silent(records_[only], batch, scratch);
+    if (status.ok()) return status;   // else a point that stores nothing may be to blame
+  }
   // Several laws in one batch: each sees its own lanes and the others at rest, for what one law accepts another may not.
   Status status;
   for (std::size_t m = 0; m < records_.size(); ++m) {

@@ -23,6 +23,7 @@ struct MaterialRecord {
   bool uniform = true;
   double density = 0;                    ///< [kg/m^3]; 0: not given. Where it varies, see `densities`
   AlignedVector<double> densities;       ///< by point; empty where uniform
+  bool silent = false;                   ///< stores nothing: of ghosts and images. At most one, the last
 };
 
 /// Memory for the pieces of mixed batches; one per thread.
@@ -85,6 +86,8 @@ class Laws {
   Status evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept;
 
  private:
+  /// One law on all lanes, whose results at points that store nothing are made zero.
+  Status evaluate_among_silent(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
   Status evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
 
   Space space_;
