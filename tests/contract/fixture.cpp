@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
 namespace perikit::contract {
 
@@ -137,6 +139,33 @@ void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
     }
     return v;
   });
+}
+
+Field force_of(BodyProblem& problem, ConstFieldView u, double* energy) {
+  Field f = problem.make_field();
+  f.fill(std::numeric_limits<double>::quiet_NaN());
+  const EvaluationStatus status = problem.evaluate_forces(u, f, energy);
+  if (!status.ok()) throw std::runtime_error(status.description);
+  return f;
+}
+
+double energy_of(BodyProblem& problem, ConstFieldView u) {
+  double energy = 0;
+  force_of(problem, u, &energy);
+  return energy;
+}
+
+Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
+  Field v = problem.body().make_field(u.components);
+  for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
+  return v;
+}
+
+Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
+  Field w = problem.make_field();
+  Noise random(seed);
+  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
+  return w;
 }
 
 double dot(const Body& body, ConstFieldView a, ConstFieldView b) {

@@ -85,6 +85,13 @@ class Noise {
 void set_field(const Body& body, FieldView field, const std::function<Point(const Point&)>& value);
 /// A smooth, finite deformation with noise on top, admissible everywhere: noise times the spacing.
 void deform(const Body& body, FieldView u, std::uint64_t seed, double noise);
+/// Forces at u, over memory full of NaN: whatever a kernel forgets to write shows. The energy -> *energy where wanted.
+/// Throws where u is inadmissible.
+Field force_of(BodyProblem& problem, ConstFieldView u, double* energy = nullptr);
+double energy_of(BodyProblem& problem, ConstFieldView u);
+/// u + h w.
+Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h);
+Field random_direction(const BodyProblem& problem, std::uint64_t seed);
 /// Sum over live points and components of a b.
 double dot(const Body& body, ConstFieldView a, ConstFieldView b);
 /// Largest |component| over live points.

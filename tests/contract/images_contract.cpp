@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "perikit/core/parallel.hpp"
@@ -57,33 +56,6 @@ void to_problem(const BodyProblem& problem, FieldView u) {
     for (int c = 0; c < u.components; ++c) u.component(c)[problem.body().internal()[n]] -= of_sources.component(c)[problem.body().internal()[n]];
 }
 
-Field force_of(BodyProblem& problem, ConstFieldView u, double* energy = nullptr) {
-  Field f = problem.make_field();
-  f.fill(std::numeric_limits<double>::quiet_NaN());
-  const EvaluationStatus status = problem.evaluate_forces(u, f, energy);
-  REQUIRE_MESSAGE(status.ok(), status.description);
-  return f;
-}
-
-double energy_of(BodyProblem& problem, ConstFieldView u) {
-  double energy = 0;
-  force_of(problem, u, &energy);
-  return energy;
-}
-
-Field sum(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
-  Field v = problem.make_field();
-  for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
-  return v;
-}
-
-Field random_field(const BodyProblem& problem, std::uint64_t seed) {
-  Field w = problem.make_field();
-  Noise random(seed);
-  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-  return w;
-}
-
 }  // namespace
 
 TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the tangent is their derivative, symmetric, and the assembled one") {
@@ -97,16 +69,16 @@ TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the ta
     const FieldView u = problem.state().displacement();
     deform(body, u, 101, 0.02);
     to_problem(problem, u);
-    const Field w = random_field(problem, 102), v = random_field(problem, 103), f = force_of(problem, u);
+    const Field w = random_direction(problem, 102), v = random_direction(problem, 103), f = force_of(problem, u);
     const double scale = largest(body, f) * static_cast<double>(body.points()), h = 1e-3 * body.spacing();
     const auto difference = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
-    const double slope = difference([&](double s) { return energy_of(problem, sum(problem, u, w, s)); });
+    const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
     if (c.conservative()) CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
     Field Kw = problem.make_field(), Kv = problem.make_field();
     REQUIRE(problem.tangent_action(u, w, Kw).ok());
     REQUIRE(problem.tangent_action(u, v, Kv).ok());
     const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
-    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, sum(problem, u, w, s)), v); });
+    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
     CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
     if (c.conservative()) CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
     BlockMatrix K;

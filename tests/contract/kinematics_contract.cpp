@@ -46,33 +46,6 @@ Field poisoned(const BodyProblem& problem) {
   return f;
 }
 
-double energy_of(BodyProblem& problem, ConstFieldView u) {
-  Field f = poisoned(problem);
-  double energy = 0;
-  REQUIRE(problem.evaluate_forces(u, f, &energy).ok());
-  return energy;
-}
-
-Field force_of(BodyProblem& problem, ConstFieldView u) {
-  Field f = poisoned(problem);
-  const EvaluationStatus status = problem.evaluate_forces(u, f, nullptr);
-  REQUIRE_MESSAGE(status.ok(), status.description);
-  return f;
-}
-
-Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h) {
-  Field v = problem.body().make_field(u.components);
-  for (std::size_t k = 0; k < u.size(); ++k) v.data()[k] = u.data[k] + h * w.data[k];
-  return v;
-}
-
-Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
-  Field w = problem.make_field();
-  Noise random(seed);
-  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-  return w;
-}
-
 }  // namespace
 
 TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {

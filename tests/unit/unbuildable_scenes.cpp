@@ -170,6 +170,18 @@ class Bench {
   TemporaryFolder folder;
 };
 
+/// The plate with its points from cloud.csv.
+std::string plate_from_file() {
+  std::string text = plate;
+  const std::size_t begin = text.find("[body.lattice]"), end = text.find("[sets]");
+  return text.replace(begin, end - begin, "[body.points]\nfile = \"cloud.csv\"\n");
+}
+std::string cloud() {
+  std::string csv = "x,y,volume\n";
+  for (int k = 0; k < 24; ++k) csv += fmt::format("{},{},1\n", k % 6 + 0.5, k / 6 + 0.5);
+  return csv;
+}
+
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
@@ -201,14 +213,9 @@ TEST_CASE("scenes that cannot be built are refused with file, line, key, what wa
 
 TEST_CASE("sides of points from a file must be placed") {
   Bench bench;
-  std::string text = plate;
-  const std::size_t begin = text.find("[body.lattice]"), end = text.find("[sets]");
-  text.replace(begin, end - begin, "[body.points]\nfile = \"cloud.csv\"\n");
+  std::string text = plate_from_file();
   text.replace(text.find("set = \"left\""), 12, "face = \"-x\"");
-  std::ofstream csv(bench.folder.path / "cloud.csv");
-  csv << "x,y,volume\n";
-  for (int k = 0; k < 24; ++k) csv << fmt::format("{},{},1\n", k % 6 + 0.5, k / 6 + 0.5);
-  csv.close();
+  std::ofstream(bench.folder.path / "cloud.csv") << cloud();
   CHECK(has(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5; allowed: the coordinate of the side"));
   text.replace(text.find("face = "), 0, "at = 0.0\n");
   CHECK(bench.refusal(text).empty());
@@ -216,11 +223,7 @@ TEST_CASE("sides of points from a file must be placed") {
 
 TEST_CASE("files that hold no body are refused with file, line, column and what is allowed") {
   Bench bench;
-  std::string text = plate;
-  const std::size_t begin = text.find("[body.lattice]"), end = text.find("[sets]");
-  text.replace(begin, end - begin, "[body.points]\nfile = \"cloud.csv\"\n");
-  std::string good = "x,y,volume\n";
-  for (int k = 0; k < 24; ++k) good += fmt::format("{},{},1\n", k % 6 + 0.5, k / 6 + 0.5);
+  const std::string text = plate_from_file(), good = cloud();
   const auto refusal = [&](const std::string& csv) {
     std::ofstream(bench.folder.path / "cloud.csv") << csv;
     return bench.refusal(text);
