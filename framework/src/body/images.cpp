@@ -1,9 +1,6 @@
 #include "perikit/body/images.hpp"
 
-#include <fmt/format.h>
-
-#include <cmath>
-#include <stdexcept>
+#include <algorithm>
 
 namespace perikit {
 
@@ -41,7 +38,7 @@ std::vector<Point> in_front(const ImagePlane& plane, const std::vector<Point>& v
 
 class Maker {
  public:
-  Maker(const Body& body, double reach) : body_(body), reach_(reach), real_(body.points()) {
+  explicit Maker(const Body& body) : body_(body), reach_(halo(body)), real_(body.points()) {
     for (const std::int32_t p : body.internal()) positions_.push_back(body.position(static_cast<std::size_t>(p)));
     first_.assign(real_ + 1, 0);
     images_.cracks = body.cracks();
@@ -121,8 +118,10 @@ class Maker {
 
 }  // namespace
 
-Images make_images(const Body& body, std::span<const ImagePlane> planes, double reach) {
-  Maker maker(body, reach);
+double halo(const Body& body) { return 2 * body.horizon() * (1 + 1e-9); }
+
+Images make_images(const Body& body, std::span<const ImagePlane> planes) {
+  Maker maker(body);
   for (int axis = 0; axis < body.dimension(); ++axis) {
     std::vector<const ImagePlane*> across;
     for (const ImagePlane& plane : planes)

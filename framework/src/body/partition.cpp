@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "perikit/body/images.hpp"
+
 namespace perikit {
 
 namespace {
@@ -45,8 +47,7 @@ Partition::Partition(Body whole, int rank, int size)
     low[r] = std::min(low[r], along[p]);
     high[r] = std::max(high[r], along[p]);
   }
-  // Gradients of the far ends of bonds need their whole families: two horizons.
-  const double reach = 2 * whole_.horizon() * (1 + 1e-9);
+  const double reach = halo(whole_);
   const auto keeps = [&](std::size_t r, std::size_t p) { return along[p] >= low[r] - reach && along[p] <= high[r] + reach; };
   const auto mine = static_cast<std::size_t>(rank);
   for (std::size_t p = 0; p < along.size(); ++p) {

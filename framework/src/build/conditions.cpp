@@ -37,10 +37,10 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
   std::vector<std::size_t> boundary_of;
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
     const BoundaryDescription& boundary = scene.boundaries[k];
-    if (!boundary.face.empty()) continue;
     if (boundary.velocity && quasi_static)
       throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
                        "found in a quasi-static run; allowed: displacement");
+    if (!boundary.face.empty()) continue;   // the images have it
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
       prescriptions.push_back(

@@ -84,7 +84,7 @@ class PlaneBuilder {
     for (const std::int32_t p : points) chosen[static_cast<std::size_t>(p)] = true;
     std::vector<std::int32_t> surface(body_.points(), -1);
     if (cells.empty()) return surface;
-    const double reach = 2 * body_.horizon() * (1 + 1e-9);
+    const double reach = halo(body_);
     for (const std::int32_t p : body_.owned()) {
       const double d = side.depth(position(p));
       if (d < 0 || d > reach) continue;
@@ -162,8 +162,6 @@ class PlaneBuilder {
       if (!boundary.components[c]) continue;
       if (plane.odd[c])
         throw InputError(boundary.face_position, key, fmt::format("found \"{}\", whose component {} {} prescribes too; allowed: each once", boundary.face, "xyz"[c], found_.origins[static_cast<std::size_t>(&plane - found_.planes.data())].key));
-      if (boundary.velocity && quasi_static_)
-        throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k), "found in a quasi-static run; allowed: displacement");
       plane.odd[c] = true;
       plane.motion[c] = static_cast<int>(found_.motions.size());
       found_.motions.push_back({boundary.velocity, function_of(*boundary.components[c], quasi_static_)});

@@ -31,8 +31,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   if (planes.planes.empty()) return {};
   const ScenePlanes::Origin& any = planes.origins.front();
   if (communicator().size() > 1) throw InputError(any.position, any.key, "found with several ranks; allowed: one rank");
-  // Gradients of the far ends of bonds need their whole families: two horizons.
-  Images images = make_images(body, planes.planes, 2 * body.horizon() * (1 + 1e-9));
+  Images images = make_images(body, planes.planes);
   try {
     body = Body(body, images, image_material(scene));
   } catch (const std::domain_error& error) {

@@ -113,11 +113,11 @@ bool BodyProblem::constant_stiffness() const noexcept {
 
 bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
   if (terms().history()) terms().history()->advance();
+  if (!parts_.fracture.damage()) return false;
   const Motion half_step = [&](FieldView end) {
     middle_of_next_step(*this, time_step, velocity, end);
     if (images()) images()->extend(end);
   };
-  if (!parts_.fracture.damage()) return false;
   return parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step, velocity.data ? half_step : Motion());
 }
 

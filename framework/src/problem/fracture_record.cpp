@@ -7,7 +7,6 @@
 namespace perikit {
 
 bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const Motion& motion) {
-  if (!damage_) return false;
   const BondUpdate update = terms.update_bonds(u, time_step, motion);
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.released;

@@ -44,8 +44,10 @@ struct Images {
   std::size_t size() const noexcept { return source.size(); }
 };
 
-/// Images of the points that lie less than `reach` from planes, axis after axis, so that edges and corners have images of images.
-/// Throws std::domain_error where they would lie among the points of the body.
-Images make_images(const Body& body, std::span<const ImagePlane> planes, double reach);
+/// How far what the points of a body need of others lies from them [m]: gradients of the far ends of bonds take their whole families.
+double halo(const Body& body);
+
+/// Images of the points that lie no farther than the halo from planes, axis after axis, so that edges and corners have images of images.
+Images make_images(const Body& body, std::span<const ImagePlane> planes);
 
 }  // namespace perikit

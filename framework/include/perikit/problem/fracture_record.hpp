@@ -17,7 +17,7 @@ class FractureRecord {
 
   /// Null where bonds never fail.
   const BodyDamage* damage() const noexcept { return damage_.get(); }
-  /// Lets bonds of `terms` fail at the displacement of the state, whose energies follow; true where any changed. motion: see Terms.
+  /// Lets bonds of `terms` fail at u, the displacement as they see it; energies of the state follow; true where any changed. motion: see Terms.
   bool update(Terms& terms, ConstFieldView u, State& state, double time_step, const Motion& motion);
   /// How bonds failed so far, in words; empty where they never fail.
   std::string summary(const BondChecks& checks, double dissipated) const;
