@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measures the speed of this machine's perikit beside its limits and beside LAMMPS, on one core, and writes framework/docs/speed.md and the tables of
-# README.md with it: some minutes on an otherwise idle machine, plus a build of perikit that counts operations.
+# framework/docs/how_fast.md with it: some minutes on an otherwise idle machine, plus a build of perikit that counts operations.
 #   speed.sh BUILD            BUILD: a release build with its benchmarks
 #   speed.sh BUILD --small    a few small bodies, no LAMMPS, no build; the page goes to BUILD/speed, the documentation stays as it is
 set -euo pipefail
@@ -28,7 +28,7 @@ if [ -z "$small" ]; then
   tests/benchmarks/lammps.sh | tee "$out/lammps.txt"
   "$build/bin/materials_benchmark" | tee "$out/materials.md"
   page=framework/docs/speed.md
-  readme=README.md
+  summary=framework/docs/how_fast.md
 else
   $bench --cells 6 --kinematics conventional baqp conventional+wan --json "$out/bench.json" | tee "$out/bench.md"
   $bench --cells 6 --kinematics conventional --dimension 2 | tee "$out/bench_plane.md"
@@ -36,8 +36,8 @@ else
   printf 'LAMMPS lps 1\nLAMMPS pmb 1\n' > "$out/lammps.txt"
   : > "$out/materials.md"
   page=$out/speed.md
-  readme=$out/README.md
-  cp README.md "$readme"
+  summary=$out/how_fast.md
+  cp framework/docs/how_fast.md "$summary"
 fi
 
 # A line a kinematics of what `perikit bench` has in two: lattice and cloud.
@@ -60,16 +60,16 @@ laws_table() {
     $3 == "plane strain" { printf "| `%s` | %s | %s | %s | %s | %s |\n", $2, stress, $4, tangent, $9, share }' "$out/materials.md"
 }
 
-# The lines between <!-- NAME --> and <!-- end NAME --> of the README become standard input.
+# The lines between <!-- NAME --> and <!-- end NAME --> of how_fast.md become standard input.
 replace() {
   local text
   text=$(cat)
-  grep -q "<!-- $1 -->" "$readme" && grep -q "<!-- end $1 -->" "$readme" || { echo "speed.sh: $readme has no place for $1"; exit 1; }
+  grep -q "<!-- $1 -->" "$summary" && grep -q "<!-- end $1 -->" "$summary" || { echo "speed.sh: $summary has no place for $1"; exit 1; }
   TEXT=$text awk -v name="$1" '
     $0 == "<!-- " name " -->" { print; print ENVIRON["TEXT"]; skip = 1 }
     $0 == "<!-- end " name " -->" { skip = 0 }
-    !skip' "$readme" > "$readme.new"
-  mv "$readme.new" "$readme"
+    !skip' "$summary" > "$summary.new"
+  mv "$summary.new" "$summary"
 }
 
 laws_table | replace "laws table"

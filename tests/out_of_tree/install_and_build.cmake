@@ -1,5 +1,5 @@
 # Installs perikit, lets the installed program write a project of every kind that it has a template for, and does with each what its
-# README says: build, contract, scene.
+# own_part.md says: build, contract, scene.
 # Needs: build (perikit's build folder), work (scratch folder), compiler, libdir.
 file(REMOVE_RECURSE ${work})
 set(prefix ${work}/prefix)

@@ -1,0 +1,10 @@
+#!/bin/sh
+# perikit as packaged: starts the build that suits this processor best.
+folder=${PERIKIT_LEVELS:-/usr/lib/perikit}
+supported=$(/lib64/ld-linux-x86-64.so.2 --help | sed -n 's/^  \(x86-64-v[234]\) (supported.*/\1/p')
+for level in native $supported; do
+  program=$folder/$level/bin/perikit
+  [ -x "$program" ] && exec "$program" "$@"
+done
+echo "perikit: this package has builds for $(ls "$folder" | tr '\n' ' ')and this processor can run $(echo $supported)" >&2
+exit 1
