@@ -1,3 +1,4 @@
+#include "perikit/sdk/stable_step.hpp"
 #include "verlet.hpp"
 
 PERIKIT_PLUGIN(registrar) {
@@ -6,8 +7,14 @@ PERIKIT_PLUGIN(registrar) {
   table.number("end_time", "s", "End of the run; hit exactly by equal steps.").require().positive();
   table.number("time_step", "s", "Largest step; found from the stiffness where it is not given.").positive();
   table.number("safety", "-", "Factor to the estimated stable step.").by_default("0.9").positive().at_most(1.0);
-  table.choice("estimate", {"eigenvalue", "bond_based"}, "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.").by_default("\"eigenvalue\"");
-  table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.").by_default("500").at_least(1);
+  table
+      .choice("estimate", {"eigenvalue", "bond_based"},
+              "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.")
+      .by_default("\"eigenvalue\"");
+  table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.")
+      .by_default("500")
+      .at_least(1);
+  allow_unstable_parameter(table);
   table.at_most_of(1, {"time_step", "safety"});
   registrar.integrator(
       {.name = "verlet",

@@ -18,7 +18,9 @@ namespace perikit {
 
 namespace fs = std::filesystem;
 
-fs::path checkpoint_file(const fs::path& folder) { return folder / "checkpoint.h5"; }
+fs::path checkpoint_file(const fs::path& folder) {
+  return folder / "checkpoint.h5";
+}
 
 std::string body_fingerprint(const ReferenceData& body) {
   Fingerprint fingerprint;
@@ -82,7 +84,9 @@ void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   image.attribute("next_time", checkpoint.output.next_time);
   image.attribute("steps_expected", checkpoint.output.steps_expected);
   image.attribute("end_time", checkpoint.output.end_time);
-  image.attribute("initial_energy", checkpoint.output.initial_energy);
+  image.attribute("initial_energy", checkpoint.output.energies.initial);
+  image.attribute("largest_energy", checkpoint.output.energies.largest);
+  image.attribute("energy_imbalance", checkpoint.output.energies.off);
   image.dataset("state", checkpoint.state);
   store_sealed(checkpoint_file(folder), image.bytes());
 }
@@ -106,23 +110,26 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.output.next_time = source.integer("/", "next_time");
   checkpoint.output.steps_expected = source.integer("/", "steps_expected");
   checkpoint.output.end_time = source.real("/", "end_time");
-  checkpoint.output.initial_energy = source.real("/", "initial_energy");
+  checkpoint.output.energies = {source.real("/", "initial_energy"), source.real("/", "largest_energy"),
+                                source.real("/", "energy_imbalance")};
   checkpoint.state = source.read_bytes("state");
   return checkpoint;
 }
 
 void check_same_scene(const std::string& before, const Scene& scene, const fs::path& folder) {
   if (before == scene.resolved) return;
-  throw InputError({scene.file.string()}, "",
-                   fmt::format("found another scene than the run in {} had, which cannot be continued with it; they differ in\n  {}",
-                               folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
+  throw InputError(
+      {scene.file.string()}, "",
+      fmt::format("found another scene than the run in {} had, which cannot be continued with it; they differ in\n  {}",
+                  folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
 }
 
 void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
                       const fs::path& folder) {
   const auto refuse = [&](const std::string& message) { throw InputError({checkpoint_file(folder).string()}, "", message); };
   if (checkpoint.perikit_version != PERIKIT_VERSION) {
-    refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits", checkpoint.perikit_version, PERIKIT_VERSION));
+    refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits",
+                       checkpoint.perikit_version, PERIKIT_VERSION));
   }
   check_same_scene(checkpoint.scene, scene, folder);
   if (checkpoint.body != body) refuse("found the checkpoint of another body: the files that the scene reads have changed");

@@ -1,3 +1,5 @@
+#include "perikit/sdk/plugin.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -5,20 +7,23 @@
 #include <memory>
 #include <vector>
 
-#include "perikit/sdk/plugin.hpp"
 #include "perikit/sdk/stable_step.hpp"
 
 using namespace perikit;
 
 namespace {
 
-/// Work of loads and constraints, step by step [J]. What a constraint puts in is the change of kinetic energy of the prescribed components
-/// less the work of the other forces on them.
+/// Work of loads and constraints, step by step [J]. What a constraint puts in is the change of kinetic energy of the prescribed
+/// components less the work of the other forces on them.
 class Work {
  public:
   explicit Work(Problem& problem)
-      : state_(problem.state()), constraints_(problem.constraints()), loads_(problem.loads()), mass_(problem.masses().by_point()),
-        old_load_(problem.make_field()), scratch_(problem.make_field()) {
+      : state_(problem.state()),
+        constraints_(problem.constraints()),
+        loads_(problem.loads()),
+        mass_(problem.masses().by_point()),
+        old_load_(problem.make_field()),
+        scratch_(problem.make_field()) {
     loads_.evaluate(state_.time, state_.external_force());
     speed_ = prescribed_speed();
   }
@@ -34,7 +39,8 @@ class Work {
     double work = 0;
     const FieldView load = state_.external_force();
     loads_.evaluate(state_.time, load);
-    for (std::size_t k = 0; k < load.size(); ++k) work += 0.5 * (load.data[k] + old_load_.data()[k]) * dt * half_step_velocity.data[k];
+    for (std::size_t k = 0; k < load.size(); ++k)
+      work += 0.5 * (load.data[k] + old_load_.data()[k]) * dt * half_step_velocity.data[k];
     const std::vector<double> now = prescribed_speed();
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
@@ -60,33 +66,43 @@ class Work {
   const Loads& loads_;
   std::span<const double> mass_;
   Field old_load_, scratch_;
-  std::vector<double> speed_, force_;   ///< by constrained component
+  std::vector<double> speed_, force_;  ///< by constrained component
 };
 
 /// YOUR PHYSICS: how the state gets from one step to the next. Default: velocity Verlet,
 ///   v(t + dt/2) = v(t - dt/2) + dt a(t),  u(t + dt) = u(t) + dt v(t + dt/2),  a = (internal + external force)/mass.
 class PartName final : public Integrator {
  public:
-  PartName(double end_time, double time_step) : end_time_(end_time), time_step_(time_step) {}
+  explicit PartName(const ParameterValues& values)
+      : values_(values),
+        end_time_(values.number("end_time")),
+        time_step_(values.has("time_step") ? values.number("time_step") : 0.0) {}
 
   IntegratorTraits traits() const noexcept override { return {.dynamic = true, .quasi_static = false}; }
 
-  std::string plan(Problem& problem) override { return fmt::format("{:.0f} steps to {:.4g} s", steps(problem), end_time_); }
+  std::string plan(Problem& problem) override {
+    check_time_step(problem, values_);
+    return fmt::format("{:.0f} steps to {:.4g} s", steps(problem), end_time_);
+  }
 
   void run(Problem& problem, Observer& observer) override {
     State& state = problem.state();
     Constraints& constraints = problem.constraints();
     // Every run variable is declared in the state, not kept in this object: checkpoints then hold it, and a run goes on bitwise.
     std::span<double> numbers = state.declare_numbers("part_name", 2);
-    double& count = numbers[0];     // of steps; 0 before the start
-    double& last_dt = numbers[1];   // 0 before the first step
+    double& count = numbers[0];    // of steps; 0 before the start
+    double& last_dt = numbers[1];  // 0 before the first step
     const FieldView u = state.displacement(), v = state.velocity(), half = state.declare("half_step_velocity");
     Work work(problem);
     const auto report = [&] {
-      return StepReport{.step = state.step, .time = state.time, .time_step = end_time_ / count, .end_time = end_time_,
+      return StepReport{.step = state.step,
+                        .time = state.time,
+                        .time_step = end_time_ / count,
+                        .end_time = end_time_,
                         .steps_expected = static_cast<std::int64_t>(count)};
     };
     if (count == 0) {
+      check_time_step(problem, values_, &observer);
       count = steps(problem);
       constraints.prescribe_velocity(state.time, v);
       evaluate(problem, observer.wants_sample(0, state.time), end_time_ / count);
@@ -106,7 +122,7 @@ class PartName final : public Integrator {
       evaluate(problem, sample, dt);
       work.end(dt, half);
       last_dt = dt;
-      if (sample) {   // velocities at full steps are only wanted here
+      if (sample) {  // velocities at full steps are only wanted here
         kick(problem, half, v, 0.5 * dt);
         constraints.prescribe_velocity(t_next, v);
       }
@@ -118,7 +134,8 @@ class PartName final : public Integrator {
  private:
   double steps(Problem& problem) const {
     constexpr double safety = 0.9;
-    const double dt = time_step_ > 0 ? time_step_ : safety * 2 / std::sqrt(largest_eigenvalue(problem, problem.state().displacement()));
+    const double dt =
+        time_step_ > 0 ? time_step_ : safety * 2 / std::sqrt(largest_eigenvalue(problem, problem.state().displacement()));
     return std::max(1.0, std::ceil(end_time_ / dt * (1 - 1e-12)));
   }
 
@@ -134,11 +151,12 @@ class PartName final : public Integrator {
     const auto mass = problem.masses().by_point();
     const FieldView internal = problem.state().internal_force(), external = problem.state().external_force();
     for (std::size_t k = 0; k < to.size(); ++k) {
-      const double m = mass[k % to.stride];   // 0 at points that only pad the arrays
+      const double m = mass[k % to.stride];  // 0 at points that only pad the arrays
       to.data[k] = from.data[k] + (m > 0 ? dt * (internal.data[k] + external.data[k]) / m : 0.0);
     }
   }
 
+  ParameterValues values_;
   double end_time_, time_step_;
 };
 
@@ -146,6 +164,7 @@ ParameterTable parameters() {
   ParameterTable table;
   table.number("end_time", "s", "End of the run; hit exactly by equal steps.").require().positive();
   table.number("time_step", "s", "Largest step; found from the stiffness at the start where it is not given.").positive();
+  allow_unstable_parameter(table);
   return table;
 }
 
@@ -160,7 +179,5 @@ PERIKIT_PLUGIN(registrar) {
                         .equations = "v(t+dt/2) = v(t-dt/2) + dt a(t), u(t+dt) = u(t) + dt v(t+dt/2)",
                         .source = "the paper, with the number of the equation",
                         .limits = "the step is estimated once: not for bodies that become stiffer"},
-                       [](const ParameterValues& values, const PartFactory&) {
-                         return std::make_unique<PartName>(values.number("end_time"), values.has("time_step") ? values.number("time_step") : 0.0);
-                       });
+                       [](const ParameterValues& values, const PartFactory&) { return std::make_unique<PartName>(values); });
 }

@@ -10,8 +10,8 @@
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
-#include "perikit/problem/integrator.hpp"
 #include "perikit/problem/body_problem.hpp"
+#include "perikit/problem/integrator.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -53,23 +53,36 @@ enum class RunStart {
   resume,  ///< from checkpoint.h5 in the folder; from the initial state where there is none
 };
 
+/// What the energies of a run lack of adding up: strain + kinetic + dissipated = initial + work of boundaries and loads.
+struct EnergyBalance {
+  double initial = 0;  ///< strain + kinetic [J] at step 0
+  double largest = 0;  ///< the largest of all the energies that were seen [J]
+  double off = 0;      ///< the largest imbalance that was seen [J]
+
+  /// The imbalance of `energies` [J], which becomes part of the record.
+  double add(const Energies& energies) noexcept;
+  /// off over largest; 0 where there was no energy.
+  double share() const noexcept { return largest > 0 ? off / largest : 0.0; }
+};
+
 /// Where the output of a run stands: what a checkpoint holds besides the state.
 struct OutputProgress {
-  std::int64_t frames = 0, history_rows = 0;   ///< those that the scene asks for; not the ones of a stop
-  std::int64_t next_time = 0;                  ///< of [output] times
-  std::int64_t history_every = 0;              ///< 0: not known before the first step
+  std::int64_t frames = 0, history_rows = 0;  ///< those that the scene asks for; not the ones of a stop
+  std::int64_t next_time = 0;                 ///< of [output] times
+  std::int64_t history_every = 0;             ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
-  double initial_energy = 0;                   ///< strain + kinetic [J] at step 0
+  EnergyBalance energies;
 };
 
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
-  /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into the
-  /// problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or body, or of
-  /// other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
-  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh, std::string libraries = {});
+  /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into
+  /// the problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or
+  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
+  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh,
+              std::string libraries = {});
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -80,7 +93,8 @@ class RunRecorder final : public Observer {
 
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
-  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the
+  /// run.
   std::string closing(double set_up) const;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
@@ -94,6 +108,11 @@ class RunRecorder final : public Observer {
   bool history_due(std::int64_t step) const;
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
+  /// Of a state that is sampled. RunError where the energies of a dynamic run are far from adding up. recorded: the state counts
+  /// in the balance of the run; not that of a stop alone.
+  void watch_energies(const StepReport& report, bool recorded);
+  /// What the end of the run warns of; empty where the energies add up.
+  std::string energy_warning() const;
   void write_history(const StepReport& report);
   void progress(const StepReport& report);
 
@@ -108,7 +127,7 @@ class RunRecorder final : public Observer {
   std::vector<double> frame_times_;
   OutputProgress done_;
   std::int64_t resumed_step_ = -1;
-  std::string body_, libraries_;   ///< fingerprints
+  std::string body_, libraries_;  ///< fingerprints
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
