@@ -46,7 +46,9 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 
 }  // namespace
 
-std::string version() { return PERIKIT_VERSION; }
+std::string version() {
+  return PERIKIT_VERSION;
+}
 
 void run(const Options& options) {
   const auto registry = open_registry(options);
@@ -54,16 +56,17 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
-  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
+  const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
-                       library_fingerprints(*registry));
+                       library_fingerprints(*registry), options.force);
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
-    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
-                                                                        recorder.resumed_step(), simulation.problem().state().time)
-                                                          : "no checkpoint to resume from: the run starts from its initial state";
+    const std::string from =
+        recorder.resumed_step() >= 0
+            ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().state().time)
+            : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
     if (!options.quiet) fmt::print("{}\n", from);
   }
@@ -111,13 +114,15 @@ void study(const Options& options) {
     set_thread_count(threads);
   const Study study = read_study(options.scene, *registry);
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / study.file.stem() : options.output;
-  const auto runner = [&](const Scene& scene, const std::filesystem::path& own) { return run_in_child(scene, *registry, own); };
+  const auto runner = [&](const Scene& scene, const std::filesystem::path& own) {
+    return run_in_child(scene, *registry, own, options.force);
+  };
   const auto progress = [&](const std::string& line) {
     if (!options.quiet) fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const StudyTable table =
-      run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress, {options.jobs, options.resume});
+  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress,
+                                     {options.jobs, options.resume, options.force});
   const auto done = std::ranges::count(table.rows, "done", &StudyRow::status);
   if (!options.quiet)
     fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(),
@@ -170,7 +175,8 @@ void contract(const Options& options) {
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
-  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
+  throw InputError({program.string()}, "",
+                   fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace perikit::app

@@ -13,6 +13,7 @@
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
 #include "run/reduction.hpp"
+#include "run/run_folder.hpp"
 
 namespace perikit {
 
@@ -24,28 +25,6 @@ constexpr std::int64_t default_history_rows = 1000;
 
 bool reached(double time, double wanted) {
   return time >= wanted - 1e-9 * std::abs(wanted);
-}
-
-bool ended(const OutputProgress& run, std::int64_t step, double time) {
-  return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
-}
-
-/// What a run that does not go on does to the one whose results the folder holds; empty where it holds none.
-std::string earlier_run(const std::filesystem::path& folder) {
-  if (!std::filesystem::exists(folder / "scene.toml")) return {};
-  if (std::filesystem::exists(checkpoint_file(folder))) {
-    try {
-      const Checkpoint checkpoint = read_checkpoint(folder);
-      if (!ended(checkpoint.output, checkpoint.step, checkpoint.time)) {
-        return fmt::format(
-            "warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have "
-            "gone on with it",
-            folder.string(), checkpoint.step, checkpoint.time);
-      }
-    } catch (const InputError&) {  // nothing that could be gone on with
-    }
-  }
-  return fmt::format("replaces the results of an earlier run in {}", folder.string());
 }
 
 ReferenceData reference_of(const BodyProblem& problem) {
@@ -86,7 +65,7 @@ std::vector<std::string> history_columns(const Scene& scene) {
 }
 
 RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start,
-                         std::string libraries)
+                         std::string libraries, bool force)
     : simulation_(simulation),
       folder_(std::move(folder)),
       show_progress_(show_progress),
@@ -107,8 +86,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   columns_ = perikit::history_columns(scene);
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
-  make_folder(folder_);
-  remove_file(temporary_name(checkpoint_file(folder_)));  // of a run that was killed
+  output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
   if (earlier)
     start_from_checkpoint();
@@ -122,15 +100,8 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
 void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
-  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml"))
-    check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
-  std::error_code missing;
-  if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
-    throw InputError({scene.file.string()}, "output",
-                     fmt::format("found {}, the folder of the scene itself, whose scene.toml the resolved scene would replace; "
-                                 "allowed: another folder (-o)",
-                                 folder_.string()));
-  }
+  if (const auto before = read_marked(folder_ / "scene.toml"); start == RunStart::resume && before)
+    check_same_scene(before->text, scene, folder_);
   const std::string replaced = start == RunStart::fresh ? earlier_run(folder_) : std::string();
   // Before any other file: no checkpoint may stand beside the frames of another run.
   remove_file(checkpoint_file(folder_));
@@ -138,7 +109,7 @@ void RunRecorder::start_fresh(RunStart start) {
     log(replaced);
     if (show_progress_) fmt::print(stderr, "{}\n", replaced);
   }
-  write_file_atomically(folder_ / "scene.toml", scene.resolved);
+  output_->mark(scene.resolved);
 }
 
 void RunRecorder::start_from_checkpoint() {
@@ -153,6 +124,7 @@ void RunRecorder::start_from_checkpoint() {
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
   log_text_ = read_text(folder_ / "run.log");
+  if (!std::filesystem::exists(folder_ / "scene.toml")) output_->mark(simulation_.scene().resolved);
 }
 
 RunRecorder::~RunRecorder() {

@@ -11,6 +11,7 @@
 #include "output/history_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"
+#include "run/output_folder.hpp"
 #include "run/processes.hpp"
 #include "run/study_plot.hpp"
 #include "scene/diagnostics.hpp"
@@ -134,6 +135,12 @@ StudyTable in_order_of_axis(StudyTable table) {
   return table;
 }
 
+/// Of an earlier run in this folder; empty where there was none.
+std::string resolved_scene(const fs::path& folder) {
+  const auto marked = read_marked(folder / "scene.toml");
+  return marked ? marked->text : std::string();
+}
+
 std::string described(const Study& study, const StudyRow& row) {
   std::vector<std::string> texts;
   for (std::size_t k = 0; k < study.keys.size(); ++k)
@@ -166,7 +173,12 @@ std::vector<std::vector<std::size_t>> combinations(const Study& study) {
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
                      const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how) {
   std::vector<Planned> runs = plan_all(study, parts, options);
-  make_folder(folder);
+  const OutputFolder output(folder, {.marker = "study.toml",
+                                     .names = {"study.toml", "table.csv", "table.md", "plot.png", "plot.svg", "runs"},
+                                     .inputs = {study.file, study.scene},
+                                     .own = false,
+                                     .force = how.force});
+  output.mark(read_text(study.file));
   for (std::size_t i = 0; i < runs.size(); ++i) runs[i].row.run = i;
   const auto own = [&](std::size_t i) { return folder / "runs" / fmt::format("{}", i); };
   std::vector<bool> ended(runs.size(), false);
@@ -184,7 +196,9 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
     progress(fmt::format("run {} {}{}{}{}", i + 1, row.status, note, row.reason.empty() ? "" : ": ", row.reason));
     write_table();
   };
-  const auto take = [&](std::size_t i, const RunOutcome& outcome) { fill(runs[i].row, study, outcome, runs[i].references, own(i)); };
+  const auto take = [&](std::size_t i, const RunOutcome& outcome) {
+    fill(runs[i].row, study, outcome, runs[i].references, own(i));
+  };
   Processes processes;
   const auto collect = [&] {
     const std::size_t i = processes.wait();
@@ -198,7 +212,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
       end(i, "");
       continue;
     }
-    const bool same = how.resume && read_text(own(i) / "scene.toml") == runs[i].scene->resolved;
+    const bool same = how.resume && resolved_scene(own(i)) == runs[i].scene->resolved;
     if (const auto kept = same ? kept_outcome(own(i)) : std::nullopt; kept && kept->status == "done") {
       take(i, *kept);
       end(i, " before");
@@ -220,7 +234,8 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
   }
   while (processes.running() > 0) collect();
   if (stop_requested()) {
-    throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
+    throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(),
+                               (folder / "table.csv").string()));
   }
   if (study.plot) {
     const StudyTable drawn = in_order_of_axis(table);

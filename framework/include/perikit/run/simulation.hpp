@@ -75,14 +75,17 @@ struct OutputProgress {
   EnergyBalance energies;
 };
 
+class OutputFolder;
+
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
   /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into
   /// the problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or
-  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
+  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes), another
+  /// process writes into it, or (unless `force`) perikit did not write what would be replaced.
   RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh,
-              std::string libraries = {});
+              std::string libraries = {}, bool force = false);
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -118,6 +121,7 @@ class RunRecorder final : public Observer {
 
   Simulation& simulation_;
   std::filesystem::path folder_;
+  std::unique_ptr<OutputFolder> output_;
   bool show_progress_;
   PointFields fields_;
   std::vector<std::string> frame_fields_;

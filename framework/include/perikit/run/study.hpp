@@ -55,9 +55,9 @@ struct StudyQuantity {
 
 struct StudyPlot {
   std::string x, y;
-  std::string series;  ///< a key of the values; empty: one line
-  std::string log;     ///< axes with a logarithmic scale: "", "x", "y", "xy"
-  std::optional<double> level;   ///< of y
+  std::string series;           ///< a key of the values; empty: one line
+  std::string log;              ///< axes with a logarithmic scale: "", "x", "y", "xy"
+  std::optional<double> level;  ///< of y
 };
 
 struct Study {
@@ -74,8 +74,8 @@ Study read_study(const std::filesystem::path& file, PartCatalogue& parts);
 /// The same from memory; `file` is used in messages and for relative paths.
 Study parse_study(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts);
 
-/// The keys of a study by section ("" for the top level, "quantity", "plot"), for `describe` and the reference page. [values] has the
-/// keys of the scene.
+/// The keys of a study by section ("" for the top level, "quantity", "plot"), for `describe` and the reference page. [values] has
+/// the keys of the scene.
 const std::vector<std::pair<std::string, ParameterTable>>& study_sections();
 
 /// For each run the index of the value of each key.
@@ -93,10 +93,11 @@ struct RunOutcome {
 
 /// Runs one scene into a folder and never throws.
 using StudyRunner = std::function<RunOutcome(const Scene& scene, const std::filesystem::path& folder)>;
-RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
+/// force: what perikit did not write in the folder is replaced all the same.
+RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder, bool force = false);
 /// The same in a process of its own, which may crash or run out of memory without harm. The calling process must not have
 /// computed in parallel before: a copied process has none of the threads.
-RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
+RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder, bool force = false);
 
 /// The outcome of a run in its folder; nothing where the run came to no end.
 void keep_outcome(const std::filesystem::path& folder, const RunOutcome& outcome);
@@ -105,6 +106,7 @@ std::optional<RunOutcome> kept_outcome(const std::filesystem::path& folder);
 struct StudyExecution {
   int jobs = 1;         ///< runs side by side; more than one disturbs what is measured in seconds
   bool resume = false;  ///< keep the runs that are done already
+  bool force = false;   ///< replace what perikit did not write in the folder
 };
 
 struct StudyRow {
@@ -125,24 +127,25 @@ struct StudyTable {
   std::string markdown() const;
 };
 
-/// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms where both
-/// axes have them).
+/// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms
+/// where both axes have them).
 struct Crossing {
   double x = 0;
   enum class Kind {
-    reached,   ///< at x
-    at_once,   ///< by all points, the first of them at x
-    never,     ///< the last point, at x, is above
+    reached,  ///< at x
+    at_once,  ///< by all points, the first of them at x
+    never,    ///< the last point, at x, is above
   } kind = Kind::never;
 };
 Crossing crossing(std::vector<std::pair<double, double>> points, double level, bool logarithmic);
 
 /// Runs every combination into folder/runs/<index>, `jobs` at a time, and writes folder/table.csv and table.md after each, and
-/// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that says so.
-/// options: for every run; `progress` gets a line before and after each.
-/// Throws InputError where no combination makes a scene, or a quantity or reference does not fit a scene - before the first run;
-/// RunError where a file cannot be written, or request_stop was called (the rows so far are kept).
+/// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that
+/// says so. options: for every run; `progress` gets a line before and after each. Throws InputError where no combination makes a
+/// scene, or a quantity or reference does not fit a scene - before the first run; RunError where a file cannot be written, or
+/// request_stop was called (the rows so far are kept).
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const std::filesystem::path& folder,
-                     const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how = {});
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress,
+                     const StudyExecution& how = {});
 
 }  // namespace perikit
