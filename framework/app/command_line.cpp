@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "perikit/core/errors.hpp"
+#include "perikit/core/messages.hpp"
 
 namespace perikit::app {
 
@@ -97,10 +98,10 @@ int refuse(const CLI::App& app, const CLI::ParseError& error, const std::string&
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
   if (std::ranges::find(commands, word) == commands.end() && !word.starts_with('-')) {
-    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "),
-               did_you_mean(word, commands));
+    tell(fmt::format("found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "),
+                     did_you_mean(word, commands)));
   } else {
-    fmt::print(stderr, "{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " ");
+    tell(fmt::format("{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " "));
   }
   return input_refused;
 }
@@ -113,7 +114,7 @@ std::optional<int> read_command_line(int argc, char** argv, Options& options) {
   app.require_subcommand(1);
   add_commands(app, options);
   if (argc < 2) {
-    fmt::print(stderr, "{}", app.help());
+    tell(app.help());
     return input_refused;
   }
   try {

@@ -118,7 +118,8 @@ void study(const Options& options) {
     return run_in_child(scene, *registry, own, options.force);
   };
   const auto progress = [&](const std::string& line) {
-    if (!options.quiet) fmt::print("{}\n", line);
+    if (options.quiet) return;
+    std::puts(line.c_str());  // a line that cannot be written ends no study
     std::fflush(stdout);
   };
   const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress,

@@ -1,14 +1,18 @@
 /// The command line: perikit run | check | study | plot | bench | new | contract | list | describe.
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <iostream>
 #include <new>
 
 #include "command_line.hpp"
 #include "perikit/core/errors.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace {
@@ -19,35 +23,57 @@ void stop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Where a standard stream is closed, the next file that is opened would take its place, and messages would go into results.
+void open_standard_streams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(descriptor, F_GETFD) < 0)
+      ::open("/dev/null", descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY);  // takes the lowest number that is free
+}
+
+/// Every way in which a command can end.
+int status_of(int argc, char** argv) {
+  using namespace perikit;
+  try {
+    app::Options options;
+    if (const std::optional<int> status = app::read_command_line(argc, argv, options)) return *status;
+    options.command(options);
+    return app::done;
+  } catch (const InputError& e) {
+    tell(fmt::format("{}\n", e.what()));
+    return app::input_refused;
+  } catch (const RunError& e) {
+    tell(fmt::format("the run failed: {}\n", e.what()));
+    return app::run_failed;
+  } catch (const std::bad_alloc&) {
+    tell("the run failed: not enough memory\n");
+    return app::run_failed;
+  } catch (const std::exception& e) {
+    if (std::ferror(stdout)) return app::run_failed;  // said by the caller
+    tell(fmt::format("internal error: {}\n", e.what()));
+    return app::run_failed;
+  }
+}
+
+/// What was printed has to arrive: a full disk behind standard output is a failure.
+int flushed(int status) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
+  perikit::tell("standard output cannot be written\n");
+  return status == perikit::app::done ? perikit::app::run_failed : status;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   // Waiting threads must sleep: spinning ones make a busy machine several times slower. The runtime reads this when it starts,
   // which is before main; so the program starts itself again once.
   if (!std::getenv("OMP_WAIT_POLICY")) {
     setenv("OMP_WAIT_POLICY", "passive", 1);
     execv("/proc/self/exe", argv);
   }
-  using namespace perikit;
-  app::Options options;
-  if (const std::optional<int> status = app::read_command_line(argc, argv, options)) return *status;
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
-  std::signal(SIGXFSZ, SIG_IGN);   // a file at its size limit is then an error of the write, with a message
-  try {
-    options.command(options);
-    return app::done;
-  } catch (const InputError& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return app::input_refused;
-  } catch (const RunError& e) {
-    fmt::print(stderr, "the run failed: {}\n", e.what());
-    return app::run_failed;
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "the run failed: not enough memory\n");
-    return app::run_failed;
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "internal error: {}\n", e.what());
-    return app::run_failed;
-  }
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is then an error of the write, with a message
+  return flushed(status_of(argc, argv));
 }

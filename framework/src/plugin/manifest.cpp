@@ -1,6 +1,7 @@
 #include "plugin/manifest.hpp"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,9 +10,10 @@
 #include <fstream>
 #include <random>
 #include <span>
-#include <toml++/toml.h>
 
 #include "core/fingerprint.hpp"
+#include "files/atomic_file.hpp"
+#include "files/toml_limits.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "plugin/registrar.hpp"
 
@@ -62,7 +64,7 @@ NamedPart read_part(const toml::table& table, const fs::path& file) {
 }
 
 /// A name beside a file that no other process or thread uses.
-fs::path temporary_name(const fs::path& file) {
+fs::path unused_name(const fs::path& file) {
   static std::atomic<unsigned> count{0};
   return fmt::format("{}.{}.{}.{:08x}.new", file.string(), getpid(), count++, std::random_device{}());
 }
@@ -74,15 +76,22 @@ bool Manifest::matches_size(const fs::path& library) const {
   return fs::file_size(library, unreadable) == size && !unreadable;
 }
 
-bool Manifest::matches(const fs::path& library) const { return matches_size(library) && checksum == perikit::checksum(library); }
+bool Manifest::matches(const fs::path& library) const {
+  return matches_size(library) && checksum == perikit::checksum(library);
+}
 
-fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
+fs::path manifest_path(const fs::path& library) {
+  return fs::path(library).replace_extension(".parts");
+}
 
 Manifest read_manifest(const fs::path& file) try {
   std::error_code unreadable;
   if (!fs::is_regular_file(file, unreadable)) throw InputError({file.string()}, "", "not a regular file");
-  if (fs::file_size(file, unreadable) > largest_manifest || unreadable) throw InputError({file.string()}, "", "too large for a manifest");
-  const toml::table table = toml::parse_file(file.string());
+  if (fs::file_size(file, unreadable) > largest_manifest || unreadable)
+    throw InputError({file.string()}, "", "too large for a manifest");
+  const std::string text = read_text(file);
+  check_toml_limits(text, file.string(), largest_manifest);
+  const toml::table table = toml::parse(std::string_view(text), std::string_view(file.string()));
   if (const auto format = required<std::int64_t>(table, "format", file); format != manifest_format) {
     throw InputError({file.string()}, "format", fmt::format("{}; this program reads {}", format, manifest_format));
   }
@@ -114,14 +123,11 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
   for (const NamedPart& part : parts) {
     list.push_back(toml::table{{"kind", name(part.kind)}, {"name", part.name}, {"summary", part.summary}});
   }
-  const toml::table table{{"format", manifest_format},
-                          {"abi", PERIKIT_ABI_VERSION},
-                          {"build_id", PERIKIT_BUILD_ID},
-                          {"size", static_cast<std::int64_t>(fs::file_size(library))},
-                          {"checksum", checksum(library)},
-                          {"part", std::move(list)}};
+  const toml::table table{{"format", manifest_format},     {"abi", PERIKIT_ABI_VERSION},
+                          {"build_id", PERIKIT_BUILD_ID},  {"size", static_cast<std::int64_t>(fs::file_size(library))},
+                          {"checksum", checksum(library)}, {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
-  const fs::path temporary = temporary_name(file);
+  const fs::path temporary = unused_name(file);
   std::ofstream out(temporary);
   out << table << '\n';
   out.close();

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "files/atomic_file.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
 #include "run/reduction.hpp"
@@ -107,7 +108,7 @@ void RunRecorder::start_fresh(RunStart start) {
   remove_file(checkpoint_file(folder_));
   if (!replaced.empty()) {
     log(replaced);
-    if (show_progress_) fmt::print(stderr, "{}\n", replaced);
+    if (show_progress_) tell(replaced + '\n');
   }
   output_->mark(scene.resolved);
 }
@@ -254,13 +255,12 @@ void RunRecorder::progress(const StepReport& report) {
       fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
                   report.end_time, report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
   if (terminal) {
-    fmt::print(stderr, "\r\033[K{}", line);
+    tell("\r\033[K" + line);
     line_open_ = !end;
     if (end) std::fputc('\n', stderr);
   } else {
-    fmt::print(stderr, "{}\n", line);
+    tell(line + '\n');
   }
-  std::fflush(stderr);
 }
 
 }  // namespace perikit

@@ -35,6 +35,8 @@ class Simulation {
  private:
   /// InputError where output asks a pair law for fields that it does not have.
   void refuse_gradients() const;
+  /// InputError where a load, a boundary or the exact values of a history column have no finite value at the start or the end.
+  void evaluate_conditions();
 
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
