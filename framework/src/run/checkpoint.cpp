@@ -18,9 +18,7 @@ namespace perikit {
 
 namespace fs = std::filesystem;
 
-fs::path checkpoint_file(const fs::path& folder) {
-  return folder / "checkpoint.h5";
-}
+fs::path checkpoint_file(const fs::path& folder) { return folder / "checkpoint.h5"; }
 
 std::string body_fingerprint(const ReferenceData& body) {
   Fingerprint fingerprint;
@@ -118,18 +116,16 @@ Checkpoint read_checkpoint(const fs::path& folder) {
 
 void check_same_scene(const std::string& before, const Scene& scene, const fs::path& folder) {
   if (before == scene.resolved) return;
-  throw InputError(
-      {scene.file.string()}, "",
-      fmt::format("found another scene than the run in {} had, which cannot be continued with it; they differ in\n  {}",
-                  folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
+  throw InputError({scene.file.string()}, "",
+                   fmt::format("found another scene than the run in {} had, which cannot be continued with it; they differ in\n  {}",
+                               folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
 }
 
 void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
                       const fs::path& folder) {
   const auto refuse = [&](const std::string& message) { throw InputError({checkpoint_file(folder).string()}, "", message); };
   if (checkpoint.perikit_version != PERIKIT_VERSION) {
-    refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits",
-                       checkpoint.perikit_version, PERIKIT_VERSION));
+    refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits", checkpoint.perikit_version, PERIKIT_VERSION));
   }
   check_same_scene(checkpoint.scene, scene, folder);
   if (checkpoint.body != body) refuse("found the checkpoint of another body: the files that the scene reads have changed");

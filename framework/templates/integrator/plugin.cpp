@@ -1,5 +1,3 @@
-#include "perikit/sdk/plugin.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,23 +5,20 @@
 #include <memory>
 #include <vector>
 
+#include "perikit/sdk/plugin.hpp"
 #include "perikit/sdk/stable_step.hpp"
 
 using namespace perikit;
 
 namespace {
 
-/// Work of loads and constraints, step by step [J]. What a constraint puts in is the change of kinetic energy of the prescribed
-/// components less the work of the other forces on them.
+/// Work of loads and constraints, step by step [J]. What a constraint puts in is the change of kinetic energy of the prescribed components
+/// less the work of the other forces on them.
 class Work {
  public:
   explicit Work(Problem& problem)
-      : state_(problem.state()),
-        constraints_(problem.constraints()),
-        loads_(problem.loads()),
-        mass_(problem.masses().by_point()),
-        old_load_(problem.make_field()),
-        scratch_(problem.make_field()) {
+      : state_(problem.state()), constraints_(problem.constraints()), loads_(problem.loads()), mass_(problem.masses().by_point()),
+        old_load_(problem.make_field()), scratch_(problem.make_field()) {
     loads_.evaluate(state_.time, state_.external_force());
     speed_ = prescribed_speed();
   }
@@ -39,8 +34,7 @@ class Work {
     double work = 0;
     const FieldView load = state_.external_force();
     loads_.evaluate(state_.time, load);
-    for (std::size_t k = 0; k < load.size(); ++k)
-      work += 0.5 * (load.data[k] + old_load_.data()[k]) * dt * half_step_velocity.data[k];
+    for (std::size_t k = 0; k < load.size(); ++k) work += 0.5 * (load.data[k] + old_load_.data()[k]) * dt * half_step_velocity.data[k];
     const std::vector<double> now = prescribed_speed();
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
@@ -66,7 +60,7 @@ class Work {
   const Loads& loads_;
   std::span<const double> mass_;
   Field old_load_, scratch_;
-  std::vector<double> speed_, force_;  ///< by constrained component
+  std::vector<double> speed_, force_;   ///< by constrained component
 };
 
 /// YOUR PHYSICS: how the state gets from one step to the next. Default: velocity Verlet,
@@ -90,15 +84,12 @@ class PartName final : public Integrator {
     Constraints& constraints = problem.constraints();
     // Every run variable is declared in the state, not kept in this object: checkpoints then hold it, and a run goes on bitwise.
     std::span<double> numbers = state.declare_numbers("part_name", 2);
-    double& count = numbers[0];    // of steps; 0 before the start
-    double& last_dt = numbers[1];  // 0 before the first step
+    double& count = numbers[0];     // of steps; 0 before the start
+    double& last_dt = numbers[1];   // 0 before the first step
     const FieldView u = state.displacement(), v = state.velocity(), half = state.declare("half_step_velocity");
     Work work(problem);
     const auto report = [&] {
-      return StepReport{.step = state.step,
-                        .time = state.time,
-                        .time_step = end_time_ / count,
-                        .end_time = end_time_,
+      return StepReport{.step = state.step, .time = state.time, .time_step = end_time_ / count, .end_time = end_time_,
                         .steps_expected = static_cast<std::int64_t>(count)};
     };
     if (count == 0) {
@@ -122,7 +113,7 @@ class PartName final : public Integrator {
       evaluate(problem, sample, dt);
       work.end(dt, half);
       last_dt = dt;
-      if (sample) {  // velocities at full steps are only wanted here
+      if (sample) {   // velocities at full steps are only wanted here
         kick(problem, half, v, 0.5 * dt);
         constraints.prescribe_velocity(t_next, v);
       }
@@ -134,8 +125,7 @@ class PartName final : public Integrator {
  private:
   double steps(Problem& problem) const {
     constexpr double safety = 0.9;
-    const double dt =
-        time_step_ > 0 ? time_step_ : safety * 2 / std::sqrt(largest_eigenvalue(problem, problem.state().displacement()));
+    const double dt = time_step_ > 0 ? time_step_ : safety * 2 / std::sqrt(largest_eigenvalue(problem, problem.state().displacement()));
     return std::max(1.0, std::ceil(end_time_ / dt * (1 - 1e-12)));
   }
 
@@ -151,7 +141,7 @@ class PartName final : public Integrator {
     const auto mass = problem.masses().by_point();
     const FieldView internal = problem.state().internal_force(), external = problem.state().external_force();
     for (std::size_t k = 0; k < to.size(); ++k) {
-      const double m = mass[k % to.stride];  // 0 at points that only pad the arrays
+      const double m = mass[k % to.stride];   // 0 at points that only pad the arrays
       to.data[k] = from.data[k] + (m > 0 ? dt * (internal.data[k] + external.data[k]) / m : 0.0);
     }
   }

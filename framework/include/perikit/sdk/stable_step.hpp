@@ -7,9 +7,9 @@
 
 namespace perikit {
 
-/// Largest eigenvalue of M^-1 K at u [1/s^2], the square of the highest frequency of the free components: Lanczos iteration on
-/// the exact tangent, plus its residual bound. Later calls start from the last eigenvector, which is kept in the state. Central
-/// differences are stable up to steps of 2 over its root.
+/// Largest eigenvalue of M^-1 K at u [1/s^2], the square of the highest frequency of the free components: Lanczos iteration on the
+/// exact tangent, plus its residual bound. Later calls start from the last eigenvector, which is kept in the state.
+/// Central differences are stable up to steps of 2 over its root.
 double largest_eigenvalue(Problem& problem, ConstFieldView u);
 
 /// Adds the key allow_unstable to the table of an explicit integrator that has a key time_step.
