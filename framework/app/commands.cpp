@@ -46,9 +46,7 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 
 }  // namespace
 
-std::string version() {
-  return PERIKIT_VERSION;
-}
+std::string version() { return PERIKIT_VERSION; }
 
 void run(const Options& options) {
   const auto registry = open_registry(options);
@@ -56,17 +54,16 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
-  const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
                        library_fingerprints(*registry), options.force);
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
-    const std::string from =
-        recorder.resumed_step() >= 0
-            ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().state().time)
-            : "no checkpoint to resume from: the run starts from its initial state";
+    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
+                                                                        recorder.resumed_step(), simulation.problem().state().time)
+                                                          : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
     if (!options.quiet) fmt::print("{}\n", from);
   }
@@ -176,8 +173,7 @@ void contract(const Options& options) {
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
-  throw InputError({program.string()}, "",
-                   fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
+  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace perikit::app

@@ -19,9 +19,8 @@ TEST_CASE("cli: exit status 0 for what is done, 2 for what is refused") {
   CHECK(desk.perikit("--help").status == 0);
   CHECK(desk.perikit("--version").status == 0);
   CHECK(desk.perikit("check scene.toml").status == 0);
-  for (const std::string refused :
-       {"", "walk scene.toml", "run", "run nowhere.toml", "run scene.toml --threads 0", "run scene.toml --unknown",
-        "check scene.toml --set", "describe material", "describe material/rubber", "describe matter/rubber", "list matter"}) {
+  for (const std::string refused : {"", "walk scene.toml", "run", "run nowhere.toml", "run scene.toml --threads 0", "run scene.toml --unknown", "check scene.toml --set",
+                              "describe material", "describe material/rubber", "describe matter/rubber", "list matter"}) {
     const Result result = desk.perikit(refused);
     CHECK_MESSAGE(result.status == 2, "perikit ", refused, ": status ", result.status);
     CHECK_MESSAGE(!result.err.empty(), "perikit ", refused, ": no message");
@@ -37,8 +36,7 @@ TEST_CASE("cli: what was meant by a misspelt command, kind or name") {
     CHECK_MESSAGE(contains(result.err, word), "perikit ", arguments, ": no '", word, "' in\n", result.err);
   };
   said("", "Subcommands:");
-  said("rnu scene.toml",
-       "unknown command 'rnu'; allowed: run, check, study, plot, bench, new, contract, list, describe; did you mean 'run'?");
+  said("rnu scene.toml", "unknown command 'rnu'; allowed: run, check, study, plot, bench, new, contract, list, describe; did you mean 'run'?");
   said("run", "scene is required\nHelp: perikit run --help");
   said("run scene.toml --sett a=1", "Help: perikit run --help");
   said("list materials", "did you mean 'material'?");
@@ -79,8 +77,7 @@ TEST_CASE("cli: errors name file, line, column, key and what was meant") {
     }
   }
   // All of them at once.
-  const Result both = Desk(replaced(replaced(plate, "spacing = 1.0", "spacing = -1.0"), "horizon_ratio", "horizon_ratoi"))
-                          .perikit("check scene.toml");
+  const Result both = Desk(replaced(replaced(plate, "spacing = 1.0", "spacing = -1.0"), "horizon_ratio", "horizon_ratoi")).perikit("check scene.toml");
   CHECK(contains(both.err, "scene.toml:8:"));
   CHECK(contains(both.err, "scene.toml:17:"));
 }
@@ -98,15 +95,13 @@ TEST_CASE("cli: list and describe show every part") {
       CHECK(contains(all, part));
       const Result described = desk.perikit(fmt::format("describe {}/{}", kind, part));
       CHECK(described.status == 0);
-      for (const std::string section : {"Equations", "Source", "Limits", "Example"})
-        CHECK_MESSAGE(contains(described.out, section), kind, "/", part, ": no ", section);
+      for (const std::string section : {"Equations", "Source", "Limits", "Example"}) CHECK_MESSAGE(contains(described.out, section), kind, "/", part, ": no ", section);
       ++parts;
     }
   }
   CHECK(parts >= 10);
   const std::string rubber = desk.perikit("describe material/neo_hookean").out;
-  for (const std::string word : {"shear_modulus", "[Pa]", "density", "kg/m^3", "volumetric", "Default"})
-    CHECK_MESSAGE(contains(rubber, word), "no ", word);
+  for (const std::string word : {"shear_modulus", "[Pa]", "density", "kg/m^3", "volumetric", "Default"}) CHECK_MESSAGE(contains(rubber, word), "no ", word);
 }
 
 TEST_CASE("cli: describe shows the keys of the scene and the whole reference") {
@@ -119,11 +114,9 @@ TEST_CASE("cli: describe shows the keys of the scene and the whole reference") {
   CHECK(contains(unknown.err, "did you mean 'output'"));
   CHECK(desk.perikit("describe").status == 2);
   const std::string study = desk.perikit("describe study").out;
-  for (const std::string word : {"[top level]", "[quantity]", "[plot]", "reduce", "run_time", "reference"})
-    CHECK_MESSAGE(contains(study, word), "no ", word);
+  for (const std::string word : {"[top level]", "[quantity]", "[plot]", "reduce", "run_time", "reference"}) CHECK_MESSAGE(contains(study, word), "no ", word);
   const std::string page = desk.perikit("describe --markdown").out;
-  for (const std::string& line : lines(desk.perikit("list material").out))
-    CHECK(contains(page, "### material/" + line.substr(0, line.find(' ')) + "\n"));
+  for (const std::string& line : lines(desk.perikit("list material").out)) CHECK(contains(page, "### material/" + line.substr(0, line.find(' ')) + "\n"));
   CHECK(contains(page, "| `checkpoint_every` |"));
 }
 
@@ -142,8 +135,7 @@ TEST_CASE("cli: check prints a scene that is the same when read again") {
   const Desk desk;
   const Result first = desk.perikit("check scene.toml --set integrator.end_time=0.5");
   REQUIRE(first.status == 0);
-  for (const std::string word : {"# points        40", "# bonds", "# memory", "# integration   verlet: 25 steps of 0.02 s"})
-    CHECK_MESSAGE(contains(first.out, word), "no '", word, "' in\n", first.out);
+  for (const std::string word : {"# points        40", "# bonds", "# memory", "# integration   verlet: 25 steps of 0.02 s"}) CHECK_MESSAGE(contains(first.out, word), "no '", word, "' in\n", first.out);
   desk.write("resolved.toml", first.out);
   const Result again = desk.perikit("check resolved.toml");
   CHECK(again.status == 0);
@@ -161,9 +153,7 @@ TEST_CASE("cli: --set, --explain, --quiet and --threads") {
   CHECK(quiet.err.empty());
   CHECK(contains(desk.perikit("run scene.toml -o loud").out, "frames in loud"));
   CHECK(contains(desk.perikit("run scene.toml --explain -o explained").out, "skipped:"));
-  CHECK(desk.perikit("run scene.toml --quiet -o set --set 'title=\"other\"' --set integrator.end_time=0.1 --set "
-                     "kinematics.type=conventional")
-            .status == 0);
+  CHECK(desk.perikit("run scene.toml --quiet -o set --set 'title=\"other\"' --set integrator.end_time=0.1 --set kinematics.type=conventional").status == 0);
   CHECK(contains(desk.text("set/scene.toml"), "title = \"other\""));
   CHECK(contains(desk.text("set/scene.toml"), "conventional"));
   CHECK(read_frames(desk.path("set")).back().time == 0.1);
@@ -179,9 +169,8 @@ TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and w
   const Desk desk;
   const Result run = desk.perikit("run scene.toml -o out");
   REQUIRE(run.status == 0);
-  for (const std::string word :
-       {"s set-up", "s steps", "s output (6 frames, 51 rows of history, 0 checkpoints)", "50 steps of 40 points", "points/s",
-        "MB of arrays", "work put in", "warnings      none", "6 frames in out"}) {
+  for (const std::string word : {"s set-up", "s steps", "s output (6 frames, 51 rows of history, 0 checkpoints)", "50 steps of 40 points", "points/s", "MB of arrays", "work put in",
+                                 "warnings      none", "6 frames in out"}) {
     CHECK_MESSAGE(contains(run.out, word), "no '", word, "' in\n", run.out);
     CHECK_MESSAGE(contains(desk.text("out/run.log"), word), "no '", word, "' in run.log");
   }
@@ -196,14 +185,12 @@ TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and w
 TEST_CASE("cli: the folder of a run") {
   const Desk desk;
   REQUIRE(desk.perikit("run scene.toml -o out").status == 0);
-  std::set<std::string> found,
-      expected{"results.h5", "reference.h5", "results.xdmf", "history.csv", "scene.toml", "run.log", "frames"};
+  std::set<std::string> found, expected{"results.h5", "reference.h5", "results.xdmf", "history.csv", "scene.toml", "run.log", "frames"};
   for (const auto& entry : fs::directory_iterator(desk.path("out"))) found.insert(entry.path().filename());
   CHECK(found == expected);
   const std::vector<std::string> history = lines(desk.text("out/history.csv"));
   REQUIRE(history.size() == 1 + 51);
-  CHECK(history[0] ==
-        "step,time,time_step,strain_energy,kinetic_energy,external_work,dissipated_energy,iterations,residual,pull");
+  CHECK(history[0] == "step,time,time_step,strain_energy,kinetic_energy,external_work,dissipated_energy,iterations,residual,pull");
   for (const std::string& row : history) CHECK(std::count(row.begin(), row.end(), ',') == 9);
   CHECK(contains(desk.text("out/run.log"), "50 steps of 0.02 s"));
   for (int k = 0; k < 6; ++k) {
@@ -215,8 +202,7 @@ TEST_CASE("cli: the folder of a run") {
   const perikit::LoadedFrame last = perikit::read_last_frame(desk.path("out/results.h5"), points);
   CHECK(last.time == 1.0);
   CHECK(last.step == 50);
-  for (const std::string field : {"displacement", "velocity", "strain_energy_density"})
-    CHECK_MESSAGE(last.fields.contains(field), "no field ", field);
+  for (const std::string field : {"displacement", "velocity", "strain_energy_density"}) CHECK_MESSAGE(last.fields.contains(field), "no field ", field);
   CHECK(desk.perikit("check out/scene.toml").status == 0);
   // A run starts from the last frame of an earlier one.
   desk.write("next.toml", plate + "\n[initial]\nfrom = \"out/results.h5\"\n");
@@ -278,10 +264,10 @@ TEST_CASE("cli: frames, every and times give the frames that they promise") {
   };
   using Steps = std::vector<std::int64_t>;
   CHECK(steps_of("frames = 5") == Steps{0, 10, 20, 30, 40, 50});
-  CHECK(steps_of("frames = 3") == Steps{0, 17, 34, 50});  // the first step at or after k/3
+  CHECK(steps_of("frames = 3") == Steps{0, 17, 34, 50});      // the first step at or after k/3
   CHECK(steps_of("frames = 1") == Steps{0, 50});
-  CHECK(steps_of("frames = 500").size() == 51);           // every step once
-  CHECK(steps_of("every = 20") == Steps{0, 20, 40, 50});  // and the end
+  CHECK(steps_of("frames = 500").size() == 51);               // every step once
+  CHECK(steps_of("every = 20") == Steps{0, 20, 40, 50});      // and the end
   CHECK(steps_of("every = 25") == Steps{0, 25, 50});
   CHECK(steps_of("times = [0.0, 0.31, 0.4, 1.0]") == Steps{0, 16, 20, 50});
 }
@@ -291,8 +277,7 @@ TEST_CASE("cli: kill -9 leaves every finished frame readable") {
   const pid_t child = desk.start({"run", "scene.toml", "-o", "out"});
   REQUIRE(child > 0);
   const auto start = std::chrono::steady_clock::now();
-  while (!fs::exists(desk.path("out/frames/00000011.h5")) &&
-         std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
+  while (!fs::exists(desk.path("out/frames/00000011.h5")) && std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   kill(child, SIGKILL);
@@ -364,8 +349,7 @@ TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and 
   const Result failed = every.perikit("run scene.toml -o out");
   INFO(failed.err);
   CHECK(failed.status == 1);
-  for (const std::string word : {"the run failed", "inadmissible", "point ", "(", "step ", "time ", "kinematics baqp",
-                                 "material neo_hookean", "last good frame: "}) {
+  for (const std::string word : {"the run failed", "inadmissible", "point ", "(", "step ", "time ", "kinematics baqp", "material neo_hookean", "last good frame: "}) {
     CHECK_MESSAGE(contains(failed.err, word), "no '", word, "'");
   }
   const std::vector<Frame> frames = read_frames(every.path("out"));
@@ -387,13 +371,11 @@ TEST_CASE("cli: bench gives a table and the same figures for other programs") {
   CHECK(contains(result.out, "| sub_horizon | hencky | 2 | lattice |"));
   CHECK(contains(result.out, "| sub_horizon | hencky | 2 | cloud |"));
   const std::string figures = desk.text("figures.json");
-  for (const std::string word :
-       {"\"triad_GB_per_s\": ",
-        "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25"})
+  for (const std::string word : {"\"triad_GB_per_s\": ", "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25"})
     CHECK_MESSAGE(contains(figures, word), word, " is missing in ", figures);
   CHECK_MESSAGE(!contains(figures, "null"), figures);
   CHECK(contains(figures, "\"operations\": 2345.5, \"of_triad\": "));
-  const Result uncounted = desk.perikit(command);  // not at this size
+  const Result uncounted = desk.perikit(command);   // not at this size
   CHECK(uncounted.status == 0);
   CHECK(contains(uncounted.out, "%) | - | - |"));
   desk.write("counts.csv", counts + "sub_horizon,hencky,2,cloud,5,many\n");

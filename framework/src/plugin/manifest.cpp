@@ -1,7 +1,6 @@
 #include "plugin/manifest.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <fstream>
 #include <random>
 #include <span>
+#include <toml++/toml.h>
 
 #include "core/fingerprint.hpp"
 #include "files/atomic_file.hpp"
@@ -76,13 +76,9 @@ bool Manifest::matches_size(const fs::path& library) const {
   return fs::file_size(library, unreadable) == size && !unreadable;
 }
 
-bool Manifest::matches(const fs::path& library) const {
-  return matches_size(library) && checksum == perikit::checksum(library);
-}
+bool Manifest::matches(const fs::path& library) const { return matches_size(library) && checksum == perikit::checksum(library); }
 
-fs::path manifest_path(const fs::path& library) {
-  return fs::path(library).replace_extension(".parts");
-}
+fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
 
 Manifest read_manifest(const fs::path& file) try {
   std::error_code unreadable;
@@ -123,9 +119,12 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
   for (const NamedPart& part : parts) {
     list.push_back(toml::table{{"kind", name(part.kind)}, {"name", part.name}, {"summary", part.summary}});
   }
-  const toml::table table{{"format", manifest_format},     {"abi", PERIKIT_ABI_VERSION},
-                          {"build_id", PERIKIT_BUILD_ID},  {"size", static_cast<std::int64_t>(fs::file_size(library))},
-                          {"checksum", checksum(library)}, {"part", std::move(list)}};
+  const toml::table table{{"format", manifest_format},
+                          {"abi", PERIKIT_ABI_VERSION},
+                          {"build_id", PERIKIT_BUILD_ID},
+                          {"size", static_cast<std::int64_t>(fs::file_size(library))},
+                          {"checksum", checksum(library)},
+                          {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
   const fs::path temporary = unused_name(file);
   std::ofstream out(temporary);

@@ -24,9 +24,7 @@ std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
-bool reached(double time, double wanted) {
-  return time >= wanted - 1e-9 * std::abs(wanted);
-}
+bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.body();
@@ -50,17 +48,11 @@ ReferenceData reference_of(const BodyProblem& problem) {
 
 }  // namespace
 
-void request_stop() noexcept {
-  stop = true;
-}
-bool stop_requested() noexcept {
-  return stop;
-}
+void request_stop() noexcept { stop = true; }
+bool stop_requested() noexcept { return stop; }
 
 std::vector<std::string> history_columns(const Scene& scene) {
-  std::vector<std::string> columns{"step",           "time",          "time_step",         "strain_energy",
-                                   "kinetic_energy", "external_work", "dissipated_energy", "iterations",
-                                   "residual"};
+  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -89,12 +81,9 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   body_ = body_fingerprint(reference);
   output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
-  if (earlier)
-    start_from_checkpoint();
-  else
-    start_fresh(start);
-  writer_ =
-      std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  if (earlier) start_from_checkpoint();
+  else start_fresh(start);
+  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
 
@@ -141,9 +130,7 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept {
-  return stopping_;
-}
+bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return ended(done_, step, time);
@@ -161,8 +148,7 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 ||
-         (done_.steps_expected > 0 && step >= done_.steps_expected);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
 bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
@@ -171,21 +157,19 @@ bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::wants_sample(std::int64_t step, double time) {
-  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
-  // the run after the next step.
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
+  // run after the next step.
   stopping_ = stop_requested();
   return stopping_ || frame_due(step, time) || history_due(step);
 }
 
 void RunRecorder::step_done(const StepReport& report) {
-  if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
+  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    done_.history_every = asked > 0               ? asked
-                          : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows)
-                                                  : 1;
+    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
   const auto before = std::chrono::steady_clock::now();
@@ -196,9 +180,7 @@ void RunRecorder::step_done(const StepReport& report) {
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;
   done_.frames += frame;
-  while (done_.next_time < std::ssize(frame_times_) &&
-         reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)]))
-    ++done_.next_time;
+  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
@@ -210,7 +192,7 @@ void RunRecorder::step_done(const StepReport& report) {
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  history_->sync();  // frames are on the disk already
+  history_->sync();   // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
                              simulation_.problem().snapshot()});
 }
@@ -249,11 +231,9 @@ void RunRecorder::progress(const StepReport& report) {
   shown_ = now;
   const double spent = std::chrono::duration<double>(now - start_).count();
   const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
-  const double rate = static_cast<double>(report.step - first_step_) *
-                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  const std::string line =
-      fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
-                  report.end_time, report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  const std::string line = fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time,
+                                       report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
   if (terminal) {
     tell("\r\033[K" + line);
     line_open_ = !end;

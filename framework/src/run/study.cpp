@@ -11,6 +11,7 @@
 #include "output/history_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"
+#include "perikit/run/study.hpp"
 #include "run/output_folder.hpp"
 #include "run/processes.hpp"
 #include "run/study_plot.hpp"
@@ -196,9 +197,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
     progress(fmt::format("run {} {}{}{}{}", i + 1, row.status, note, row.reason.empty() ? "" : ": ", row.reason));
     write_table();
   };
-  const auto take = [&](std::size_t i, const RunOutcome& outcome) {
-    fill(runs[i].row, study, outcome, runs[i].references, own(i));
-  };
+  const auto take = [&](std::size_t i, const RunOutcome& outcome) { fill(runs[i].row, study, outcome, runs[i].references, own(i)); };
   Processes processes;
   const auto collect = [&] {
     const std::size_t i = processes.wait();
@@ -234,8 +233,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
   }
   while (processes.running() > 0) collect();
   if (stop_requested()) {
-    throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(),
-                               (folder / "table.csv").string()));
+    throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
   }
   if (study.plot) {
     const StudyTable drawn = in_order_of_axis(table);

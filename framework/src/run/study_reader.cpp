@@ -32,8 +32,7 @@ ParameterTable head_table() {
 ParameterTable quantity_table() {
   ParameterTable table;
   table.string("name", "Name of its column.").require();
-  table.string("from", fmt::format("A column of history.csv, or a measure of the run: {}.", fmt::join(run_measures(), ", ")))
-      .require();
+  table.string("from", fmt::format("A column of history.csv, or a measure of the run: {}.", fmt::join(run_measures(), ", "))).require();
   table.choice("reduce", {"last", "max", "min", "mean"}, "How the rows of the history become one number.").by_default("\"last\"");
   return table;
 }
@@ -156,8 +155,8 @@ class StudyReader {
     key.values.push_back(std::move(value));
   }
 
-  /// A string without its quotes; a table by its type, then what else it says, tables in it without their keys: conventional
-  /// (wan), conventional (silling (coefficient = 0.1)).
+  /// A string without its quotes; a table by its type, then what else it says, tables in it without their keys: conventional (wan),
+  /// conventional (silling (coefficient = 0.1)).
   static std::string shown(const toml::node& node, const std::string& text) {
     if (const auto* string = node.as_string()) return string->get();
     const auto* table = node.as_table();
@@ -246,10 +245,9 @@ class StudyReader {
     };
     study_.plot =
         StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : "",
-                  values.has("level") ? std::optional(values.number("level")) : std::nullopt};
+                            values.has("level") ? std::optional(values.number("level")) : std::nullopt};
     if (study_.plot->level && study_.plot->log.find('y') != std::string::npos && !(*study_.plot->level > 0)) {
-      reader_.errors.add(values.position("level"), "plot.level",
-                         fmt::format("found {}; allowed with a logarithmic axis: a number > 0", *study_.plot->level));
+      reader_.errors.add(values.position("level"), "plot.level", fmt::format("found {}; allowed with a logarithmic axis: a number > 0", *study_.plot->level));
     }
   }
 
@@ -260,17 +258,14 @@ class StudyReader {
 /// What read_quantity reads by itself, as describe shows it.
 ParameterTable whole_quantity_table() {
   ParameterTable table = quantity_table();
-  table.expression(
-      "reference", "",
-      "Gives the column NAME_error, the distance from it over its size; an expression in the scene's [constants]; not 0.");
+  table.expression("reference", "", "Gives the column NAME_error, the distance from it over its size; an expression in the scene's [constants]; not 0.");
   return table;
 }
 
 }  // namespace
 
 const std::vector<std::pair<std::string, ParameterTable>>& study_sections() {
-  static const std::vector<std::pair<std::string, ParameterTable>> all{
-      {"", head_table()}, {"quantity", whole_quantity_table()}, {"plot", plot_table()}};
+  static const std::vector<std::pair<std::string, ParameterTable>> all{{"", head_table()}, {"quantity", whole_quantity_table()}, {"plot", plot_table()}};
   return all;
 }
 

@@ -1,11 +1,12 @@
 #include "scene/scene_differences.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <map>
 #include <sstream>
+#include <toml++/toml.h>
 
+#include "scene/scene_differences.hpp"
 #include "scene/toml_reader.hpp"
 #include "scene/toml_text.hpp"
 
@@ -29,9 +30,7 @@ using Leaves = std::map<std::string, std::string>;
 
 /// Every value by its dotted key; entries of an array of tables by their number.
 void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
-  const auto below = [&](std::string_view key) {
-    return path.empty() ? toml_key(key) : fmt::format("{}.{}", path, toml_key(key));
-  };
+  const auto below = [&](std::string_view key) { return path.empty() ? toml_key(key) : fmt::format("{}.{}", path, toml_key(key)); };
   if (const toml::table* table = node.as_table()) {
     for (const auto& [key, value] : *table) collect(value, below(key.str()), leaves);
   } else if (const toml::array* array = node.as_array(); array && !array->empty() && array->is_homogeneous<toml::table>()) {
@@ -56,8 +55,7 @@ std::vector<std::string> scene_differences(const std::string& before, const std:
   std::vector<std::string> differences;
   for (const auto& [key, ignored] : all) {
     const auto a = old_values.find(key), b = new_values.find(key);
-    const std::string from = a == old_values.end() ? "not given" : a->second,
-                      to = b == new_values.end() ? "not given" : b->second;
+    const std::string from = a == old_values.end() ? "not given" : a->second, to = b == new_values.end() ? "not given" : b->second;
     if (from != to) differences.push_back(fmt::format("{}: {}, now {}", key, from, to));
   }
   // Texts that are told apart by something else than a value, or by the end of a long one.

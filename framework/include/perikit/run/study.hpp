@@ -55,9 +55,9 @@ struct StudyQuantity {
 
 struct StudyPlot {
   std::string x, y;
-  std::string series;           ///< a key of the values; empty: one line
-  std::string log;              ///< axes with a logarithmic scale: "", "x", "y", "xy"
-  std::optional<double> level;  ///< of y
+  std::string series;  ///< a key of the values; empty: one line
+  std::string log;     ///< axes with a logarithmic scale: "", "x", "y", "xy"
+  std::optional<double> level;   ///< of y
 };
 
 struct Study {
@@ -74,8 +74,8 @@ Study read_study(const std::filesystem::path& file, PartCatalogue& parts);
 /// The same from memory; `file` is used in messages and for relative paths.
 Study parse_study(const std::string& text, const std::filesystem::path& file, PartCatalogue& parts);
 
-/// The keys of a study by section ("" for the top level, "quantity", "plot"), for `describe` and the reference page. [values] has
-/// the keys of the scene.
+/// The keys of a study by section ("" for the top level, "quantity", "plot"), for `describe` and the reference page. [values] has the
+/// keys of the scene.
 const std::vector<std::pair<std::string, ParameterTable>>& study_sections();
 
 /// For each run the index of the value of each key.
@@ -127,25 +127,24 @@ struct StudyTable {
   std::string markdown() const;
 };
 
-/// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms
-/// where both axes have them).
+/// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms where both
+/// axes have them).
 struct Crossing {
   double x = 0;
   enum class Kind {
-    reached,  ///< at x
-    at_once,  ///< by all points, the first of them at x
-    never,    ///< the last point, at x, is above
+    reached,   ///< at x
+    at_once,   ///< by all points, the first of them at x
+    never,     ///< the last point, at x, is above
   } kind = Kind::never;
 };
 Crossing crossing(std::vector<std::pair<double, double>> points, double level, bool logarithmic);
 
 /// Runs every combination into folder/runs/<index>, `jobs` at a time, and writes folder/table.csv and table.md after each, and
-/// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that
-/// says so. options: for every run; `progress` gets a line before and after each. Throws InputError where no combination makes a
-/// scene, or a quantity or reference does not fit a scene - before the first run; RunError where a file cannot be written, or
-/// request_stop was called (the rows so far are kept).
+/// folder/plot.png and plot.svg at the end where the study wants one. A combination that is refused or fails gives a row that says so.
+/// options: for every run; `progress` gets a line before and after each.
+/// Throws InputError where no combination makes a scene, or a quantity or reference does not fit a scene - before the first run;
+/// RunError where a file cannot be written, or request_stop was called (the rows so far are kept).
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const std::filesystem::path& folder,
-                     const StudyRunner& run, const std::function<void(const std::string&)>& progress,
-                     const StudyExecution& how = {});
+                     const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how = {});
 
 }  // namespace perikit
