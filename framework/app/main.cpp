@@ -30,6 +30,13 @@ void open_standard_streams() {
       ::open("/dev/null", descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY);  // takes the lowest number that is free
 }
 
+/// A library may end the program where it gets no memory or no thread (the runtime of OpenMP does), and the end of another may then wait for
+/// ever for threads of its own (OpenBLAS). So the program ends here, before the ends of libraries: whatever it wrote is complete.
+void end_at_once(int status, void*) {
+  std::fflush(nullptr);
+  ::_exit(status);
+}
+
 /// Every way in which a command can end.
 int status_of(int argc, char** argv) {
   using namespace perikit;
@@ -72,6 +79,11 @@ int main(int argc, char** argv) {
     setenv("OMP_WAIT_POLICY", "passive", 1);
     execv("/proc/self/exe", argv);
   }
+  // Factorizations have threads of ours or none; those of OpenBLAS would only take memory, 128 MiB each.
+  setenv("OPENBLAS_NUM_THREADS", "1", 0);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)   // these look for leaks at the end
+  ::on_exit(end_at_once, nullptr);
+#endif
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is then an error of the write, with a message
