@@ -2,9 +2,14 @@
 
 #include <cholmod.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <umfpack.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "free_matrix.hpp"
@@ -19,6 +24,18 @@ namespace {
 
 SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) {
   return reinterpret_cast<SuiteSparse_long*>(v.data());
+}
+
+/// Memory that OpenBLAS takes with its first product. Where it gets none it asks again, and for ever.
+constexpr double dense_memory = 128.1 * (1 << 20);
+
+/// What a limit of the address space leaves [bytes]; infinite without one.
+double address_space_left() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return std::numeric_limits<double>::infinity();
+  double pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return static_cast<double>(limit.rlim_cur) - pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 /// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
@@ -64,7 +81,12 @@ struct SparseSolver::Implementation {
   double entries = 0, limit;
 
   explicit Implementation(double memory) : limit(memory) {
-    if (openblas_set_num_threads) openblas_set_num_threads(1);
+    if (openblas_set_num_threads) {
+      openblas_set_num_threads(1);
+      static bool held = false;   // once it has the memory it keeps it
+      if (const double left = address_space_left(); !std::exchange(held, true) && left < dense_memory)
+        throw RunError(fmt::format("not enough memory: dense products take {:.3g} MB, and the limit of this process leaves {:.3g} MB", dense_memory / 1e6, left / 1e6));
+    }
     cholmod_l_start(&common);
     common.print = 0;
     common.supernodal = CHOLMOD_SUPERNODAL;

@@ -78,7 +78,7 @@ TEST_CASE("folders: what a run reads is not where it writes") {
   const Desk other;
   REQUIRE(other.perikit("run scene.toml --quiet -o out").status == 0);
   const std::string results = other.text("out/results.h5"), frame = other.text("out/frames/00000005.h5");
-  for (const std::string from : {"out/results.h5", "out", "./out/../out/results.h5"}) {
+  for (const std::string from : {"out/results.h5", "./out/../out/results.h5"}) {
     other.write("next.toml", plate + fmt::format("\n[initial]\nfrom = \"{}\"\n", from));
     refused(other.perikit("run next.toml --quiet -o out --force"), "results.h5, which is read, where ");
     CHECK(other.text("out/results.h5") == results);
