@@ -18,7 +18,7 @@ void add_commands(CLI::App& app, Options& options) {
   const auto add = [&](const char* name, const char* text, void (*command)(const Options&)) {
     CLI::App* sub = app.add_subcommand(name, text);
     sub->callback([&options, command] { options.command = command; });
-    sub->add_option("--plugin-path", options.plugin_path, "Further folders of plugins, searched first");
+    sub->add_option("--plugin-path", options.plugin_path, "Further folders of plugins, searched first")->allow_extra_args(false);
     return sub;
   };
   const auto with_scene = [&](CLI::App* sub) {

@@ -62,7 +62,7 @@ TEST_CASE("folders: a scene.toml that was changed since is nobody's to replace")
   const std::string changed = desk.text("out/scene.toml") + "# a note of mine\n";
   desk.write("out/scene.toml", changed);
   refused(desk.perikit("run scene.toml --quiet -o out"),
-          "out/scene.toml, which perikit did not write, or which was changed since");
+          "out/scene.toml: output: found a file that perikit did not write, or that was changed since");
   refused(desk.perikit("run out/scene.toml --quiet -o out"), "out/scene.toml, which is read, where ");
   CHECK(desk.text("out/scene.toml") == changed);
 }
@@ -139,7 +139,7 @@ TEST_CASE("folders: studies keep foreign files, too, and a missing scene.toml is
              "= \"strain_energy\"\n");
   fs::create_directories(desk.path("out"));
   desk.write("out/table.csv", "mine");
-  refused(desk.perikit("study study.toml --quiet -o out"), "out/table.csv, beside no study.toml that perikit wrote");
+  refused(desk.perikit("study study.toml --quiet -o out"), "out/table.csv: output: found it beside no study.toml that perikit wrote");
   CHECK(desk.text("out/table.csv") == "mine");
   refused(desk.perikit("study study.toml --quiet -o ."), "study.toml, which is read, where ");
   CHECK(desk.perikit("study study.toml --quiet -o out --force").status == 0);

@@ -87,7 +87,8 @@ void OutputFolder::refuse_inputs(const Use& use) const {
 }
 
 void OutputFolder::refuse_foreign(const Use& use) const {
-  const std::optional<MarkedText> marker = read_marked(marker_);
+  std::optional<MarkedText> marker = read_marked(marker_);
+  if (marker && marker->text.empty()) marker.reset();   // nothing is lost with it
   const bool own = marker ? marker->sealed : use.own;
   std::error_code error;
   for (const std::string& name : use.names) {
@@ -97,11 +98,10 @@ void OutputFolder::refuse_foreign(const Use& use) const {
     const bool link = fs::is_symlink(status);
     if (link && use.force) remove_file(file);  // the link, not what it points to
     if (use.force || (own && !link)) continue;
-    throw InputError({path_.string()}, "output",
-                     fmt::format("found {}, {}; allowed: another folder (-o), or --force, which replaces it", file.string(),
-                                 link                        ? "a symbolic link"
-                                 : marker && file == marker_ ? "which perikit did not write, or which was changed since"
-                                                             : fmt::format("beside no {} that perikit wrote", use.marker)));
+    const std::string what = link                          ? "a symbolic link"
+                             : marker && file == marker_ ? "a file that perikit did not write, or that was changed since"
+                                                         : fmt::format("it beside no {} that perikit wrote", use.marker);
+    throw InputError({file.string()}, "output", fmt::format("found {}; allowed: another folder (-o), or --force, which replaces it", what));
   }
 }
 
