@@ -95,10 +95,10 @@ void check(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   Simulation simulation(scene, *registry);
+  std::string summary = simulation.summary();   // which may still refuse
+  if (options.explain) summary += simulation.explanation(*registry);
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.
-  std::string summary = simulation.summary();
-  if (options.explain) summary += simulation.explanation(*registry);
   std::istringstream lines(summary);
   for (std::string line; std::getline(lines, line);) fmt::print("# {}\n", line);
 }

@@ -1,12 +1,16 @@
 /// The command line: perikit run | check | study | plot | bench | new | contract | list | describe.
 
+#include <dlfcn.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <iostream>
 #include <new>
 
@@ -58,7 +62,39 @@ int status_of(int argc, char** argv) {
     if (std::ferror(stdout)) return app::run_failed;  // said by the caller
     tell(fmt::format("internal error: {}\n", e.what()));
     return app::run_failed;
+  } catch (...) {
+    tell("internal error: something that is no std::exception was thrown; a library of parts may have done so\n");
+    return app::run_failed;
   }
+}
+
+/// The first library of parts on the stack.
+std::string library_on_stack() {
+  std::array<void*, 64> frames;
+  const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
+  for (int k = 0; k < count; ++k) {
+    Dl_info info{};
+    if (::dladdr(frames[static_cast<std::size_t>(k)], &info) == 0 || !info.dli_fname) continue;
+    void* const library = ::dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD);  // null for the program itself
+    if (library && ::dlsym(library, "perikit_register")) return info.dli_fname;
+  }
+  return {};
+}
+
+/// What a part throws where it may not (a law in the middle of a loop over points, say) ends the program; it is named here.
+[[noreturn]] void end_of_exception() noexcept {
+  const std::string library = library_on_stack();
+  std::string what = "something that is no std::exception";
+  if (const std::exception_ptr thrown = std::current_exception()) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const std::exception& error) {
+      what = error.what();
+    } catch (...) {
+    }
+  }
+  perikit::tell(fmt::format("the run failed: {} threw where nothing may be thrown: {}\n", library.empty() ? "a part or perikit itself" : library, what));
+  ::_exit(perikit::app::run_failed);
 }
 
 /// What was printed has to arrive: a full disk behind standard output is a failure.
@@ -84,6 +120,7 @@ int main(int argc, char** argv) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)   // these look for leaks at the end
   ::on_exit(end_at_once, nullptr);
 #endif
+  std::set_terminate(end_of_exception);
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is then an error of the write, with a message

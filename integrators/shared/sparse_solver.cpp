@@ -78,7 +78,7 @@ struct SparseSolver::Implementation {
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   void *symbolic = nullptr, *numeric = nullptr;
   bool analysed = false, definite = false, ready = false;
-  double entries = 0, limit;
+  double entries = 0, limit, reciprocal_condition = 1;
 
   explicit Implementation(double memory) : limit(memory) {
     if (openblas_set_num_threads) {
@@ -155,6 +155,7 @@ struct SparseSolver::Implementation {
       failure =
           fmt::format("not enough memory for the Cholesky factor of {} unknowns ({:.3g} numbers)", free.unknowns(), common.lnz);
     entries = common.lnz;
+    if (definite) reciprocal_condition = cholmod_l_rcond(cholesky, &common);
     return definite;
   }
 
@@ -170,6 +171,7 @@ struct SparseSolver::Implementation {
       status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
     if (status == UMFPACK_OK) {
       entries = info[UMFPACK_LNZ] + info[UMFPACK_UNZ];
+      reciprocal_condition = info[UMFPACK_RCOND];
       return true;
     }
     failure = status == UMFPACK_WARNING_singular_matrix ? "the tangent is singular: part of the body is free to move"
@@ -232,6 +234,9 @@ bool SparseSolver::positive_definite() const noexcept {
 }
 std::size_t SparseSolver::unknowns() const noexcept {
   return implementation_->free.unknowns();
+}
+double SparseSolver::reciprocal_condition() const noexcept {
+  return implementation_->reciprocal_condition;
 }
 double SparseSolver::factor_entries() const noexcept {
   return implementation_->entries;

@@ -181,6 +181,12 @@ void Verlet::run(Problem& problem, Observer& observer) {
     return r;
   };
   const bool fresh = dt == 0;
+  double& planned_end = state.declare_numbers("planned_end", 1)[0];
+  if (!fresh && planned_end != options_.end_time) {
+    make_plan(dt);   // not the step: only its end is another
+    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time, planned_end, counter, dt));
+  }
+  planned_end = options_.end_time;
   if (fresh) {
     check_time_step(problem, options_.values, &observer);
     make_plan(estimated ? stable_step(problem) : options_.time_step);

@@ -9,6 +9,7 @@
 #include "build/damage.hpp"
 #include "build/image_planes.hpp"
 #include "build/materials.hpp"
+#include "build/questionable.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
@@ -81,8 +82,10 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
 
 std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
+  const auto influence = factory.influence(*scene.influence);
+  if (needs.influence) refuse_no_influence(scene, *influence);
   try {
-    return Families::make(body, factory.influence(*scene.influence), needs);
+    return Families::make(body, influence, needs);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
   }
@@ -133,6 +136,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, partition, constraints, quasi_static, state);
+  parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -87,9 +88,19 @@ Planned plan(const Study& study, const std::vector<std::size_t>& combination, Pa
   return planned;
 }
 
-std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const SceneOptions& options) {
+/// Reads the scene of every combination; of many, says so from the start.
+std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const SceneOptions& options, const std::function<void(const std::string&)>& progress) {
   std::vector<Planned> runs;
-  for (const auto& combination : combinations(study)) runs.push_back(plan(study, combination, parts, options));
+  const auto all = combinations(study);
+  auto told = std::chrono::steady_clock::now();
+  if (all.size() > 200) progress(fmt::format("{} combinations; reading their scenes", all.size()));
+  for (const auto& combination : all) {
+    runs.push_back(plan(study, combination, parts, options));
+    if (stop_requested()) throw RunError("stopped by a signal before the first run");
+    if (std::chrono::steady_clock::now() - told < std::chrono::seconds(5)) continue;
+    told = std::chrono::steady_clock::now();
+    progress(fmt::format("{} of {} scenes read", runs.size(), all.size()));
+  }
   if (std::ranges::none_of(runs, [](const Planned& run) { return run.scene.has_value(); })) {
     throw InputError(
         {study.file.string()}, "values",
@@ -173,7 +184,7 @@ std::vector<std::vector<std::size_t>> combinations(const Study& study) {
 
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
                      const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how) {
-  std::vector<Planned> runs = plan_all(study, parts, options);
+  std::vector<Planned> runs = plan_all(study, parts, options, progress);
   const OutputFolder output(folder, {.marker = "study.toml",
                                      .names = {"study.toml", "table.csv", "table.md", "plot.png", "plot.svg", "runs"},
                                      .inputs = {study.file, study.scene},

@@ -106,6 +106,8 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     return failed("not enough memory");
   } catch (const std::exception& error) {
     return failed(error.what());
+  } catch (...) {
+    return failed("a library of parts threw something that is no std::exception");
   }
   return outcome;
 }

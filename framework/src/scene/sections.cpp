@@ -59,6 +59,8 @@ ParameterTable lattice_parameters() {
       .at_least(0)
       .at_most(0.5)
       .by_default("0.0");
+  table.number("weak_springs", "-", "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, where they are. "
+                                    "Without it such a piece is refused.").positive().at_most(1.0);
   table.integer("seed", "Seed of the random shift; default: run.seed.").at_least(0);
   return table;
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -38,11 +39,14 @@ class Simulation {
   void refuse_gradients() const;
   /// InputError where a load, a boundary or the exact values of a history column have no finite value at the start or the end.
   void evaluate_conditions();
+  /// InputError where nothing holds a piece of a body whose equilibrium is looked for.
+  void watch_pieces();
 
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
   std::unique_ptr<BodyProblem> problem_;
+  std::string carried_, loose_;   ///< from an earlier run, by weak springs; in words
 };
 
 /// The columns of history.csv: the standard ones, then those that the scene asks for.
@@ -75,7 +79,10 @@ struct OutputProgress {
   std::int64_t history_every = 0;              ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
+  double frame_spacing = 0;                    ///< of [output] frames: it stays where a run is lengthened
   EnergyBalance energies;
+  std::vector<std::int64_t> frame_fingerprints;   ///< of the files of these frames
+  std::int64_t history_fingerprint = 0;        ///< of the values in these rows; 0: none yet
 };
 
 class OutputFolder;
@@ -110,6 +117,11 @@ class RunRecorder final : public Observer {
  private:
   void start_fresh(RunStart start);
   void start_from_checkpoint();
+  /// InputError where a run that is lengthened cannot be.
+  void check_longer() const;
+  std::filesystem::path frame_file(std::int64_t index) const;
+  /// InputError naming the file where frames or history are not those that the run wrote.
+  void check_kept_files() const;
   bool checkpoint_due(std::int64_t step, double time) const;
   void keep_checkpoint(const StepReport& report);
   bool frame_due(std::int64_t step, double time) const;
@@ -121,7 +133,8 @@ class RunRecorder final : public Observer {
   void watch_energies(const StepReport& report, bool recorded);
   /// What the end of the run warns of; empty where the energies add up.
   std::string energy_warning() const;
-  void write_history(const StepReport& report);
+  /// counts: not a row of a stop alone.
+  void write_history(const StepReport& report, bool counts);
   void progress(const StepReport& report);
   /// Whether a line of progress is due, which is then taken to be shown.
   bool line_due();
@@ -155,6 +168,7 @@ class RunRecorder final : public Observer {
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
   double first_time_ = 0;
   std::vector<std::string> warnings_;
+  std::set<std::string> strange_fields_;   ///< that were not finite somewhere
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.
