@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "free_matrix.hpp"
+#include "perikit/core/errors.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 

@@ -86,7 +86,7 @@ TEST_CASE("loose pieces: weak springs hold them, and are told of") {
     const Desk desk(replaced(scene, "left = \"x < 2\"", "left = \"x < 2\"\nmiddle = \"x > 2 && x < 4\""));
     const std::string springs = fmt::format(" --set run.weak_springs={} --set 'load=[{{set=\"middle\",force=[0.01,0]}}]'", k);
     const Result run = desk.perikit("run scene.toml -o out" + springs);
-    CHECK_MESSAGE(run.status == 0, run.err);
+    REQUIRE_MESSAGE(run.status == 0, run.err);
     CHECK_MESSAGE(
         contains(run.out,
                  "nothing but weak springs (0.0001 of a point's stiffness) holds a piece of 20 points about (6, 2.5, 0)"),
@@ -101,7 +101,7 @@ TEST_CASE("loose pieces: weak springs hold them, and are told of") {
       desk.perikit(fmt::format("run scene.toml -o out --set run.weak_springs={} --set "
                                "'load=[{{set=\"right\",body_force=[1e-8,0]}}]' --set 'sets.right=\"x > 4\"'",
                                k));
-  CHECK_MESSAGE(run.status == 0, run.err);
+  REQUIRE_MESSAGE(run.status == 0, run.err);
   const double mu = 0.8, lambda = 2.0 - 2.0 / 3.0 * mu;
   CHECK(read_frames(desk.path("out")).back().displacement[3 * 6] ==
         doctest::Approx(1e-8 / (k * (lambda + 2 * mu))).epsilon(1e-6));

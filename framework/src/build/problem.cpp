@@ -82,7 +82,7 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
 
 std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
-  const auto influence = factory.influence(*scene.influence);
+  const std::shared_ptr<const InfluenceFunction> influence = factory.influence(*scene.influence);
   if (needs.influence) refuse_no_influence(scene, *influence);
   try {
     return Families::make(body, influence, needs);

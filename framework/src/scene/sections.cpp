@@ -59,8 +59,6 @@ ParameterTable lattice_parameters() {
       .at_least(0)
       .at_most(0.5)
       .by_default("0.0");
-  table.number("weak_springs", "-", "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, where they are. "
-                                    "Without it such a piece is refused.").positive().at_most(1.0);
   table.integer("seed", "Seed of the random shift; default: run.seed.").at_least(0);
   return table;
 }
@@ -207,6 +205,8 @@ ParameterTable run_parameters() {
   table.boolean("share", "Compute what is equal once: bonds for both of their ends, stencils for equal families. false only to compare: the "
                          "result is the same to rounding.").by_default("true");
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
+  table.number("weak_springs", "-", "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, where they are. "
+                                    "Without it such a piece is refused.").positive().at_most(1.0);
   table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;
 }
