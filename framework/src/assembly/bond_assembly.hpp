@@ -54,6 +54,7 @@ class BondAssembly final : public Assembly {
   const BlockRows& rows_;
   const Laws& laws_;
   const Formulation& formulation_;
+  std::span<const double> factors_;  ///< of the weights; empty: 1
   bool mean_, symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each

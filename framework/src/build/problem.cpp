@@ -12,13 +12,16 @@
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
+#include "spaces/consistency.hpp"
 
 namespace perikit {
 
 namespace {
 
 /// The number of the material of ghosts and images, after those of the scene.
-std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint16_t>(scene.regions.size() + 1); }
+std::uint16_t image_material(const Scene& scene) {
+  return static_cast<std::uint16_t>(scene.regions.size() + 1);
+}
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
@@ -79,13 +82,39 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
   return factory.stabilization(*scene.stabilization);
 }
 
-std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
+std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body,
+                                         const Formulation& formulation) {
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
   try {
     return Families::make(body, factory.influence(*scene.influence), needs);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
   }
+}
+
+/// What is asked of a cloud with consistent = true; null where it is not.
+std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const ProblemParts& parts,
+                                                    const Formulation& formulation) {
+  if (!scene.consistent.value_or(false)) return nullptr;
+  const auto refuse = [&](const std::string& found, const std::string& allowed) {
+    throw InputError(scene.consistent_position, "family.consistent", fmt::format("found true {}; allowed: {}", found, allowed));
+  };
+  if (parts.body->lattice())
+    refuse("on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0");
+  if (parts.partition) refuse("with several ranks", "one rank");
+  if (!formulation.bond && !(formulation.weighted && formulation.parts(parts.body->dimension()) != 1))
+    refuse(fmt::format("with kinematics \"{}\", which has no weights to choose", scene.kinematics->type),
+           "kinematics with evaluation points at bonds or parts of families");
+  if (formulation.force_state == ForceState::local)
+    refuse("with force_state = \"local\", whose forces are not -dE/du", "force_state = \"variational\"");
+  if (formulation.selective()) refuse("with kinematics \"selective\"", "false");
+  auto consistency = std::make_shared<CloudConsistency>();
+  if (const ImageMap* images = parts.images.get()) {
+    consistency->extend = [images](FieldView u) { images->extend(u); };
+    consistency->fold = [images](FieldView force) { images->fold(force); };
+    consistency->copy_from_sources = [images](FieldView field) { images->copy_from_sources(field); };
+  }
+  return consistency;
 }
 
 /// Refuses laws with history where the path has no steps, and where forces are not the derivative of their work.
@@ -95,13 +124,15 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
     if (laws.records()[id].material->state_components(laws.space()) == 0) continue;
     const PartValues& part = *sources[id];
     const auto refuse = [&](const std::string& with, const std::string& allowed) {
-      throw InputError(part.values.position("type"), part.values.path() + ".type",
-                       fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
+      throw InputError(
+          part.values.position("type"), part.values.path() + ".type",
+          fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
     if (quasi_static)
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
              "an explicit integrator, or another material");
-    if (formulation.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+    if (formulation.force_state == ForceState::local)
+      refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
 }
 
@@ -113,9 +144,10 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   Beyond beyond = place_points(scene, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
-  const bool others = partition || parts.images;   // points that store nothing
+  const bool others = partition || parts.images;  // points that store nothing
 
-  TermParts of_terms{.formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
+  TermParts of_terms{
+      .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
   refuse_stress(scene, body, of_terms.formulation);
   parts.laws = build_laws(scene, factory, body, others);
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
@@ -124,6 +156,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), quasi_static, partition != nullptr));
   of_terms.damage = parts.fracture.damage();
+  of_terms.consistency = build_consistency(scene, parts, of_terms.formulation);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
@@ -135,7 +168,8 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   set_initial_state(scene, body, partition, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
-  ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
+  ProblemValues values{
+      body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }
 
