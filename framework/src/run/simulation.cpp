@@ -105,6 +105,7 @@ std::string Simulation::summary() {
                         problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : problem_->warnings()) text += fmt::format("warning       {}\n", warning);
+  for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
   if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from)) {

@@ -13,11 +13,20 @@ Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
   if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
 }
 
-BatchWork Mechanics::work(Work kind, bool energy) const noexcept { return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()}; }
+void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
+  if (!consistency->found) find_consistency(parts_, *space_, *consistency);
+  consistency_ = std::move(consistency);
+  parts_.factors = consistency_->factors;
+  space_->set_factors(parts_.factors);
+}
+
+BatchWork Mechanics::work(Work kind, bool energy) const noexcept {
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()};
+}
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);   // summed in the order of the blocks
+  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);  // summed in the order of the blocks
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
   if (energy) *energy = std::accumulate(energies.begin(), energies.end(), *energy);
@@ -81,6 +90,7 @@ std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const 
 void Mechanics::report(ModelReport& report) const {
   space_->report(report);
   if (history_) report.bytes += history_->bytes();
+  if (consistency_) consistency_->report(report);
 }
 
 }  // namespace perikit

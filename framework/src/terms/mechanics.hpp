@@ -1,12 +1,13 @@
 #pragma once
 #include "perikit/operators/law_history.hpp"
+#include "spaces/consistency.hpp"
 #include "spaces/evaluation_space.hpp"
 #include "terms/term.hpp"
 
 namespace perikit {
 
-/// Laws at the evaluation points of a space: E = sum_q W_q psi(F_q), with the map between the gradients of the space and those of the laws.
-/// Force, tangent action, energy and samples stand here once, for every space.
+/// Laws at the evaluation points of a space: E = sum_q W_q psi(F_q), with the map between the gradients of the space and those of
+/// the laws. Force, tangent action, energy and samples stand here once, for every space.
 class Mechanics final : public Term {
  public:
   explicit Mechanics(const SpaceParts& parts);
@@ -24,6 +25,8 @@ class Mechanics final : public Term {
 
   /// Of the laws; null where none has one.
   LawHistory* history() noexcept { return history_.get(); }
+  /// A constant stress is in equilibrium from now on, where the body is whole.
+  void balance(std::shared_ptr<CloudConsistency> consistency);
   void history_restored() { space_->history_restored(); }
 
  private:
@@ -32,6 +35,7 @@ class Mechanics final : public Term {
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
+  std::shared_ptr<const CloudConsistency> consistency_;
 };
 
 }  // namespace perikit
