@@ -65,7 +65,7 @@ Moduli elastic_constants(const MaterialInput& input) {
   if (has[1] && !(nu > -1 && nu < 0.5)) refuse(names[1], nu, "a value > -1 and < 0.5");
   if (has[1] && 1 - 2 * nu < smallest_difference)
     refuse(names[1], nu, fmt::format("a value below 0.5 by more than {}: closer to it, rounding decides the bulk modulus; give the bulk modulus itself", smallest_difference / 2));
-  if (has[0] && has[2] && std::abs(3 * mu - E) < smallest_difference * mu)
+  if (has[0] && has[2] && E != 3 * mu && std::abs(3 * mu - E) < smallest_difference * mu)
     refuse(names[0], E, fmt::format("a value that differs from three times the shear modulus by more than {} of it: closer, rounding decides the bulk modulus", smallest_difference));
   if (has[2]) positive(names[2], mu);
   if (has[3]) positive(names[3], bulk);

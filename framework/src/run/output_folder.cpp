@@ -88,7 +88,7 @@ void OutputFolder::refuse_inputs(const Use& use) const {
 
 void OutputFolder::refuse_foreign(const Use& use) const {
   std::optional<MarkedText> marker = read_marked(marker_);
-  if (marker && marker->text.empty()) marker.reset();   // nothing is lost with it
+  if (marker && marker->text.empty() && !marker->sealed) marker.reset();   // nothing is lost with it
   const bool own = marker ? marker->sealed : use.own;
   std::error_code error;
   for (const std::string& name : use.names) {
