@@ -55,6 +55,7 @@ class BondAssembly final : public Assembly {
   const Laws& laws_;
   const Formulation& formulation_;
   std::span<const double> factors_;  ///< of the weights; empty: 1
+  ConstFieldView shift_;             ///< of point gradients; without data: none
   bool mean_, symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each

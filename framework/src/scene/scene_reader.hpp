@@ -24,6 +24,7 @@ class SceneReader {
   void read_body(const toml::table& root);
   void read_lattice(const toml::table& body);
   void read_points(const toml::table& body);
+  void read_points_box(const ParameterValues& values);
   void read_sets(const toml::table& root);
   void read_family(const toml::table& root);
   void read_parts(const toml::table& root);
@@ -56,7 +57,7 @@ class SceneReader {
 
   PartCatalogue& parts_;
   TomlReader reader_;
-  bool lattice_seed_ = false;   ///< body.lattice has a seed of its own
+  bool lattice_seed_ = false;  ///< body.lattice has a seed of its own
   ResolvedWriter writer_;
   Scene scene_;
   std::vector<std::string> set_names_;
