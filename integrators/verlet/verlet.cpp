@@ -18,10 +18,25 @@ namespace {
 class Stepper {
  public:
   explicit Stepper(Problem& problem)
-      : problem_(problem), state_(problem.state()), constraints_(problem.constraints()), u_(state_.displacement()),
-        v_(state_.declare("half_step_velocity")), force_(state_.internal_force()), mass_(problem.masses().by_point().data()),
-        uniform_(problem.masses().uniform()), loaded_(problem.loads().any()), external_(loaded_ ? state_.external_force() : FieldView{}) {
-    if (loaded_) problem.loads().evaluate(state_.time, external_);
+      : problem_(problem),
+        state_(problem.state()),
+        constraints_(problem.constraints()),
+        u_(state_.displacement()),
+        v_(state_.declare("half_step_velocity")),
+        force_(state_.internal_force()),
+        mass_(problem.masses().by_point().data()),
+        uniform_(problem.masses().uniform()),
+        loaded_(problem.loads().any()),
+        external_(loaded_ ? state_.external_force() : FieldView{}) {
+    if (loaded_) load();
+  }
+
+  /// Loads at the present state.
+  void load() {
+    const EvaluationStatus status = problem_.external_forces(u_, state_.time, external_);
+    if (!status.ok())
+      throw RunError(
+          fmt::format("step {}, time {:.6g} s: loads that follow the surface: {}", state_.step, state_.time, status.description));
   }
 
   void evaluate(double* energy, double dt) {
@@ -191,7 +206,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     stepper.evaluate(sample ? &state.energies.strain : nullptr, dt);
     if (old_external.size() > 0) {
       std::copy_n(stepper.external().data, old_external.size(), old_external.data());
-      problem.loads().evaluate(t_next, stepper.external());
+      stepper.load();
     }
     stepper.prescribed_speed(t_next, speeds);
     stepper.add_work(dt, old_external);

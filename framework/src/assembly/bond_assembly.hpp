@@ -56,7 +56,8 @@ class BondAssembly final : public Assembly {
   const Formulation& formulation_;
   std::span<const double> factors_;  ///< of the weights; empty: 1
   ConstFieldView shift_;             ///< of point gradients; without data: none
-  bool mean_, symmetric_;
+  double far_share_;
+  bool symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
   AlignedVector<double> Hbar_;                     ///< by row

@@ -177,15 +177,25 @@ void describe(const char* label, const Balanced& result, const std::string& what
 
 void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudConsistency& out) {
   const auto begin = std::chrono::steady_clock::now();
-  const ClosedPoints closed = find_closed_points(parts.families, out.copy_from_sources);
+  ClosedPoints closed = find_closed_points(parts.families, out.copy_from_sources);
+  const auto find = [&] {
+    out.gradients = out.weights = {};
+    out.bounded = 0;
+    if (parts.formulation.point || parts.formulation.selective()) {
+      out.shift = with_dimension(parts.families.body().dimension(),
+                                 [&](auto d) { return find_shift<d>(*parts.families.cloud(), closed, out, out.gradients); });
+      space.shift_gradients(out.shift);
+    }
+    if (space.factors() > 0) find_weights(parts, space, closed, out);
+  };
+  find();
+  if (std::max(out.gradients.after, out.weights.after) > acceptable_residual && !closed.at_surfaces.empty()) {
+    // Evaluation points near surfaces may be too few: then the inside alone.
+    closed.at_surfaces.clear();
+    find();
+  }
   out.whole = closed.whole.size();
   out.at_surfaces = closed.at_surfaces.size();
-  if (parts.formulation.point || parts.formulation.selective()) {
-    out.shift = with_dimension(parts.families.body().dimension(),
-                               [&](auto d) { return find_shift<d>(*parts.families.cloud(), closed, out, out.gradients); });
-    space.shift_gradients(out.shift);
-  }
-  if (space.factors() > 0) find_weights(parts, space, closed, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   out.found = true;
 }

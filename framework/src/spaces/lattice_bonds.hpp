@@ -47,16 +47,17 @@ class LatticeBonds final : public EvaluationSpace {
   const LatticeTiles& tiles_;
   const Formulation& formulation_;
   const Laws& laws_;
-  bool selective_, mean_;
-  bool pairs_;                       ///< each bond evaluated once for both ends
-  bool two_states_;                  ///< and yet with a history of its own for each
-  LatticeOperator<D> operator_;      ///< order 1
-  std::optional<LatticeStencils<D>> stencils_;   ///< higher orders
-  Field flux_;                       ///< the stress on Hbar, then Q
-  Field gradient_, direction_;       ///< Hbar of u and of w
-  Field scale_;                      ///< V_i / N_i of bond weights
-  Field volume_, pressure_;          ///< selective: volume changes of points; pressures (and their rates) on them
-  int slots_at_once_;                ///< of a bond batch
+  bool selective_;
+  double far_share_;
+  bool pairs_;                                  ///< each bond evaluated once for both ends
+  bool two_states_;                             ///< and yet with a history of its own for each
+  LatticeOperator<D> operator_;                 ///< order 1
+  std::optional<LatticeStencils<D>> stencils_;  ///< higher orders
+  Field flux_;                                  ///< the stress on Hbar, then Q
+  Field gradient_, direction_;                  ///< Hbar of u and of w
+  Field scale_;                                 ///< V_i / N_i of bond weights
+  Field volume_, pressure_;                     ///< selective: volume changes of points; pressures (and their rates) on them
+  int slots_at_once_;                           ///< of a bond batch
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern of the set-up: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
