@@ -30,15 +30,13 @@ std::vector<Example> kinematics_examples() {
     std::replace(table.begin(), table.end(), '\n', ',');
     const auto part = parse_part(Kind::stabilization, example.part, example.table, subject().registry);
     for (const char* order : {"", "order = 2"})
-      all.push_back(
-          {"conventional", order, fmt::format("{{ {} }}", table), subject().registry.stabilization(*part)->traits().isotropic});
+      all.push_back({"conventional", order, fmt::format("{{ {} }}", table), subject().registry.stabilization(*part)->traits().isotropic});
   }
   return all;
 }
 
 std::string kinematics_table(const Example& example) {
-  const std::string stabilization =
-      example.stabilization.empty() ? "" : fmt::format("stabilization = {}\n", example.stabilization);
+  const std::string stabilization = example.stabilization.empty() ? "" : fmt::format("stabilization = {}\n", example.stabilization);
   return fmt::format("type = \"{}\"\n{}{}", example.part, stabilization, example.table);
 }
 
@@ -55,8 +53,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   std::string text = "format = 1\n[body]\n";
   text += fmt::format("dimension = {}\n", d);
   if (d == 2) text += fmt::format("plane = \"{}\"\nthickness = {:.17g}\n", o.plane, 1.5 * o.scale);
-  if (d == 1)
-    text += fmt::format("line = \"{}\"\narea = {:.17g}\n", o.plane == "stress" ? "stress" : "strain", 1.5 * o.scale * o.scale);
+  if (d == 1) text += fmt::format("line = \"{}\"\narea = {:.17g}\n", o.plane == "stress" ? "stress" : "strain", 1.5 * o.scale * o.scale);
   text += fmt::format("[body.lattice]\nspacing = {:.17g}\nlower = {}\nupper = {}\n", o.scale, vector([](int) { return 0.0; }),
                       vector([&](int a) { return o.scale * cells[static_cast<std::size_t>(a)]; }));
   if (o.cloud) text += "jitter = 0.25\nseed = 7\n";
@@ -66,30 +63,23 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   if (o.consistent) text += "consistent = true\n";
   text += "[kinematics]\n" + kinematics + "\n[material]\n" + o.material + "\n";
   if (o.two_materials) {
-    text += fmt::format(
-        "[[region]]\nset = \"part\"\nmaterial = {{ type = \"neo_hookean\", density = 2.0, shear_modulus = {:.17g}, bulk_modulus "
-        "= {:.17g} }}\n",
-        0.4 * o.modulus, 1.3 * o.modulus);
+    text += fmt::format("[[region]]\nset = \"part\"\nmaterial = {{ type = \"neo_hookean\", density = 2.0, shear_modulus = {:.17g}, bulk_modulus = {:.17g} }}\n",
+                        0.4 * o.modulus, 1.3 * o.modulus);
   }
   if (o.crack && d == 2) {
-    text += fmt::format("[[crack]]\nsegment = [[-1.0, {0:.17g}], [{1:.17g}, {0:.17g}]]\n", 0.5013 * o.scale * cells[1],
-                        0.55 * o.scale * cells[0]);
+    text += fmt::format("[[crack]]\nsegment = [[-1.0, {0:.17g}], [{1:.17g}, {0:.17g}]]\n", 0.5013 * o.scale * cells[1], 0.55 * o.scale * cells[0]);
   }
   if (o.crack && d == 3) {
     const double z = 0.5013 * o.scale * cells[2], x = 0.45 * o.scale * cells[0], y = o.scale * (cells[1] + 1);
-    text += fmt::format(
-        "[[crack]]\npolygon = [[-1.0, -1.0, {0:.17g}], [{1:.17g}, -1.0, {0:.17g}], [{1:.17g}, {2:.17g}, {0:.17g}], [-1.0, "
-        "{2:.17g}, {0:.17g}]]\n",
-        z, x, y);
+    text += fmt::format("[[crack]]\npolygon = [[-1.0, -1.0, {0:.17g}], [{1:.17g}, -1.0, {0:.17g}], [{1:.17g}, {2:.17g}, {0:.17g}], [-1.0, {2:.17g}, {0:.17g}]]\n", z, x, y);
   }
   text += "[integrator]\n" + o.integrator + "\n[run]\n" + fmt::format("skip = {}\nshare = {}\n", o.skip, o.share) + o.conditions;
   return text;
 }
 
 std::string Case::label() const {
-  return fmt::format("{} ({}{}) {}D {}{}{}{}", example.part, example.table, example.stabilization, body.dimension,
-                     body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "", body.two_materials ? " two materials" : "",
-                     body.plane == "stress" ? " plane stress" : "");
+  return fmt::format("{} ({}{}) {}D {}{}{}{}", example.part, example.table, example.stabilization, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
+                     body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
 }
 
 Formulation formulation_of(const Example& example) {
@@ -97,9 +87,7 @@ Formulation formulation_of(const Example& example) {
   return make_formulation(registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, registry)));
 }
 
-bool Case::conservative() const {
-  return formulation_of(example).force_state == ForceState::variational;
-}
+bool Case::conservative() const { return formulation_of(example).force_state == ForceState::variational; }
 
 std::vector<Case> cases() {
   std::vector<Case> all;

@@ -39,7 +39,7 @@ void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, st
     const std::int32_t* column = K.column.data() + K.row_first[row];
     double* block = K.values.data() + K.row_first[row] * (D * D);
     for (std::size_t l = 0; l < nodes.size(); ++l, ++column, block += D * D) {
-      for (; *column != nodes[l]; ++column) block += D * D;  // both ascend
+      for (; *column != nodes[l]; ++column) block += D * D;   // both ascend
       const bool there = !symmetric || k / padding <= l / padding;
       for (std::size_t a = 0; a < D; ++a)
         for (std::size_t b = 0; b < D; ++b)
@@ -49,12 +49,10 @@ void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, st
 }
 
 template <int D>
-void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out,
-                   ElementScratch<D>& s) {
+void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out, ElementScratch<D>& s) {
   const auto neighbours = rows.neighbours(row);
   out.nodes = static_cast<int>(neighbours.size()) + 1;
-  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) -
-                             neighbours.begin());
+  out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) - neighbours.begin());
   out.width = padded(static_cast<std::size_t>(out.nodes));
   out.weight.clear();
   out.test.clear();
@@ -77,8 +75,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     return;
   }
   bond_shares(rows.families(), p, formulation.weight, s.family, s.share);
-  s.stencil.build({&formulation, horizon}, s.family, s.share.data(), 0, nullptr,
-                  rows.families().normaliser(p, BondWeight::volume));
+  s.stencil.build({&formulation, horizon}, s.family, s.share.data(), 0, nullptr, rows.families().normaliser(p, BondWeight::volume));
   s.stencil.expand(s.gradient);
   const int owners = formulation.selective() ? 1 : 0;
   const std::vector<double>& tested = s.stencil.tested();
@@ -91,10 +88,8 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     const auto gradient = [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; };
     if (!tested.empty()) {
       out.g.swap(out.test);
-      const int own = q - owners;  // the bond of the evaluation point, the only one that its stress acts on
-      write_point<D>(out, to, [&](int k, int e) {
-        return own < 0 ? gradient(k, e) : k == own ? tested[static_cast<std::size_t>(k)] * gradient(k, e) : 0.0;
-      });
+      const int own = q - owners;   // the bond of the evaluation point, the only one that its stress acts on
+      write_point<D>(out, to, [&](int k, int e) { return own < 0 ? gradient(k, e) : k == own ? tested[static_cast<std::size_t>(k)] * gradient(k, e) : 0.0; });
       out.g.swap(out.test);
     }
     write_point<D>(out, to++, gradient);

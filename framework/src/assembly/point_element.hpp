@@ -22,20 +22,18 @@ struct ElementShape {
 /// The nodes of a row, ascending: its family and the point itself. Returns the place of the point.
 std::size_t element_nodes(const BlockRows& rows, std::size_t row, std::vector<std::int32_t>& nodes);
 
-/// K += S over these nodes: S[a][b][k][l], width x width each. symmetric: only tiles of 8 x 8 on and above the diagonal are
-/// there.
+/// K += S over these nodes: S[a][b][k][l], width x width each. symmetric: only tiles of 8 x 8 on and above the diagonal are there.
 template <int D>
 void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, std::size_t width, bool symmetric, BlockMatrix& K);
 
 /// Nodes: the owner and its family, ascending.
 template <int D>
 struct PointElement {
-  int nodes = 0, own = 0;   ///< own: place of the owner among the nodes
-  int points = 0;           ///< evaluation points with a weight
-  std::size_t width = 0;    ///< padded(nodes)
-  AlignedVector<double> g;  ///< [q][e][node], the owner's own gradient first (with the selective map), then points
-  AlignedVector<double>
-      test;  ///< likewise what stresses are tested with, where that is another thing (local force states); else empty
+  int nodes = 0, own = 0;      ///< own: place of the owner among the nodes
+  int points = 0;              ///< evaluation points with a weight
+  std::size_t width = 0;       ///< padded(nodes)
+  AlignedVector<double> g;     ///< [q][e][node], the owner's own gradient first (with the selective map), then points
+  AlignedVector<double> test;  ///< likewise what stresses are tested with, where that is another thing (local force states); else empty
   std::vector<double> weight;  ///< W_q [m^3]
   const double* row(int q, int e) const noexcept { return g.data() + static_cast<std::size_t>(q * D + e) * width; }
 };
@@ -52,7 +50,8 @@ struct ElementScratch {
 };
 
 template <int D>
-void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out, ElementScratch<D>& s);
+void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out,
+                   ElementScratch<D>& s);
 
 /// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch.
 template <int D>

@@ -14,13 +14,13 @@ struct SkipNote {
 };
 
 struct ModelReport {
-  std::size_t bytes = 0;  ///< of families, references and work fields
-  std::size_t bonds = 0;  ///< directed, intact
+  std::size_t bytes = 0;                      ///< of families, references and work fields
+  std::size_t bonds = 0;                      ///< directed, intact
   std::size_t evaluation_points = 0;
-  std::size_t broken_bonds = 0;       ///< cut by pre-cracks
-  std::size_t singular_families = 0;  ///< points without a gradient of their own: H = 0
-  std::size_t fallbacks = 0;          ///< evaluation points that use the whole family, or a lower order
-  std::size_t dropped_parts = 0;      ///< parts of families without a gradient of their own
+  std::size_t broken_bonds = 0;               ///< cut by pre-cracks
+  std::size_t singular_families = 0;          ///< points without a gradient of their own: H = 0
+  std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family, or a lower order
+  std::size_t dropped_parts = 0;              ///< parts of families without a gradient of their own
   std::vector<SkipNote> skips;
   std::vector<std::string> warnings;                       ///< one line each
   std::vector<std::pair<std::string, std::string>> notes;  ///< further lines of run.log: label and text
