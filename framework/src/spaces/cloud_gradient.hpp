@@ -1,6 +1,6 @@
 #pragma once
-/// Point gradients on a cloud and their adjoint, one point at a time over its sorted neighbours. Rows run over displacement
-/// components: H[D p + e][c] = H_ce.
+/// Point gradients on a cloud and their adjoint, one point at a time over its sorted neighbours. Rows run over displacement components:
+/// H[D p + e][c] = H_ce.
 ///
 ///   order 1:   S = sum_j omega V_j u_ij (x) xi_ij,  H = S K^-1;   f_i = sum_j omega xi_ij (V_j Q_i + V_i Q_j),  Q = P K^-1
 ///   order 2+:  H = sum_j u_ij (x) g_ij with stored g;             f_i += P_i g_ij,  f_j -= P_i g_ij
@@ -158,7 +158,7 @@ class CloudGradient {
   bool store_stencil(std::size_t p);
 
   const CloudFamilies& families_;
-  const Row* position_;  ///< {x, y, z, V}
+  const Row* position_;                  ///< {x, y, z, V}
   int order_;
   AlignedVector<double> stencil_;  ///< g[D * bond + e]
   AlignedVector<Row> lambda_;      ///< by point; empty: not shifted

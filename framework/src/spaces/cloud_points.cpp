@@ -6,13 +6,8 @@ namespace perikit {
 
 template <int D>
 CloudPoints<D>::CloudPoints(const SpaceParts& parts)
-    : families_(*parts.families.cloud()),
-      laws_(parts.laws),
-      points_(families_.body().points()),
-      position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
-      gradient_(families_),
-      u_(points_),
-      flux_(D * points_) {
+    : families_(*parts.families.cloud()), laws_(parts.laws), points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), gradient_(families_), u_(points_), flux_(D * points_) {
   quiet_ = parts.quiet_blocks(cloud_reach(families_.lists(), points_));
 }
 
@@ -30,9 +25,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
   for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
-    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding,
-                                  [](std::uint8_t m) { return m != 0; }))
-      continue;
+    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding, [](std::uint8_t m) { return m != 0; })) continue;
     for (int l = 0; l < lanes; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       if (l >= n || !pass.wanted(static_cast<std::int64_t>(p))) {
@@ -50,7 +43,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     const int bad = pass.work.evaluate(n, s, false, &energy);
     if (bad >= 0) return pass.report(static_cast<std::int64_t>(first) + bad);
     if (pass.work.work() == Work::sample) {
-      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);  // a lone point shows its own values
+      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);   // a lone point shows its own values
       pass.work.add_samples(n, s, *pass.sums);
       continue;
     }
@@ -73,13 +66,9 @@ void CloudPoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   mirror_rows(pass.u, points_, u_);
   if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
-  if (pass.alone() || pass.work.tangent())
-    quiet_.wake();
-  else
-    quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  parallel_for(blocks(), [&](std::size_t b) {
-    if (quiet_.begins(b)) block(b, pass);
-  });
+  if (pass.alone() || pass.work.tangent()) quiet_.wake();
+  else quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) block(b, pass); });
   if (pass.bad >= 0 || pass.alone()) return;
   parallel_for(blocks(), [&](std::size_t b) {
     if (!quiet_.awake(b, 2)) return;
