@@ -4,6 +4,7 @@
 
 #include "perikit/build/problem.hpp"
 #include "perikit/core/parallel.hpp"
+#include "run/doubts.hpp"
 
 namespace perikit {
 
@@ -52,6 +53,7 @@ std::string Simulation::summary() {
                         problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
+  for (const std::string& warning : doubts(scene_, *problem_)) text += fmt::format("warning       {}\n", warning);
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
     text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
