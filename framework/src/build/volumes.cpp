@@ -52,10 +52,9 @@ std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension
   for (std::size_t n = 0; n < points.size() && inside; ++n) {
     // Cells all of whose surroundings are inside, on a coarse grid, are whole.
     bool whole = true;
-    over_grid(points[n], 1.25 * cells.reach[n], 5, dimension, [&](const Point& x) {
-      bool in_box = true;
-      for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) in_box = in_box && x[c] > lower[c] && x[c] < upper[c];
-      whole = whole && (!in_box || (*inside)(x) != 0);
+    over_grid(points[n], 1.25 * cells.reach[n], 9, dimension, [&](Point x) {
+      for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) x[c] = std::clamp(x[c], lower[c], upper[c]);
+      whole = whole && (*inside)(x) != 0;
     });
     if (whole) continue;
     int all = 0, in = 0;
