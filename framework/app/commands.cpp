@@ -13,6 +13,7 @@
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "new_project.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -46,7 +47,9 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 
 }  // namespace
 
-std::string version() { return PERIKIT_VERSION; }
+std::string version() {
+  return PERIKIT_VERSION;
+}
 
 void run(const Options& options) {
   const auto registry = open_registry(options);
@@ -54,18 +57,20 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
-  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
-  if (options.explain) fmt::print("{}", simulation.explanation(*registry));
+  const bool first = communicator().rank() == 0;     // which alone speaks
+  const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
                        library_fingerprints(*registry));
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
-    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
-                                                                        recorder.resumed_step(), simulation.problem().state().time)
-                                                          : "no checkpoint to resume from: the run starts from its initial state";
+    const std::string from =
+        recorder.resumed_step() >= 0
+            ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().state().time)
+            : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
-    if (!options.quiet) fmt::print("{}\n", from);
+    if (!options.quiet && first) fmt::print("{}\n", from);
   }
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused())
@@ -80,7 +85,7 @@ void run(const Options& options) {
   }
   const std::string closing = recorder.closing(set_up);
   log_end(recorder, closing);
-  if (!options.quiet)
+  if (!options.quiet && first)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format(
@@ -170,7 +175,8 @@ void contract(const Options& options) {
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
-  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
+  throw InputError({program.string()}, "",
+                   fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace perikit::app

@@ -17,9 +17,15 @@ struct Content {
   FieldView view;
 };
 
-Content& content(N_Vector v) { return *static_cast<Content*>(v->content); }
-double* data(N_Vector v) { return content(v).view.data; }
-std::size_t size(N_Vector v) { return content(v).view.size(); }
+Content& content(N_Vector v) {
+  return *static_cast<Content*>(v->content);
+}
+double* data(N_Vector v) {
+  return content(v).view.data;
+}
+std::size_t size(N_Vector v) {
+  return content(v).view.size();
+}
 
 /// z[k] <- value(k) for all k.
 template <class Value>
@@ -33,8 +39,14 @@ void assign(N_Vector z, Value&& value) {
 constexpr auto add = [](double a, double b) { return a + b; };
 constexpr auto least = [](double a, double b) { return std::min(a, b); };
 
-double over_ranks(double value, decltype(add)) { return communicator().sum(value); }
-double over_ranks(double value, decltype(least)) { return -communicator().largest(-value); }
+double over_ranks(double value, decltype(add)) {
+  ExactSum sum;
+  sum.add(value);
+  return total_over_ranks(sum);
+}
+double over_ranks(double value, decltype(least)) {
+  return -communicator().largest(-value);
+}
 
 /// Sum or another associative reduction, by blocks in order.
 template <class Value, class Combine>
@@ -87,18 +99,29 @@ void set_operations(N_Vector v) {
     combine(a, content(x).view, b, content(y).view, content(z).view);
   };
   ops->nvconst = [](realtype c, N_Vector z) { fill(c, content(z).view); };
-  ops->nvprod = [](N_Vector x, N_Vector y, N_Vector z) { assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] * b[k]; }); };
-  ops->nvdiv = [](N_Vector x, N_Vector y, N_Vector z) { assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] / b[k]; }); };
+  ops->nvprod = [](N_Vector x, N_Vector y, N_Vector z) {
+    assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] * b[k]; });
+  };
+  ops->nvdiv = [](N_Vector x, N_Vector y, N_Vector z) {
+    assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] / b[k]; });
+  };
   ops->nvscale = [](realtype c, N_Vector x, N_Vector z) { assign(z, [c, a = data(x)](std::size_t k) { return c * a[k]; }); };
   ops->nvabs = [](N_Vector x, N_Vector z) { assign(z, [a = data(x)](std::size_t k) { return std::abs(a[k]); }); };
   ops->nvinv = [](N_Vector x, N_Vector z) { assign(z, [a = data(x)](std::size_t k) { return 1 / a[k]; }); };
   ops->nvaddconst = [](N_Vector x, realtype c, N_Vector z) { assign(z, [c, a = data(x)](std::size_t k) { return a[k] + c; }); };
   ops->nvdotprod = [](N_Vector x, N_Vector y) { return dot(content(x).view, content(y).view); };
   ops->nvmaxnorm = [](N_Vector x) { return largest_magnitude(content(x).view); };
-  ops->nvmin = [](N_Vector x) { return reduce(x, data(x)[0], [a = data(x)](std::size_t k) { return a[k]; }, least); };
-  ops->nvl1norm = [](N_Vector x) { return reduce(x, 0.0, [a = data(x)](std::size_t k) { return std::abs(a[k]); }, add); };
+  ops->nvmin = [](N_Vector x) {
+    return reduce(
+        x, data(x)[0], [a = data(x)](std::size_t k) { return a[k]; }, least);
+  };
+  ops->nvl1norm = [](N_Vector x) {
+    return reduce(
+        x, 0.0, [a = data(x)](std::size_t k) { return std::abs(a[k]); }, add);
+  };
   ops->nvwl2norm = [](N_Vector x, N_Vector w) {
-    return std::sqrt(reduce(x, 0.0, [a = data(x), b = data(w)](std::size_t k) { return a[k] * b[k] * a[k] * b[k]; }, add));
+    return std::sqrt(reduce(
+        x, 0.0, [a = data(x), b = data(w)](std::size_t k) { return a[k] * b[k] * a[k] * b[k]; }, add));
   };
   ops->nvwrmsnorm = [](N_Vector x, N_Vector w) { return N_VWL2Norm(x, w) / std::sqrt(static_cast<double>(size(x))); };
 }
@@ -109,7 +132,9 @@ SundialsContext::SundialsContext() {
   if (SUNContext_Create(nullptr, &context_) != 0) throw RunError("SUNDIALS gives no context");
 }
 
-SundialsContext::~SundialsContext() { SUNContext_Free(&context_); }
+SundialsContext::~SundialsContext() {
+  SUNContext_Free(&context_);
+}
 
 FieldVector wrap(const Problem& problem, FieldView view, SUNContext context) {
   FieldVector v(N_VNewEmpty(context));
@@ -119,6 +144,8 @@ FieldVector wrap(const Problem& problem, FieldView view, SUNContext context) {
   return v;
 }
 
-FieldView field_of(N_Vector v) { return content(v).view; }
+FieldView field_of(N_Vector v) {
+  return content(v).view;
+}
 
 }  // namespace perikit

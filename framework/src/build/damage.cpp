@@ -34,11 +34,10 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation, bool ranks) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
-  if (ranks) refuse("a body on several ranks", "one rank");
   if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
 }
 
@@ -63,12 +62,12 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static, bool ranks) {
+                                               const ImageMap* images, bool quasi_static) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation, ranks);
+  refuse_unsuited(scene, parts.formulation);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);

@@ -10,9 +10,10 @@
 
 namespace perikit {
 
-/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. images (null: none) have the
-/// limits of their sources. ranks: several share the body. Throws InputError where the criterion does not suit them or the integrator.
+/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. images (null: none)
+/// have the limits of their sources. ranks: several share the body. Throws InputError where the criterion does not suit them or
+/// the integrator.
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static, bool ranks);
+                                               const ImageMap* images, bool quasi_static);
 
 }  // namespace perikit

@@ -28,13 +28,20 @@ Load distributed(const LoadDescription& description, const Body& body, const Ter
   return load;
 }
 
-/// What of a load on the whole body falls on the points that `part` owns.
-void keep_owned(const Partition& partition, const Body& part, Load& load) {
+/// By internal index of the whole body: where the owned points of a part are in it; -1: others.
+std::vector<std::int32_t> own_places(const Partition& partition, const Body& part) {
+  std::vector<std::int32_t> own(partition.whole().stride(), -1);
+  for (const std::int32_t p : part.owned()) own[static_cast<std::size_t>(part.places().place[static_cast<std::size_t>(p)])] = p;
+  return own;
+}
+
+/// What of a load on the whole body falls on the points of a part.
+void keep_owned(const std::vector<std::int32_t>& own, Load& load) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < load.points.size(); ++k) {
-    const std::int32_t input = partition.whole().input_of(static_cast<std::size_t>(load.points[k]));
-    if (!partition.owns(input)) continue;
-    load.points[kept] = part.internal()[static_cast<std::size_t>(partition.place(input))];
+    const std::int32_t place = own[static_cast<std::size_t>(load.points[k])];
+    if (place < 0) continue;
+    load.points[kept] = place;
     load.share[kept++] = load.share[k];
   }
   load.points.resize(kept);
@@ -43,19 +50,22 @@ void keep_owned(const Partition& partition, const Body& part, Load& load) {
 
 }  // namespace
 
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static) {
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images,
+                  bool quasi_static) {
   const Body& body = parts.families->body();
   TermParts whole = parts;
   std::unique_ptr<Families> of_whole;
-  const bool faces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
+  const bool faces =
+      std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
   if (partition && faces) {
     of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
     whole.families = of_whole.get();
   }
+  const std::vector<std::int32_t> own = partition ? own_places(*partition, body) : std::vector<std::int32_t>();
   std::vector<Load> loads;
   for (const LoadDescription& description : scene.loads) {
     Load load = distributed(description, partition ? partition->whole() : body, whole, images);
-    if (partition) keep_owned(*partition, body, load);
+    if (partition) keep_owned(own, load);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;

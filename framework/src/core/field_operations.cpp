@@ -9,30 +9,23 @@ namespace perikit {
 
 namespace {
 
-/// Partial sums are over blocks of this many numbers, whatever the number of threads.
 constexpr std::size_t sum_block = 16384;
-
-template <class Term>
-double blocked_sum(std::size_t n, Term&& term) {
-  return ordered_sum((n + sum_block - 1) / sum_block, [&](std::size_t b) { return term(b * sum_block, std::min(n, (b + 1) * sum_block)); });
-}
 
 }  // namespace
 
 double dot(ConstFieldView a, ConstFieldView b) {
-  return communicator().sum(blocked_sum(a.size(), [&](std::size_t begin, std::size_t end) {
-    double sum = 0;
-    for (std::size_t k = begin; k < end; ++k) sum += a.data[k] * b.data[k];
-    return sum;
-  }));
+  return total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return a.data[k] * b.data[k]; }));
 }
 
-double norm(ConstFieldView a) { return std::sqrt(dot(a, a)); }
+double norm(ConstFieldView a) {
+  return std::sqrt(dot(a, a));
+}
 
 double largest_magnitude(ConstFieldView a) {
   std::vector<double> most((a.size() + sum_block - 1) / sum_block, 0.0);
   parallel_for(most.size(), [&](std::size_t b) {
-    for (std::size_t k = b * sum_block; k < std::min(a.size(), (b + 1) * sum_block); ++k) most[b] = std::max(most[b], std::abs(a.data[k]));
+    for (std::size_t k = b * sum_block; k < std::min(a.size(), (b + 1) * sum_block); ++k)
+      most[b] = std::max(most[b], std::abs(a.data[k]));
   });
   return communicator().largest(most.empty() ? 0.0 : *std::max_element(most.begin(), most.end()));
 }
@@ -44,7 +37,8 @@ void combine(double a, ConstFieldView x, double b, ConstFieldView y, FieldView s
 }
 
 void copy(ConstFieldView from, FieldView to) {
-  over_blocks(to.size(), [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
+  over_blocks(to.size(),
+              [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
 }
 
 void fill(double value, FieldView x) {
@@ -57,15 +51,18 @@ void mask(ConstFieldView mask, FieldView x) {
   });
 }
 
-void fill_with_noise(ConstFieldView mask, std::uint64_t seed, FieldView x) {
-  over_blocks(x.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      std::uint64_t k = i + seed;
-      k = (k ^ (k >> 30)) * 0xbf58476d1ce4e5b9ULL;
-      k = (k ^ (k >> 27)) * 0x94d049bb133111ebULL;
-      x.data[i] = mask.data[i] != 0 ? static_cast<double>((k ^ (k >> 31)) >> 11) * 0x1.0p-52 - 1.0 : 0.0;
-    }
-  });
+void fill_with_noise(ConstFieldView mask, std::uint64_t seed, const Places& places, FieldView x) {
+  const std::size_t stride = places.place.empty() ? x.stride : places.stride;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(x.components); ++c)
+    over_blocks(x.stride, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) {
+        const std::size_t i = c * x.stride + p, at = places.place.empty() ? p : static_cast<std::size_t>(places.place[p]);
+        std::uint64_t k = c * stride + at + seed;
+        k = (k ^ (k >> 30)) * 0xbf58476d1ce4e5b9ULL;
+        k = (k ^ (k >> 27)) * 0x94d049bb133111ebULL;
+        x.data[i] = mask.data[i] != 0 ? static_cast<double>((k ^ (k >> 31)) >> 11) * 0x1.0p-52 - 1.0 : 0.0;
+      }
+    });
 }
 
 }  // namespace perikit

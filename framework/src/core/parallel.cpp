@@ -3,7 +3,6 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "core/thread_team.hpp"
 #include "perikit/core/simd.hpp"
@@ -14,9 +13,15 @@ namespace {
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 }
 
-int thread_count() noexcept { return threads; }
-void set_thread_count(int n) noexcept { threads = counts_operations ? 1 : std::max(1, n); }
-int thread_index() noexcept { return detail::team_index(); }
+int thread_count() noexcept {
+  return threads;
+}
+void set_thread_count(int n) noexcept {
+  threads = counts_operations ? 1 : std::max(1, n);
+}
+int thread_index() noexcept {
+  return detail::team_index();
+}
 
 namespace detail {
 void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
@@ -27,13 +32,5 @@ void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)
   team_for(threads, n, context, body);
 }
 }  // namespace detail
-
-double ordered_sum(std::size_t blocks, const std::function<double(std::size_t)>& term) {
-  std::vector<double> parts(blocks);
-  parallel_for(blocks, [&](std::size_t b) { parts[b] = term(b); });
-  double total = 0;
-  for (const double part : parts) total += part;
-  return total;
-}
 
 }  // namespace perikit

@@ -10,9 +10,12 @@
 #include <sstream>
 
 #include "files/atomic_file.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/problem/motion.hpp"
 #include "perikit/run/simulation.hpp"
+#include "problem/snapshot.hpp"
 #include "run/checkpoint.hpp"
+#include "run/gathering.hpp"
 #include "run/reduction.hpp"
 
 namespace perikit {
@@ -23,7 +26,9 @@ std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
-bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
+bool reached(double time, double wanted) {
+  return time >= wanted - 1e-9 * std::abs(wanted);
+}
 
 bool ended(const OutputProgress& run, std::int64_t step, double time) {
   return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
@@ -48,7 +53,7 @@ std::string earlier_run(const std::filesystem::path& folder) {
 }
 
 ReferenceData reference_of(const BodyProblem& problem) {
-  const Body& body = problem.body();
+  const Body& body = problem.whole();
   ReferenceData data;
   for (std::size_t p = 0; p < body.owned().size(); ++p) {
     const auto i = static_cast<std::size_t>(body.owned()[p]);
@@ -67,13 +72,35 @@ ReferenceData reference_of(const BodyProblem& problem) {
   return data;
 }
 
+/// What a run goes on from, from rank 0 to the others.
+void share(Checkpoint& checkpoint) {
+  if (communicator().size() == 1) return;
+  ByteWriter out;
+  out.value(checkpoint.output);
+  out.value(checkpoint.step);
+  out.value(checkpoint.time);
+  std::vector<std::byte> head = out.take();
+  communicator().broadcast(head);
+  communicator().broadcast(checkpoint.state);
+  ByteReader in(head);
+  checkpoint.output = in.value<OutputProgress>();
+  checkpoint.step = in.value<std::int64_t>();
+  checkpoint.time = in.value<double>();
+}
+
 }  // namespace
 
-void request_stop() noexcept { stop = true; }
-bool stop_requested() noexcept { return stop; }
+void request_stop() noexcept {
+  stop = true;
+}
+bool stop_requested() noexcept {
+  return stop;
+}
 
 std::vector<std::string> history_columns(const Scene& scene) {
-  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
+  std::vector<std::string> columns{"step",           "time",          "time_step",         "strain_energy",
+                                   "kinetic_energy", "external_work", "dissipated_energy", "iterations",
+                                   "residual"};
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -83,6 +110,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
     : simulation_(simulation),
       folder_(std::move(folder)),
       show_progress_(show_progress),
+      first_(communicator().rank() == 0),
       fields_(simulation.problem(), simulation.dynamic(), !simulation.scene().initial_velocity.empty()),
       libraries_(std::move(libraries)),
       start_(std::chrono::steady_clock::now()),
@@ -100,19 +128,28 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   columns_ = perikit::history_columns(scene);
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
-  make_folder(folder_);
-  remove_file(temporary_name(checkpoint_file(folder_)));   // of a run that was killed
-  const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
-  if (earlier) start_from_checkpoint();
-  else start_fresh(start);
-  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  bool earlier = false;
+  if (first_) {
+    make_folder(folder_);
+    remove_file(temporary_name(checkpoint_file(folder_)));  // of a run that was killed
+    earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
+  }
+  earlier = communicator().largest(earlier ? 1 : 0) > 0;
+  if (earlier)
+    start_from_checkpoint();
+  else if (first_)
+    start_fresh(start);
+  if (!first_) return;
+  writer_ =
+      std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
 
 void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
-  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml")) check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
+  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml"))
+    check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
   std::error_code missing;
   if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
     throw InputError({scene.file.string()}, "output",
@@ -131,8 +168,13 @@ void RunRecorder::start_fresh(RunStart start) {
 }
 
 void RunRecorder::start_from_checkpoint() {
-  const Checkpoint checkpoint = read_checkpoint(folder_);
-  check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+  Checkpoint checkpoint;
+  if (first_) {
+    checkpoint = read_checkpoint(folder_);
+    check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+    log_text_ = read_text(folder_ / "run.log");
+  }
+  share(checkpoint);
   try {
     simulation_.problem().restore(checkpoint.state);
   } catch (const InputError& error) {
@@ -141,7 +183,6 @@ void RunRecorder::start_from_checkpoint() {
   done_ = checkpoint.output;
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
-  log_text_ = read_text(folder_ / "run.log");
 }
 
 RunRecorder::~RunRecorder() {
@@ -149,6 +190,7 @@ RunRecorder::~RunRecorder() {
 }
 
 void RunRecorder::log(std::string_view message) {
+  if (!first_) return;
   std::istringstream lines{std::string(message)};
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("warning")) warnings_.push_back(line);
@@ -157,7 +199,9 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept { return stopping_; }
+bool RunRecorder::cancelled() const noexcept {
+  return stopping_;
+}
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return ended(done_, step, time);
@@ -175,7 +219,8 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 ||
+         (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
 bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
@@ -184,19 +229,21 @@ bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::wants_sample(std::int64_t step, double time) {
-  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
-  // run after the next step.
-  stopping_ = stop_requested();
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
+  // the run after the next step.
+  stopping_ = communicator().largest(stop_requested() ? 1 : 0) > 0;
   return stopping_ || frame_due(step, time) || history_due(step);
 }
 
 void RunRecorder::step_done(const StepReport& report) {
-  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
+  if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
+    done_.history_every = asked > 0               ? asked
+                          : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows)
+                                                  : 1;
   }
   fields_.renew();
   const auto before = std::chrono::steady_clock::now();
@@ -206,12 +253,15 @@ void RunRecorder::step_done(const StepReport& report) {
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;
   done_.frames += frame;
-  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
+  while (done_.next_time < std::ssize(frame_times_) &&
+         reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)]))
+    ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
   }
-  if (report.step == 0) done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
+  if (report.step == 0)
+    done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   progress(report);
@@ -219,31 +269,44 @@ void RunRecorder::step_done(const StepReport& report) {
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  history_->sync();   // frames are on the disk already
+  std::vector<std::byte> state = simulation_.problem().snapshot();
+  if (!first_) return;
+  history_->sync();  // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
-                             simulation_.problem().snapshot()});
+                             std::move(state)});
 }
 
 void RunRecorder::write_frame(const StepReport& report) {
   std::vector<OutputField> fields;
-  for (const std::string& name : frame_fields_) fields.push_back(fields_.get(name));
-  writer_->write(report.time, report.step, fields);
+  for (const std::string& name : frame_fields_) {
+    const OutputField& mine = fields_.get(name);
+    fields.push_back({name, mine.width, gather_points(simulation_.problem(), mine.data, static_cast<std::size_t>(mine.width))});
+  }
   ++frames_written_;
+  if (first_) writer_->write(report.time, report.step, fields);
 }
 
 void RunRecorder::write_history(const StepReport& report) {
   BodyProblem& problem = simulation_.problem();
   Energies& energies = problem.state().energies;
   if (simulation_.dynamic()) energies.kinetic = kinetic_energy(problem, problem.state().velocity());
-  std::vector<double> row{static_cast<double>(report.step), report.time, report.time_step, energies.strain, energies.kinetic,
-                          energies.external_work, energies.dissipated, static_cast<double>(report.iterations), report.residual};
-  for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
-  history_->row(row);
+  std::vector<double> row{static_cast<double>(report.step),
+                          report.time,
+                          report.time_step,
+                          energies.strain,
+                          energies.kinetic,
+                          energies.external_work,
+                          energies.dissipated,
+                          static_cast<double>(report.iterations),
+                          report.residual};
+  for (const HistoryDescription& record : simulation_.scene().output.history)
+    row.push_back(reduced(record, problem, fields_.get(record.quantity), report.time));
   ++rows_written_;
+  if (first_) history_->row(row);
 }
 
 void RunRecorder::progress(const StepReport& report) {
-  if (!show_progress_) return;
+  if (!show_progress_ || !first_) return;
   const auto now = std::chrono::steady_clock::now();
   const bool terminal = isatty(fileno(stderr));
   const bool end = last(report.step, report.time);
@@ -251,9 +314,11 @@ void RunRecorder::progress(const StepReport& report) {
   shown_ = now;
   const double spent = std::chrono::duration<double>(now - start_).count();
   const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
-  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  const std::string line = fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time,
-                                       report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
+  const double rate = static_cast<double>(report.step - first_step_) *
+                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  const std::string line =
+      fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
+                  report.end_time, report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
   if (terminal) {
     fmt::print(stderr, "\r\033[K{}", line);
     line_open_ = !end;

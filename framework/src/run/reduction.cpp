@@ -10,18 +10,22 @@
 #include <utility>
 
 #include "perikit/fields/point_fields.hpp"
+#include "run/gathering.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// At the points of a set, in its order.
+/// At this rank's points of a set, in its order.
 std::vector<double> values_of(const HistoryDescription& record, const Body& body, const OutputField& field) {
   const int column = PointFields::column(record.quantity, record.component);
   const auto w = static_cast<std::size_t>(field.width);
+  const auto input = [&](std::int32_t p) { return body.input_of(static_cast<std::size_t>(p)); };
   std::vector<double> values;
   for (const std::int32_t p : body.set(record.set)) {
-    const double* row = &field.data[w * static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(p)))];
+    const auto row_number =
+        static_cast<std::size_t>(std::ranges::lower_bound(body.owned(), input(p), {}, input) - body.owned().begin());
+    const double* row = &field.data[w * row_number];
     values.push_back(column >= 0 ? row[column] : std::sqrt(std::inner_product(row, row + w, row, 0.0)));
   }
   return values;
@@ -31,11 +35,11 @@ double product(const std::vector<double>& u, const std::vector<double>& v) {
   return std::inner_product(u.begin(), u.end(), v.begin(), 0.0);
 }
 
-/// Turns three columns until they are orthogonal (one-sided Jacobi). Returns the rotation, by columns: turned column k is the sum over c of
-/// rotation[k][c] times column c.
+/// Turns three columns until they are orthogonal (one-sided Jacobi). Returns the rotation, by columns: turned column k is the sum
+/// over c of rotation[k][c] times column c.
 std::array<Point, 3> orthogonalized(std::array<std::vector<double>, 3>& x) {
   std::array<Point, 3> rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  for (int sweep = 0; sweep < 8; ++sweep) {   // each squares what is left of the cosines
+  for (int sweep = 0; sweep < 8; ++sweep) {  // each squares what is left of the cosines
     for (const auto& [i, j] : {std::pair{0u, 1u}, std::pair{0u, 2u}, std::pair{1u, 2u}}) {
       const double a = product(x[i], x[i]), b = product(x[j], x[j]), c = product(x[i], x[j]);
       if (c == 0) continue;
@@ -57,7 +61,7 @@ double fitted(const HistoryDescription& record, const Body& body, const std::vec
   const auto& members = body.set(record.set);
   const double n = static_cast<double>(members.size());
   const auto mean_of = [n](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0) / n; };
-  std::array<std::vector<double>, 3> x;   // places, from their centre
+  std::array<std::vector<double>, 3> x;  // places, from their centre
   Point centre{};
   for (std::size_t c = 0; c < 3; ++c) {
     for (const std::int32_t p : members) x[c].push_back(body.position(static_cast<std::size_t>(p))[c]);
@@ -72,7 +76,7 @@ double fitted(const HistoryDescription& record, const Body& body, const std::vec
   double fit = mean;
   for (std::size_t k = 0; k < 3; ++k) {
     const double extent = product(x[k], x[k]);
-    if (extent <= 1e-18 * largest) continue;   // the points have no extent along this axis, and no slope
+    if (extent <= 1e-18 * largest) continue;  // the points have no extent along this axis, and no slope
     double along = 0;
     for (std::size_t c = 0; c < 3; ++c) along += axes[k][c] * (record.at[c] - centre[c]);
     fit += along * product(x[k], off) / extent;
@@ -98,8 +102,10 @@ double error(const HistoryDescription& record, const Body& body, const std::vect
 
 }  // namespace
 
-double reduced(const HistoryDescription& record, const Body& body, const OutputField& field, double t) {
-  const std::vector<double> values = values_of(record, body, field);
+double reduced(const HistoryDescription& record, const BodyProblem& problem, const OutputField& field, double t) {
+  const std::vector<double> values = gather_set(problem, record.set, values_of(record, problem.body(), field));
+  if (values.empty()) return 0;  // rank 0 has them
+  const Body& body = problem.whole();
   if (record.reduce == "fit") return fitted(record, body, values);
   if (record.reduce == "error") return error(record, body, values, t);
   if (record.reduce == "min") return *std::ranges::min_element(values);

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "perikit/build/problem.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
@@ -12,7 +15,7 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   integrator_ = factory.integrator(*scene_.integrator);
   traits_ = integrator_->traits();
   problem_ = build_problem(scene_, factory, traits_);
-  if (traits_.dynamic) problem_->masses().by_point();   // refuses missing densities
+  if (traits_.dynamic) problem_->masses().by_point();  // refuses missing densities
   if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
     throw InputError(
         scene_.initial_velocity_position, "initial.velocity",
@@ -28,8 +31,10 @@ void Simulation::refuse_gradients() const {
     std::vector<std::string> others;
     for (const PointField& other : point_fields())
       if (!other.of_gradients) others.push_back(other.name);
-    throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
-                                                field, scene_.kinematics->type, fmt::join(others, ", ")));
+    throw InputError(
+        position, key,
+        fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
+                    field, scene_.kinematics->type, fmt::join(others, ", ")));
   };
   for (const std::string& field : scene_.output.fields) check(field, scene_.output.fields_position, "output.fields");
   for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
@@ -37,50 +42,104 @@ void Simulation::refuse_gradients() const {
   }
 }
 
-void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer); }
+void Simulation::run(Observer& observer) {
+  integrator_->run(*problem_, observer);
+}
+
+namespace {
+
+/// How the body lies on ranks. All of them must call it.
+std::string ranks_summary(const BodyProblem& problem) {
+  const Partition& partition = *problem.partition();
+  const std::vector<std::int64_t>& points = partition.points();
+  const double mean = static_cast<double>(partition.whole().points()) / static_cast<double>(points.size());
+  const auto ghosts = static_cast<double>(problem.ghosts()->size());
+  const auto bytes = static_cast<double>(problem.bytes());
+  const double most_ghosts = communicator().largest(ghosts), most_bytes = communicator().largest(bytes);
+  const double sent = communicator().largest(8.0 * problem.dimension() * static_cast<double>(problem.ghosts()->sent()));
+  return fmt::format(
+      "ranks         {} with {} threads each\n"
+      "balance       {} points on the largest rank, {:.3f} of the mean\n"
+      "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
+      "exchange      at most {:.3g} MB a rank and step\n"
+      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n",
+      points.size(), thread_count(), *std::ranges::max_element(points),
+      static_cast<double>(*std::ranges::max_element(points)) / mean, most_ghosts, most_ghosts / mean, sent / 1e6,
+      most_bytes / 1e6, most_bytes / mean);
+}
+
+}  // namespace
 
 std::string Simulation::summary() {
   const Body& body = problem_->body();
   const ModelReport report = problem_->terms().report();
-  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.owned().size(),
+  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points_of_all_ranks(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
-  if (problem_->images()) text += fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
-  text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
+  if (problem_->images())
+    text +=
+        fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
+  if (problem_->partition()) return text + ranks_summary(*problem_) + plan();
+  text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds,
+                      static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
-    text += fmt::format("warning       {} points have {}\n", report.singular_families,
-                        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
+    text += fmt::format(
+        "warning       {} points have {}\n", report.singular_families,
+        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
-    text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
+    text +=
+        "warning       the displacement at the start is one increment from the undeformed body for materials whose stress "
+        "depends on the path\n";
   }
-  if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
-  if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
+  if (report.fallbacks > 0)
+    text +=
+        fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
+  if (report.dropped_parts > 0)
+    text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n",
+                        report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
-  text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.owned().size()));
+  text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6,
+                      bytes / static_cast<double>(body.owned().size()));
+  return text + plan();
+}
+
+std::string Simulation::plan() {
   const std::string plan = integrator_->plan(*problem_);
-  if (!plan.empty()) text += fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
-  return text;
+  return plan.empty() ? plan : fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
 }
 
 std::string Simulation::explanation(const Registry& registry) const {
   std::vector<SkipNote> notes = problem_->terms().report().skips;
   std::size_t known = 0;
   for (const Kind kind : all_kinds) known += registry.names(kind).size();
-  notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
-  if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
-  if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
+  notes.push_back({"libraries that the scene does not name", "parts are found by manifest",
+                   fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
+  if (!scene_.damage)
+    notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
+  if (scene_.damage)
+    notes.push_back({"checks of bonds that cannot have failed yet",
+                     "each group of eight points knows how far its nearest bond is from failing",
+                     "counted in run.log at the end"});
   if (scene_.skip && traits_.dynamic && problem_->terms().conservative()) {
-    notes.push_back({"parts of the body that no wave has reached", "blocks of points at rest whose families' families are at rest have no forces", "counted in run.log at the end"});
+    notes.push_back({"parts of the body that no wave has reached",
+                     "blocks of points at rest whose families' families are at rest have no forces",
+                     "counted in run.log at the end"});
     if (const std::size_t held = problem_->constraints().points_held_at_rest(); held > 0) {
-      notes.push_back({"points held at rest", "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
-                       fmt::format("the blocks of {} points, less those in reach of others", held)});
+      notes.push_back(
+          {"points held at rest",
+           "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
+           fmt::format("the blocks of {} points, less those in reach of others", held)});
     }
   }
-  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
-  if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
+  if (!traits_.dynamic)
+    notes.push_back(
+        {"velocity, mass", "not a dynamic run",
+         fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
+  if (problem_->constant_stiffness())
+    notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
   const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
   notes.push_back({"fields that nobody asked for", "computed when written",

@@ -20,7 +20,8 @@ std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus,
   const std::size_t n = family.size;
   AlignedVector<double> omega(n, 0.0), rest(n, 0.0), moduli(n, modulus), stiffness(n, 0.0);
   for (std::size_t k = 0; k < family.far.size(); ++k) omega[k] = family.whole_omega(k);
-  law.bond_law({family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
+  law.bond_law(
+      {family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
   std::array<double, D> sum{};
   for (std::size_t k = 0; k < family.far.size(); ++k)
     for (std::size_t a = 0; a < D; ++a) {
@@ -70,7 +71,12 @@ FamilyArrays regular_family(const Families& families) {
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
-    : families_(parts.families), body_(families_.body()), laws_(parts.laws), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
+    : families_(parts.families),
+      body_(families_.body()),
+      laws_(parts.laws),
+      formulation_(parts.formulation),
+      law_(*formulation_.pairs),
+      share_(parts.share) {
   const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
   loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (formulation_.dilatation) {
@@ -115,7 +121,7 @@ void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::
       x.weighted_volume = m;
       x.intact = intact;
       moduli = law_.moduli(x);
-      if (x.bulk() > 0) warn(x, laws_.record_of(p));   // not of ghosts and images
+      if (x.bulk() > 0) warn(x, laws_.record_of(p));  // not of ghosts and images
     }
     // A point without bonds is a free mass: nothing to divide by, nothing stored.
     if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
@@ -142,15 +148,13 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-double PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+void PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
   if (density_.size() == 0) density_ = body_.make_field(2);
   if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
   loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
-  double energy = 0;
-  for (std::size_t p = 0; p < body_.stride(); ++p) {
-    if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
-  }
-  return energy;
+  for (std::size_t p = 0; p < body_.stride(); ++p)
+    if (marks[p / padding] && body_.alive(p) && body_.owns(p))
+      energy.add(body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]));
 }
 
 template <int D>
@@ -172,7 +176,7 @@ void PairForces<D>::set_correction() {
         G.fill(1.0);
         if (!family.far.empty()) {
           PairPoint x = point(p);
-          if (!(x.bulk() > 0)) x.moduli = {1, 1};   // ghosts: the correction is one of shape
+          if (!(x.bulk() > 0)) x.moduli = {1, 1};  // ghosts: the correction is one of shape
           const auto own = stiffness(family, x), exact = stiffness(regular, x);
           for (std::size_t a = 0; a < D; ++a)
             if (own[a] > 0) G[a] = exact[a] / own[a];
@@ -184,7 +188,8 @@ void PairForces<D>::set_correction() {
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
+                                       const std::uint8_t* only) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -194,37 +199,41 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
-  if (energies) energies->assign(batches, 0.0);
+  std::vector<ExactSum> energies(energy ? static_cast<std::size_t>(thread_count()) : 0);
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
-    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding, [](std::uint8_t m) { return m != 0; })) return;
+    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding,
+                             [](std::uint8_t m) { return m != 0; }))
+      return;
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
-    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
-                                       energies || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    formulation_.dilatation->evaluate(
+        {n, theta, dilatation_modulus_.data() + first, energy || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energies && body_.alive(p)) (*energies)[b] += body_.volume(p) * phi[l];
+      if (energy && body_.alive(p) && body_.owns(p))
+        energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
     }
   });
+  for (const ExactSum& of_thread : energies) energy->add(of_thread);
   return -1;
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, double* energy) {
-  std::vector<double> volumetric, bonds(energy ? loop_->blocks() : 0, 0.0);
+std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
+  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? &volumetric : nullptr, nullptr);
+    const std::int64_t bad = dilatation(u, {}, energy, nullptr);
     if (bad >= 0) return bad;
   }
   const std::int64_t bad = loop_->run({PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr});
-  for (const std::vector<double>* parts : {&volumetric, &bonds})
-    for (const double e : *parts) *energy += e;
+  for (std::size_t b = 0; b < bonds.size(); ++b)
+    if (loop_->owns(b)) energy->add(bonds[b]);
   return bad;
 }
 
@@ -250,7 +259,8 @@ std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples)
     if (bad >= 0) return bad;
   }
   const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
-  for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
+  for (std::size_t p = 0; p < body_.stride(); ++p)
+    samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
   return bad;
 }
 
@@ -258,15 +268,21 @@ template <int D>
 void PairForces<D>::report(ModelReport& report) const {
   report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
   report.bytes += loop_->bytes();
-  for (const Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
+  for (const Field* field :
+       {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_})
+    report.bytes += field->bytes();
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
-  report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
+  report.skips.push_back(
+      {"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
-  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
+  if (share_ && fields_.modulus.size() == 0)
+    report.skips.push_back(
+        {"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
 }
 
 std::unique_ptr<Term> make_pair_forces(const PairParts& parts) {
-  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
+  return with_dimension(parts.families.body().dimension(),
+                        [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
 }
 
 }  // namespace perikit

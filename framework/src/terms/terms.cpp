@@ -7,6 +7,7 @@
 #include "assembly/block_pattern.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "perikit/core/communicator.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
 #include "terms/zero_energy_penalty.hpp"
@@ -18,7 +19,8 @@ namespace {
 /// Zero, a piece for each thread at a time.
 void clear(double* values, std::size_t size) {
   constexpr std::size_t piece = std::size_t{1} << 16;
-  parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
+  parallel_for((size + piece - 1) / piece,
+               [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
 }
 
 }  // namespace
@@ -27,7 +29,7 @@ void clear(double* values, std::size_t size) {
 struct Terms::Assemblies {
   BlockRows rows;
   std::vector<std::unique_ptr<Assembly>> all;
-  std::size_t version;   ///< of the bonds that they know
+  std::size_t version;  ///< of the bonds that they know
   int steps = 1;
 };
 
@@ -45,7 +47,8 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     mechanics_ = mechanics.get();
     terms_.push_back(std::move(mechanics));
   }
-  if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
+  if (parts_.stabilization)
+    terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
   if (!parts_.damage) return;
   const NearestFailure* known = nullptr;
   for (const auto& term : terms_) {
@@ -62,16 +65,19 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   if (bad < 0) return status;
   const Body& body = parts_.families->body();
   const Point x = body.position(static_cast<std::size_t>(bad));
-  status.point = body.input_of(static_cast<std::size_t>(bad));
+  status.point = body.number(static_cast<std::size_t>(bad));
+  if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(bad)];
   status.description = fmt::format("point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
   return status;
 }
 
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
-  if (energy) *energy = 0;
+  ExactSum sum;
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces(u, force, energy);
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
+    bad = (*term)->add_forces(u, force, energy ? &sum : nullptr);
+  if (energy) *energy = total_over_ranks(sum);
   return status(bad);
 }
 
@@ -127,7 +133,9 @@ Field Terms::shape_tensor_condition() const {
   return has_gradients() ? condition_field(*parts_.families) : parts_.families->body().make_field(1);
 }
 
-Field Terms::damage() const { return damage_field(*parts_.families); }
+Field Terms::damage() const {
+  return damage_field(*parts_.families);
+}
 
 QuietCounts Terms::quiet_counts() const {
   QuietCounts counts;
@@ -139,7 +147,9 @@ QuietCounts Terms::quiet_counts() const {
   return counts;
 }
 
-LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->history() : nullptr; }
+LawHistory* Terms::history() const noexcept {
+  return mechanics_ ? mechanics_->history() : nullptr;
+}
 
 void Terms::history_restored() {
   if (mechanics_) mechanics_->history_restored();
@@ -152,20 +162,25 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion& motion) {
   if (!failing_) return {};
   const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
-    double sum = 0;
-    for (const auto& term : terms_) sum += term->energy_of(at, marks);
-    return sum;
+    ExactSum sum;
+    for (const auto& term : terms_) term->energy_of(at, marks, sum);
+    return total_over_ranks(sum);
   };
-  return failing_->fracture.update(u, time_step, motion, energy, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  return failing_->fracture.update(u, time_step, motion, energy,
+                                   [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
-std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
+std::vector<BondChange> Terms::changed_bonds() const {
+  return parts_.families->changed();
+}
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {
   if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
-BondChecks Terms::bond_checks() const { return failing_ ? failing_->fracture.checks() : BondChecks{}; }
+BondChecks Terms::bond_checks() const {
+  return failing_ ? failing_->fracture.checks() : BondChecks{};
+}
 
 ModelReport Terms::report() const {
   const Families& families = *parts_.families;
@@ -177,19 +192,25 @@ ModelReport Terms::report() const {
   const int d = families.body().dimension();
   const double bond_bytes = static_cast<double>(report.bonds) * 8 * (d + 1);
   if (const LatticeFamilies* lattice = families.lattice()) {
-    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
+                            megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
     std::size_t whole = 0;
     const auto& chunks = lattice->tiles.chunks;
     for (const LatticeChunk& chunk : chunks) whole += chunk.pattern < 0;
-    report.skips.push_back({"shape tensors of whole families",
-                            fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
-                            megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) * sizeof(LatticePattern))});
+    report.skips.push_back(
+        {"shape tensors of whole families",
+         fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
+         megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) *
+                   sizeof(LatticePattern))});
   } else {
     report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
   }
-  if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  if (d < 3 && has_gradients())
+    report.skips.push_back(
+        {"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
   if (!conservative())
-    report.warnings.push_back("local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+    report.warnings.push_back(
+        "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
   for (const auto& term : terms_) term->report(report);
   return report;
 }

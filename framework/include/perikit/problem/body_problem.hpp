@@ -22,15 +22,15 @@ struct ProblemParts {
   ProblemParts();
   ProblemParts(ProblemParts&&) noexcept;
   ~ProblemParts();
-  std::unique_ptr<const Partition> partition;   ///< null where one rank has the whole body
-  std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
-  std::unique_ptr<const ImageMap> images;       ///< null without
+  std::unique_ptr<const Partition> partition;  ///< null where one rank has the whole body
+  std::unique_ptr<const Body> body;            ///< of this rank, with the images of its points
+  std::unique_ptr<const ImageMap> images;      ///< null without
   std::unique_ptr<Laws> laws;
-  std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
+  std::unique_ptr<Families> families;  ///< of the body: everything that looks at bonds borrows them
   FractureRecord fracture;
   std::unique_ptr<Terms> terms;
-  std::string kinematics;                       ///< names, for messages
-  std::vector<std::string> materials;           ///< by material of the body
+  std::string kinematics;              ///< names, for messages
+  std::vector<std::string> materials;  ///< by material of the body
 };
 
 class BodyProblem final : public Problem {
@@ -52,15 +52,21 @@ class BodyProblem final : public Problem {
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
-  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another problem.
+  /// Everything that a run continues from, as bytes, on rank 0; restore is bitwise, on any number of ranks. All ranks must call
+  /// both. restore throws InputError for what belongs to another problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
 
   Terms& terms() noexcept { return *parts_.terms; }
   const Terms& terms() const noexcept { return *parts_.terms; }
+  /// Null where one rank has the whole body.
+  const Partition* partition() const noexcept { return parts_.partition.get(); }
+  const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
   /// The body of all ranks.
   const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
-  std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
+  std::string fracture_summary() const {
+    return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated);
+  }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
 
@@ -69,16 +75,16 @@ class BodyProblem final : public Problem {
   ProblemValues values_;
   std::optional<Ghosts> ghosts_;
   /// u as the terms see it: with the values of ghosts and images, in `memory`; u itself where there are none.
-  ConstFieldView seen(ConstFieldView u, Field& memory) const;
-  /// Ends an evaluation: forces on ghosts and images go to where they belong; one status for all ranks.
-  void finish(FieldView force, EvaluationStatus& status) const;
+  ConstFieldView seen(ConstFieldView u, Field& memory);
+  /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
+  void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
   template <class Fill>
   void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
 
   Field seen_, seen_direction_;
-  BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
-  std::unique_ptr<Companion> companion_;        ///< made when asked for
+  BlockMatrix tangent_of_terms_, companion_of_terms_;  ///< with images
+  std::unique_ptr<Companion> companion_;               ///< made when asked for
 };
 
 }  // namespace perikit
