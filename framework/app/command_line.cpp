@@ -32,7 +32,11 @@ void add_commands(CLI::App& app, Options& options) {
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
   run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
-  with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
+  CLI::App* check_command =
+      add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check);
+  with_scene(check_command);
+  check_command->add_option("--ranks", options.ranks, "Predict what each of so many ranks holds and exchanges")
+      ->check(CLI::Range(1, 100000));
   CLI::App* study_command =
       add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
   study_command->add_option("study", options.scene, "Study file (TOML)")->required();
@@ -75,15 +79,18 @@ void add_commands(CLI::App& app, Options& options) {
                             "CSV of operations a point and step; default: the one that comes with perikit");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
-  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
+  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")
+      ->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   add("contract", "Run the contract suites on every part of a library", contract)
-      ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
+      ->add_option("library", options.library, "Library of parts (FILE.so)")
+      ->required();
   add("list", "List the known parts", list)
       ->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
   CLI::App* describe_command =
       add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
-  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
+  describe_command->add_option("part", options.part,
+                               "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
   describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }
 
@@ -92,7 +99,8 @@ int refuse(const CLI::App& app, const CLI::ParseError& error, const std::string&
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
   if (std::ranges::find(commands, word) == commands.end() && !word.starts_with('-')) {
-    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "), did_you_mean(word, commands));
+    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "),
+               did_you_mean(word, commands));
   } else {
     fmt::print(stderr, "{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " ");
   }

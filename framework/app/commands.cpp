@@ -17,6 +17,7 @@
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
+#include "ranks.hpp"
 
 namespace perikit::app {
 
@@ -29,7 +30,10 @@ std::unique_ptr<Registry> open_registry(const Options& options) {
 }
 
 Scene read(const Options& options, Registry& registry) {
-  if (options.threads > 0) set_thread_count(options.threads);
+  if (options.threads > 0)
+    set_thread_count(options.threads);
+  else if (communicator().size() > 1)
+    set_thread_count(cores_of_rank());
   return read_scene(options.scene, registry, {options.overrides, options.trust});
 }
 
@@ -72,6 +76,8 @@ void run(const Options& options) {
     recorder.log(from);
     if (!options.quiet && first) fmt::print("{}\n", from);
   }
+  if (communicator().size() > 1)
+    if (const std::string warning = crowded(thread_count()); !warning.empty()) recorder.log(warning);
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused())
     recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
@@ -103,6 +109,7 @@ void check(const Options& options) {
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.
   std::string summary = simulation.summary();
+  if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks);
   if (options.explain) summary += simulation.explanation(*registry);
   std::istringstream lines(summary);
   for (std::string line; std::getline(lines, line);) fmt::print("# {}\n", line);

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "families/families.hpp"
+#include "perikit/core/communicator.hpp"
+#include "perikit/problem/ghosts.hpp"
 
 namespace perikit {
 
@@ -62,7 +64,7 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static) {
+                                               const ImageMap* images, const Partition* partition, bool quasi_static) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
@@ -99,6 +101,12 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   if (images)
     for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
       if (field->size() > 0) images->copy_from_sources(*field);
+  if (partition) {
+    Ghosts ghosts(*partition, body, 1);
+    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+      if (field->size() > 0) ghosts.forward(*field);
+    equal = communicator().largest(equal ? 0 : 1) == 0;
+  }
   if (equal) damage->failure = Field();
   return damage;
 }

@@ -115,8 +115,6 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
     if (quasi_static)
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
              "an explicit integrator, or another material");
-    if (communicator().size() > 1)
-      refuse(fmt::format("{} ranks", communicator().size()), "one rank with many threads (--threads), or another material");
     if (formulation.force_state == ForceState::local)
       refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
@@ -140,7 +138,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), quasi_static));
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
   of_terms.damage = parts.fracture.damage();
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   parts.terms = std::make_unique<Terms>(of_terms);

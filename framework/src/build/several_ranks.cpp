@@ -14,10 +14,13 @@ void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const I
     throw InputError(position, key, fmt::format("found {} on {} ranks; allowed: {}", what, ranks, instead));
   };
   const std::string threads = "one rank with many threads (--threads)";
-  if (integrator.quasi_static)
+  if (!integrator.several_ranks)
     refuse(scene.integrator->values.position("type"), "integrator.type", fmt::format("\"{}\"", scene.integrator->type),
+           fmt::format("integrators that need no matrix (explicit ones; Krylov solvers with preconditioner = \"none\"), or {}",
+                       threads));
+  if (scene.damage && integrator.quasi_static)
+    refuse(scene.damage->values.position(""), "damage", fmt::format("bonds that may fail with \"{}\"", scene.integrator->type),
            fmt::format("explicit integrators, or {}", threads));
-  if (scene.damage) refuse(scene.damage->values.position(""), "damage", "bonds that may fail", threads);
   if (scene.stabilization && formulation.order > 1)
     refuse(scene.kinematics->values.position("stabilization"), "kinematics.stabilization",
            "a penalty over gradients of an order above 1", fmt::format("order = 1, or {}", threads));

@@ -147,6 +147,7 @@ bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
   if (!parts_.fracture.damage()) return false;
   const Motion half_step = [&](FieldView end) {
     middle_of_next_step(*this, time_step, velocity, end);
+    if (ghosts_) ghosts_->forward(end);
     if (images()) images()->extend(end);
   };
   return parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step,
@@ -164,12 +165,45 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   parts_.fracture.read(terms(), in);
 }
 
+namespace {
+
+/// What laws remember, rank by rank: evaluation points have numbers of their own on each.
+void write_history(std::span<const double> mine, ByteWriter& out) {
+  const auto of_ranks = communicator().gather(std::as_bytes(mine));
+  out.value(static_cast<std::uint64_t>(of_ranks.size()));
+  for (const std::vector<std::byte>& of_rank : of_ranks) {
+    out.value(static_cast<std::uint64_t>(of_rank.size() / sizeof(double)));
+    out.bytes(of_rank.data(), of_rank.size());
+  }
+}
+
+/// Without history the number of ranks may be another.
+void read_history(ByteReader& in, std::span<double> mine) {
+  const auto ranks = in.value<std::uint64_t>();
+  const auto own = static_cast<std::uint64_t>(communicator().rank());
+  std::uint64_t all = 0, found = 0;
+  for (std::uint64_t rank = 0; rank < ranks; ++rank) {
+    const auto count = in.value<std::uint64_t>();
+    all += count;
+    if (rank == own) found = count;
+    if (rank == own && count == mine.size())
+      in.bytes(mine.data(), mine.size_bytes());
+    else
+      in.skip(count, sizeof(double));
+  }
+  if (all > 0 && ranks != static_cast<std::uint64_t>(communicator().size()))
+    throw InputError(fmt::format("found the history of materials on {} ranks; allowed: the same number of ranks", ranks));
+  if (found != mine.size()) throw InputError("the saved state belongs to other materials");
+}
+
+}  // namespace
+
 std::vector<std::byte> BodyProblem::snapshot() const {
   ByteWriter out;
   out.value(static_cast<std::uint64_t>(whole().stride()));
   values_.constraints.write(out);
   parts_.fracture.write(terms(), out);
-  out.numbers(terms().history() ? terms().history()->values() : std::span<double>());
+  write_history(terms().history() ? terms().history()->values() : std::span<double>(), out);
   values_.state.write(whole(), out);
   return out.take();
 }
@@ -180,8 +214,7 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   constraints().read(in);
   parts_.fracture.read(terms(), in);
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
-  if (in.value<std::uint64_t>() != history.size()) throw InputError("the saved state belongs to other materials");
-  in.bytes(history.data(), history.size_bytes());
+  read_history(in, history);
   terms().history_restored();
   state().read(whole(), in);
   if (!in.done()) throw InputError("the saved state is damaged");

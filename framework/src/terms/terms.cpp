@@ -171,7 +171,7 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion&
 }
 
 std::vector<BondChange> Terms::changed_bonds() const {
-  return parts_.families->changed();
+  return failing_ ? failing_->fracture.changed() : parts_.families->changed();
 }
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {

@@ -17,7 +17,7 @@ class Failing final : public Integrator {
       : rank_(static_cast<int>(values.integer("rank"))), at_(values.text("at")), error_(values.text("error")) {
     fail_at("construction");
   }
-  IntegratorTraits traits() const noexcept override { return {}; }
+  IntegratorTraits traits() const noexcept override { return {.several_ranks = true}; }
   std::string plan(Problem& problem) override {
     fail_at("plan");
     (void)problem.evaluate_forces(problem.state().displacement(), problem.state().internal_force(), nullptr);
