@@ -1,11 +1,13 @@
 #pragma once
 /// Ranks that are threads of one process: what a run on several ranks does, without MPI and its start.
 
+#include <algorithm>
 #include <barrier>
 #include <cstdlib>
 #include <exception>
 #include <functional>
 #include <memory>
+#include <span>
 #include <thread>
 #include <vector>
 

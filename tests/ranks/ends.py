@@ -34,7 +34,7 @@ def throws():
                 "memory": (1, "the run failed: not enough memory"), "other": (1, "internal error: thrown on purpose: other")}
     for rank, place, error in ((2, "construction", "input"), (0, "plan", "other"), (1, "step", "run"), (2, "step", "memory"), (0, "step", "run")):
         text = scene('type = "conventional"', integrator='type = "failing"\nrank = %d\nat = "%s"\nerror = "%s"' % (rank, place, error))
-        text = text.replace('"velocity", ', "").replace('{ name = "middle", set = "middle", quantity = "velocity", reduce = "max" },', "")
+        text = text.replace('"velocity", ', "").replace('{ name = "middle", set = "middle", quantity = "velocity", component = "x", reduce = "max" },', "")
         status, message = messages[error]
         began = time.time()
         done = run(PROGRAM, text, WORK + "/throws", 3, 1, ("--plugin-path", FAILING))
@@ -51,7 +51,7 @@ def refusals():
     for what, text, words in (
             ("a scene with a mistake", scene('type = "conventonal"'), "did you mean"),
             ("newton", scene(conventional, integrator='type = "newton"').replace('"velocity", ', "").replace("velocity", "displacement"), 'found "newton" on 3 ranks'),
-            ("damage", scene(conventional, extra='[damage]\ntype = "critical_stretch"\nstretch = 0.1\n'), "found bonds that may fail on 3 ranks"),
+            ("a plane of symmetry", scene(conventional, extra='[[symmetry]]\naxis = "y"\n'), "found a plane of symmetry on 3 ranks"),
             ("periodic sides", scene(conventional, extra='[[periodic]]\naxis = "y"\n'), "found periodic sides on 3 ranks"),
             ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
             ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0'), "inadmissible deformation")):

@@ -28,11 +28,24 @@ KINEMATICS = {
 }
 
 INCLUSION = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = "1 + x/100", bulk_modulus = 3.0 }\n'
+DAMAGE = {
+    "critical_stretch": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n',
+    "gradual": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\ngradual = true\n',
+    "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
+}
+HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
 
 def with_inclusion(text):
     return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
+
+
+def torn(kinematics, damage, cloud):
+    """Pulled apart so fast that bonds fail, pieces among them."""
+    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 6.0\ntime_step = 0.05')
+    text = text.replace("[[boundary]]", 'velocity = ["0.15*(x - 16)/16", "0.1*sin(x/3)*(y - 13)/13"]\n[[boundary]]', 1)
+    return text.replace('"reaction"]', '"reaction", "damage"]') + CRACK + damage
 
 
 def cases(everything):
@@ -49,6 +62,16 @@ def cases(everything):
         for cloud in (False, True) if everything else (False,):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
             yield "%s, inclusion and pre-crack, %s" % (name, "cloud" if cloud else "lattice"), text + CRACK, ranks, threads
+    for name in KINEMATICS if everything else ("bond_based", "baqp"):
+        if name == "order 2" or "sub_horizon" in name or "selective" in name:
+            criteria = ("critical_stretch",)
+        else:
+            criteria = DAMAGE if everything else ("critical_stretch",)
+        for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
+            yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), torn(KINEMATICS[name], DAMAGE[criterion], cloud), ranks, threads
+    for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
+        for cloud in (False, True) if everything else (False,):
+            yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
 

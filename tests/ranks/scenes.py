@@ -41,6 +41,7 @@ def scene(kinematics, dimension=2, cloud=False, integrator='type = "verlet"\nend
     return """format = 1
 [body]
 dimension = {dimension}
+{state}
 [body.lattice]
 spacing = 1.0
 lower = {lower}
@@ -71,12 +72,12 @@ frames = 3
 history_every = 1
 fields = {fields}
 history = [ {{ name = "end", set = "high", quantity = "displacement", component = "x", reduce = "mean" }},
-            {{ name = "middle", set = "middle", quantity = "velocity", reduce = "max" }},
-            {{ name = "slope", set = "all", quantity = "displacement", component = "x", reduce = "fit", at = {middle3} }},
+            {{ name = "middle", set = "middle", quantity = "velocity", component = "x", reduce = "max" }},
+            {{ name = "slope", set = "all", quantity = "displacement", component = "x", reduce = "fit", at = {middle} }},
             {{ name = "pull", set = "low", quantity = "reaction", component = "x", reduce = "sum" }} ]
 {extra}
 """.format(dimension=dimension, lower=vector([0] * dimension), upper=vector(cells), jitter=0.2 if cloud else 0.0, high=length - 2,
-           middle=vector([c / 2 for c in cells]), middle3=vector([c / 2 for c in cells] + [0] * (3 - dimension)), ratio=3.015 if dimension < 3 else 2.515,
+           middle=vector([c / 2 for c in cells]), state={1: 'line = "strain"', 2: 'plane = "strain"', 3: ""}[dimension], ratio=3.015 if dimension < 3 else 2.515,
            kinematics=kinematics, material=material or 'type = "saint_venant_kirchhoff"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3',
            shake=vector('"%s"' % s for s in shake), held=vector(['"0.01*sin(t)"'] + [0] * (dimension - 1)),
            force=vector([0.05] + ['"0.01*t"'] * (dimension - 1)), integrator=integrator, fields=str(fields).replace("'", '"'), extra=extra)
