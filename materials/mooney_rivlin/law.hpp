@@ -6,6 +6,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/material.hpp"
+#include "perikit/sdk/rubber_free_stress.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
@@ -78,6 +79,12 @@ struct MooneyRivlin {
       const Tensor<T, S> dtau = on_d * dd + turn + inner(G, dH) * by_volume;
       return (dtau - P * transpose(dH)) * G;
     };
+  }
+
+  template <class T, class S, class K>
+  auto free_stress(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    return rubber_free_stress(H, T(C1), T(C2), T(kappa), volumetric);
   }
 };
 

@@ -19,6 +19,7 @@ namespace perikit::contract {
 struct Subject {
   Registry registry;
   std::vector<std::pair<Kind, std::string>> parts;
+  bool third_party = false;  ///< parts of a library that is not of this build
 };
 Subject& subject();
 

@@ -12,7 +12,15 @@ class ForwardingProblem : public Problem {
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
     return of_.evaluate_forces(u, force, energy, time_step);
   }
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return of_.tangent_action(u, w, Kw); }
+  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override {
+    return of_.external_forces(u, t, force);
+  }
+  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override {
+    return of_.add_load_stiffness(u, t, w, Kw);
+  }
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    return of_.tangent_action(u, w, Kw);
+  }
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return of_.assemble_tangent(u, K); }
   AssembledSize assembled_size() override { return of_.assembled_size(); }
   void assemble_companion(ConstFieldView u, BlockMatrix& K) override { of_.assemble_companion(u, K); }

@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
   try {
     // First: a library that replaces a known part is the one to test.
     if (!arguments.library.empty()) subject.registry.open(arguments.library);
+    subject.third_party = !arguments.library.empty();
     for (const auto& folder : Registry::standard_search_path(arguments.plugin_path)) subject.registry.add_folder(folder);
     // Bodies, laws and steps of the suites are made of the program's own parts.
     if (!subject.registry.known(Kind::kinematics, "conventional") || !subject.registry.known(Kind::material, "saint_venant_kirchhoff")) {

@@ -354,3 +354,24 @@ TEST_CASE("zero_energy.toml: the conventional gradient does not see the shortest
     if (row.values[0].shown == "baqp" || row.values[0].shown == "projection") CHECK(*row.quantities[0] > 0.1 * exact);
   }
 }
+
+TEST_CASE("a study tells the observed orders of its errors, along each key and with the others held") {
+  StudyFolder folder;
+  StudyTable table{folder.parse(study_text), {}};
+  for (const char* law : {"\"conventional\"", "\"baqp\""})
+    for (const double k : {4.0, 1.0, 2.0}) {
+      const double error = std::string(law) == "\"baqp\"" ? 3 * k * k : 0.5 / k;
+      table.rows.push_back({table.rows.size(),
+                            {{law, law, std::nullopt}, {std::to_string(k), std::to_string(static_cast<int>(k)), k}},
+                            {1.0, 1.0},
+                            {error, std::nullopt},
+                            "done",
+                            ""});
+    }
+  const std::string text = table.markdown();
+  CHECK(contains(text, "| top_error | kinematics.type = \"baqp\" | constants.k | 1 | 2 | 2.00 |"));
+  CHECK(contains(text, "| top_error | kinematics.type = \"baqp\" | constants.k | 2 | 4 | 2.00 |"));
+  CHECK(contains(text, "| top_error | kinematics.type = \"conventional\" | constants.k | 1 | 2 | -1.00 |"));
+  table.rows.resize(1);
+  CHECK(!contains(table.markdown(), "observed order"));
+}

@@ -8,8 +8,14 @@
 
 namespace perikit {
 
-SpaceTimeFunction function_of(const Expression& expression, bool ramps) {
-  return {expression, expression.depends_on_position(), expression.depends_on_time(), ramps && expression.is_number()};
+SpaceTimeFunction function_of(const Expression& expression, const RampDescription& ramp, bool quasi_static) {
+  const bool ramps = quasi_static && ramp.given.value_or(true) && !expression.depends_on_time();
+  return {expression, expression.depends_on_position(), expression.depends_on_time(), ramps};
+}
+
+void refuse_ramp(const RampDescription& ramp, const std::string& key, bool quasi_static) {
+  if (ramp.given && !quasi_static)
+    throw InputError(ramp.position, key + ".ramp", "found it in a run without load parameter; allowed: in quasi-static runs");
 }
 
 namespace {
@@ -46,11 +52,12 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
     if (boundary.velocity && quasi_static)
       throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
                        "found in a quasi-static run; allowed: displacement");
+    refuse_ramp(boundary.ramp, fmt::format("boundary.{}", k), quasi_static);
     if (!boundary.face.empty()) continue;  // the images have it
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
-      prescriptions.push_back(
-          {boundary.velocity, static_cast<int>(c), function_of(*boundary.components[c], quasi_static), body.set(boundary.set)});
+      prescriptions.push_back({boundary.velocity, static_cast<int>(c),
+                               function_of(*boundary.components[c], boundary.ramp, quasi_static), body.set(boundary.set)});
       boundary_of.push_back(k);
     }
   }

@@ -1,6 +1,7 @@
 #pragma once
 /// From [[boundary]], [[load]] and [initial] to the values of a problem.
 
+#include <string>
 #include <vector>
 
 #include "perikit/body/partition.hpp"
@@ -12,8 +13,11 @@
 
 namespace perikit {
 
-/// The value of one key; ramps: where it is a plain number.
-SpaceTimeFunction function_of(const Expression& expression, bool ramps);
+/// The value of one key. In quasi-static runs it ramps as the scene says, else where it does not mention t.
+SpaceTimeFunction function_of(const Expression& expression, const RampDescription& ramp, bool quasi_static);
+
+/// Throws InputError where a run without load parameter says how values ramp. key: of the boundary or load.
+void refuse_ramp(const RampDescription& ramp, const std::string& key, bool quasi_static);
 
 /// Of points and of the images that faces have. Throws InputError for prescribed velocities in quasi-static runs, and for points
 /// at a held face that are held themselves.

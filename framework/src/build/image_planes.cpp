@@ -164,7 +164,7 @@ class PlaneBuilder {
         throw InputError(boundary.face_position, key, fmt::format("found \"{}\", whose component {} {} prescribes too; allowed: each once", boundary.face, "xyz"[c], found_.origins[static_cast<std::size_t>(&plane - found_.planes.data())].key));
       plane.odd[c] = true;
       plane.motion[c] = static_cast<int>(found_.motions.size());
-      found_.motions.push_back({boundary.velocity, function_of(*boundary.components[c], quasi_static_)});
+      found_.motions.push_back({boundary.velocity, function_of(*boundary.components[c], boundary.ramp, quasi_static_)});
     }
   }
 

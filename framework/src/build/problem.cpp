@@ -47,7 +47,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
 
 /// How far the forces of a formulation reach (partition.hpp).
 Partition::Reach reach_of(const Formulation& formulation) {
-  return {.bonds = formulation.bond && formulation.base == BondBase::mean ? 3 : 2,
+  return {.bonds = formulation.bond && formulation.far_share > 0 ? 3 : 2,
           .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1)};
 }
 

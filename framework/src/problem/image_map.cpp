@@ -40,6 +40,18 @@ void ImageMap::copy_from_sources(FieldView field) const {
     for (std::size_t k = 0; k < image_.size(); ++k) field.component(c)[image_[k]] = field.component(c)[source_[k]];
 }
 
+void ImageMap::mirror_gradients(FieldView H) const {
+  const int d = H.components == 9 ? 3 : H.components == 5 ? 2 : 1;
+  for (int c = 0; c < H.components; ++c) {
+    const bool in_space = c < d * d;
+    const auto row = static_cast<std::size_t>(c / d), column = static_cast<std::size_t>(c % d);
+    double* of = H.component(c);
+    // The normal of a plane of symmetry changes its sign as the displacement along it does.
+    for (std::size_t k = 0; k < image_.size(); ++k)
+      of[image_[k]] = (in_space ? sign_[k][row] * sign_[k][column] : 1.0) * of[source_[k]];
+  }
+}
+
 void ImageMap::append_images(std::vector<std::int32_t>& points) const {
   std::vector<bool> chosen(map_.size(), false);
   for (const std::int32_t p : points) chosen[static_cast<std::size_t>(p)] = true;

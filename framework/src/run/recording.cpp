@@ -109,7 +109,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
                          std::string libraries)
     : simulation_(simulation),
       folder_(std::move(folder)),
-      show_progress_(show_progress),
+      show_progress_(show_progress && communicator().rank() == 0),
       first_(communicator().rank() == 0),
       fields_(simulation.problem(), simulation.dynamic(), !simulation.scene().initial_velocity.empty()),
       libraries_(std::move(libraries)),
@@ -263,8 +263,31 @@ void RunRecorder::step_done(const StepReport& report) {
   if (report.step == 0)
     done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
+  if (simulation_.quasi_static()) last_step_ = {report, simulation_.problem().snapshot(), row || stopping_, frame || stopping_};
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   progress(report);
+}
+
+bool RunRecorder::interrupted() const noexcept {
+  return communicator().largest(stop_requested() ? 1 : 0) > 0;
+}
+
+void RunRecorder::stopped_within_step() {
+  stopping_ = true;
+  if (communicator().size() > 1) communicator().broadcast(last_step_.state);  // rank 0 has it
+  simulation_.problem().restore(last_step_.state);
+  fields_.renew();
+  if (!last_step_.row) write_history(last_step_.report);
+  if (!last_step_.frame) write_frame(last_step_.report);
+  keep_checkpoint(last_step_.report);
+  log(fmt::format("stopped within step {}, which was given up", last_step_.report.step + 1));
+}
+
+void RunRecorder::working(std::string_view what) {
+  if (line_due())
+    show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what,
+                     std::chrono::duration<double>(shown_ - start_).count()),
+         false);
 }
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
@@ -305,21 +328,17 @@ void RunRecorder::write_history(const StepReport& report) {
   if (first_) history_->row(row);
 }
 
-void RunRecorder::progress(const StepReport& report) {
-  if (!show_progress_ || !first_) return;
+bool RunRecorder::line_due() {
   const auto now = std::chrono::steady_clock::now();
-  const bool terminal = isatty(fileno(stderr));
-  const bool end = last(report.step, report.time);
-  if (!end && now - shown_ < (terminal ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000))) return;
+  if (!show_progress_ ||
+      now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000)))
+    return false;
   shown_ = now;
-  const double spent = std::chrono::duration<double>(now - start_).count();
-  const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
-  const double rate = static_cast<double>(report.step - first_step_) *
-                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  const std::string line =
-      fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
-                  report.end_time, report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
-  if (terminal) {
+  return true;
+}
+
+void RunRecorder::show(const std::string& line, bool end) {
+  if (isatty(fileno(stderr))) {
     fmt::print(stderr, "\r\033[K{}", line);
     line_open_ = !end;
     if (end) std::fputc('\n', stderr);
@@ -327,6 +346,25 @@ void RunRecorder::progress(const StepReport& report) {
     fmt::print(stderr, "{}\n", line);
   }
   std::fflush(stderr);
+}
+
+void RunRecorder::progress(const StepReport& report) {
+  const bool end = last(report.step, report.time);
+  if (!line_due() && !(end && show_progress_)) return;
+  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
+  const double left = done > 0 ? spent * (1 - done) / done : 0.0;
+  if (!simulation_.dynamic()) {
+    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time,
+                     report.end_time, report.iterations, report.residual, left),
+         end);
+    return;
+  }
+  const double rate = static_cast<double>(report.step - first_step_) *
+                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
+                   report.end_time, report.time_step, rate, left),
+       end);
 }
 
 }  // namespace perikit

@@ -53,8 +53,18 @@ void SceneReader::read_boundaries(const toml::table& root) {
       if (values.has(key)) description.components = components(values, key);
     }
     description.position = values.position(description.velocity ? "velocity" : "displacement");
+    description.ramp = ramp_of(values, description.components);
     scene_.boundaries.push_back(std::move(description));
   }
+}
+
+RampDescription SceneReader::ramp_of(const ParameterValues& values, const std::vector<std::optional<Expression>>& components) {
+  if (!values.has("ramp")) return {};
+  const bool ramp = values.boolean("ramp");
+  if (ramp && std::ranges::any_of(components, [](const auto& value) { return value && value->depends_on_time(); }))
+    reader_.errors.add(values.position("ramp"), join_path(values.path(), "ramp"),
+                       "found true with a value that mentions t and says itself how it grows; allowed: values without t");
+  return {ramp, values.position("ramp")};
 }
 
 void SceneReader::check_axis(char axis, const ParameterValues& values, const char* key) {
@@ -102,19 +112,31 @@ void SceneReader::read_loads(const toml::table& root) {
       description.type = type;
       description.components = expressions(values, key, true);
     }
+    if (values.has("pressure")) {
+      description.type = Type::pressure;
+      description.components.emplace_back(values.expression("pressure"), scene_.constants, true, values.position("pressure"),
+                                          path + ".pressure");
+      description.follower = values.boolean("follower");
+      if (!values.has("face")) description.position = values.position("pressure");
+    } else if (values.has("follower") && values.boolean("follower")) {
+      reader_.errors.add(values.position("follower"), path + ".follower",
+                         "found it without pressure; allowed: only with pressure");
+    }
     if (load->contains("traction") && !load->contains("face")) {
       reader_.errors.add(reader_.position(*load), path + ".face",
                          "found nothing beside traction; allowed: " + allowed(*table.find("face")));
     }
     if (values.has("face")) {
       description.face = values.text("face");
-      if (!load->contains("traction")) {
-        reader_.errors.add(values.position("face"), path + ".face",
-                           fmt::format("found \"{}\" without traction; allowed: only with traction", description.face));
+      if (!load->contains("traction") && !load->contains("pressure")) {
+        reader_.errors.add(
+            values.position("face"), path + ".face",
+            fmt::format("found \"{}\" without traction; allowed: only with traction or pressure", description.face));
       } else {
         check_axis(description.face[1], values, "face");
       }
     }
+    description.ramp = ramp_of(values, {description.components.begin(), description.components.end()});
     scene_.loads.push_back(std::move(description));
   }
 }

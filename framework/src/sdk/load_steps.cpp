@@ -58,7 +58,12 @@ class LoadSteps {
   void run() {
     if (started() == 0) begin();
     find_driving_force(old_driving_);
-    while (position() < planned() && !observer_.cancelled()) step();
+    equilibrium_.watch(observer_);
+    while (position() < planned() && !observer_.cancelled()) {
+      if (step()) continue;
+      observer_.stopped_within_step();
+      return;
+    }
   }
 
  private:
@@ -77,12 +82,29 @@ class LoadSteps {
     if (!equilibrium_.residual(u_, residual_, sample ? &state_.energies.strain : nullptr)) {
       throw RunError(fmt::format("{}: the initial displacement is inadmissible: {}", integrator_, equilibrium_.failure()));
     }
+    warn_of_jumps();
     started() = 1;
     increment() = 1;
     report(0.0, 0);
   }
 
-  void step() {
+  /// A first step that has to find what should have been there at its start may take long, or end elsewhere.
+  void warn_of_jumps() {
+    if (const double gap = equilibrium_.missing(u_, driving_); gap > 1e-12 * problem_.body().spacing())
+      observer_.log(
+          fmt::format("warning: prescribed displacements are up to {:.3g} m away from the initial ones at load parameter 0; the "
+                      "first step makes up for it",
+                      gap));
+    if (!equilibrium_.converged())
+      observer_.log(
+          fmt::format("warning: the body is out of balance by {:.3g} N at load parameter 0, by its initial displacement or by "
+                      "loads that do not begin at 0; "
+                      "the first step starts from there",
+                      equilibrium_.residual_norm()));
+  }
+
+  /// False where the run is to end within the step.
+  bool step() {
     // A step never passes a planned point.
     double span = std::min(increment(), std::floor(position()) + 1 - position());
     const double smallest = std::ldexp(1.0, -static_cast<int>(options_.cut_backs));
@@ -94,9 +116,10 @@ class LoadSteps {
       if (solution.converged) settle(span, solution);
       if (solution.converged) {
         accept(span, solution);
-        return;
+        return true;
       }
       give_up();
+      if (equilibrium_.stopped()) return false;
       const double t = (position() + span) / planned();
       equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
       if (span / 2 < smallest) {

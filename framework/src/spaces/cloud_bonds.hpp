@@ -46,7 +46,8 @@ class CloudBonds final : public EvaluationSpace {
   const CloudFamilies& families_;
   const Formulation& formulation_;
   const Laws& laws_;
-  bool selective_, mean_;
+  bool selective_;
+  double far_share_;
   bool pairs_;       ///< each bond evaluated once for both ends
   bool two_states_;  ///< and yet with a history of its own for each
   std::size_t points_;

@@ -49,7 +49,8 @@ class LatticeBonds final : public EvaluationSpace {
   const LatticeTiles& tiles_;
   const Formulation& formulation_;
   const Laws& laws_;
-  bool selective_, mean_;
+  bool selective_;
+  double far_share_;
   bool pairs_;                                  ///< each bond evaluated once for both ends
   bool two_states_;                             ///< and yet with a history of its own for each
   LatticeOperator<D> operator_;                 ///< order 1

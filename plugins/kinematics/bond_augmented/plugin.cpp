@@ -31,10 +31,9 @@ class BondAugmented final : public BondKinematics {
   /// g = c k / (1 + c xi . k),  c = (lambda - 1) omega V,  k = K^-1 xi
   template <int D>
   void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept {
-    const std::size_t per_bond = family.inverse_shape_stride;
     const auto inverse = [&](int a, int b, int bond) {
-      const double* p = family.inverse_shape + static_cast<std::size_t>(symmetric_index(D, a, b)) * per_bond;
-      return per_bond == 0 ? Pack(family.inverse_shape[symmetric_index(D, a, b)]) : Pack::load(p + bond);
+      const double* shape = family.shape_of(symmetric_index(D, a, b), bond);
+      return family.inverse_shape_stride == 0 ? Pack(*shape) : Pack::load(shape);
     };
     for (int bond = 0; bond < family.bonds; bond += pack_width) {
       Pack xi[D], k[D], projection(0.0);

@@ -15,8 +15,8 @@ struct Formulation {
   const WeightedKinematics* weighted = nullptr;
   const PairKinematics* pairs = nullptr;
   GradientMap map = GradientMap::identity;
-  int order = 1;                                  ///< of the point gradient
-  BondBase base = BondBase::own;
+  int order = 1;         ///< of the point gradient
+  double far_share = 0;  ///< s of A_b = (1 - s) Hbar_i + s Hbar_j
   BondWeight weight = BondWeight::volume;
   bool pair_symmetric = false, g_from_xi_only = false;
   PartWeight part_weight = PartWeight::equal;

@@ -4,9 +4,10 @@
 /// momentum balances hold for every formulation without further code. A library implements one of four small classes:
 ///
 ///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
-///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = Hbar_i or (Hbar_i + Hbar_j)/2 (baqp, projection, ...)
-///   WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1 (non_spherical, sub_horizon, ...)
-///   PairKinematics      no gradients and no material evaluations: central forces along the bonds (bond_based, ordinary)
+///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0 or 1/2
+///   (projection, baqp) or any other share WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k)
+///   K_q^-1 (non_spherical, sub_horizon, ...) PairKinematics      no gradients and no material evaluations: central forces along
+///   the bonds (bond_based, ordinary)
 ///
 /// or puts a map of the gradients over one with evaluation points at bonds or parts of families: MappedKinematics (selective).
 ///
@@ -29,16 +30,21 @@ namespace perikit {
 /// One family (or a part of one) as arrays over its bonds, padded to `padding` with bonds of zero weight and unit xi.
 struct FamilyView {
   int dimension = 3;
-  int bonds = 0;                      ///< entries; padded(bonds) can be read and written
-  double horizon = 0;                 ///< delta [m]
-  const double* xi[3] = {};           ///< bond vectors [m]; unused axes null
-  const double* length = nullptr;     ///< |xi| [m]
-  const double* volume = nullptr;     ///< V_j [m^3]; 0 in the padding
-  const double* omega = nullptr;      ///< influence (with bond integrity); 0 in the padding
-  /// Inverse of the owner's shape tensor, symmetric: xx | xx yy xy | xx yy zz xy xz yz. Component c of bond k at
-  /// inverse_shape[c * inverse_shape_stride + k * (inverse_shape_stride != 0)]: one owner, or one per bond.
+  int bonds = 0;                   ///< entries; padded(bonds) can be read and written
+  double horizon = 0;              ///< delta [m]
+  const double* xi[3] = {};        ///< bond vectors [m]; unused axes null
+  const double* length = nullptr;  ///< |xi| [m]
+  const double* volume = nullptr;  ///< V_j [m^3]; 0 in the padding
+  const double* omega = nullptr;   ///< influence (with bond integrity); 0 in the padding
+  /// Inverse of the owner's shape tensor, symmetric: xx | xx yy xy | xx yy zz xy xz yz. Read it by `shape`.
   const double* inverse_shape = nullptr;
-  std::size_t inverse_shape_stride = 0;
+  std::size_t inverse_shape_stride = 0;  ///< 0: one owner of all bonds; else each bond has its own
+
+  /// Component c of it for bond k, and where it is stored.
+  double shape(int c, int k) const noexcept { return *shape_of(c, k); }
+  const double* shape_of(int c, int k) const noexcept {
+    return inverse_shape_stride == 0 ? inverse_shape + c : inverse_shape + static_cast<std::size_t>(c) * inverse_shape_stride + k;
+  }
 };
 
 /// What the moduli of a pair law at one point may depend on.
@@ -75,15 +81,23 @@ struct DilatationBatch {
   double* stiffness = nullptr;        ///< d2phi/dtheta2 [Pa]
 };
 
-enum class BondBase { own, mean };              ///< A_b: the gradient of the owner, or the mean of both ends
-enum class BondWeight { volume, kernel };       ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
-enum class ForceState { variational, local };   ///< forces: -dE/du, or each bond's own force state alone
-enum class PartWeight { equal, volume };        ///< W_q of the admissible parts of a point: equal shares of V_i, or shares as their volumes
-enum class GradientMap { identity, selective }; ///< selective: the volume change of every evaluation point is that of its owner
+enum class BondBase {
+  own,
+  mean,
+  blend
+};  ///< A_b: the gradient of the owner, the mean of both ends, or (1 - far_share) of the owner's and far_share of the other
+enum class BondWeight { volume, kernel };      ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
+enum class ForceState { variational, local };  ///< forces: -dE/du, or each bond's own force state alone
+enum class PartWeight {
+  equal,
+  volume
+};  ///< W_q of the admissible parts of a point: equal shares of V_i, or shares as their volumes
+enum class GradientMap { identity, selective };  ///< selective: the volume change of every evaluation point is that of its owner
 
 struct BondTraits {
   int order = 1;                            ///< of the point gradient
   BondBase base = BondBase::own;
+  double far_share = 0.5;  ///< of `blend`, in [0, 1]
   BondWeight weight = BondWeight::volume;
   bool pair_symmetric = false;              ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
   bool g_from_xi_only = false;              ///< g is odd in xi and independent of omega and the shape tensor

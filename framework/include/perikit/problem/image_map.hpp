@@ -25,6 +25,9 @@ class ImageMap {
   void fold(const BlockMatrix& full, BlockMatrix& K) const;
   /// field(image) <- field(source).
   void copy_from_sources(FieldView field) const;
+  /// H(image) <- what a gradient H(source) is beyond planes of symmetry and periodic sides, in the components of the space. Not
+  /// beyond faces that are held: what is prescribed there comes in too.
+  void mirror_gradients(FieldView H) const;
   /// Appends the images of the points, internal indices.
   void append_images(std::vector<std::int32_t>& points) const;
   /// Reactions of images, by component, go to the points at the planes: what holds the planes in place [N].

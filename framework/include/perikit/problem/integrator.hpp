@@ -32,11 +32,19 @@ class Observer {
   virtual void log(std::string_view message) = 0;
   /// True when the run should end after this step.
   virtual bool cancelled() const noexcept { return false; }
+
+  // For integrators whose steps take long.
+  /// What an integrator is at within a step, told again and again.
+  virtual void working(std::string_view /*what*/) {}
+  /// True when the run should end within this step: the integrator then calls `stopped_within_step` and returns.
+  virtual bool interrupted() const noexcept { return false; }
+  /// The present step is given up. The observer puts the problem back to where the last `step_done` found it.
+  virtual void stopped_within_step() {}
 };
 
 struct IntegratorTraits {
   bool dynamic = false;       ///< needs densities; writes velocity
-  bool quasi_static = false;  ///< time is a load parameter in [0, 1]; plain numbers of boundaries and loads ramp
+  bool quasi_static = false;  ///< time is a load parameter in [0, 1]; values of boundaries and loads that do not mention t ramp
   /// Runs where each of several ranks has a part of the body: it asks for no assembled tangent, and what it sums over points goes
   /// through the operations on fields or `total_over_ranks`.
   bool several_ranks = false;

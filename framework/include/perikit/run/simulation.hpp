@@ -25,6 +25,7 @@ class Simulation {
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   bool dynamic() const noexcept { return traits_.dynamic; }
+  bool quasi_static() const noexcept { return traits_.quasi_static; }
   /// Runs to the end. Throws RunError.
   void run(Observer& observer);
   /// Points, bonds, memory and the integrator's plan, one per line - what `perikit check` prints.
@@ -80,6 +81,9 @@ class RunRecorder final : public Observer {
   /// Lines that begin with "warning" are told again at the end.
   void log(std::string_view message) override;
   bool cancelled() const noexcept override;
+  void working(std::string_view what) override;
+  bool interrupted() const noexcept override;
+  void stopped_within_step() override;
 
   /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
@@ -101,6 +105,9 @@ class RunRecorder final : public Observer {
   void write_frame(const StepReport& report);
   void write_history(const StepReport& report);
   void progress(const StepReport& report);
+  /// Whether a line of progress is due, which is then taken to be shown.
+  bool line_due();
+  void show(const std::string& line, bool end);
 
   Simulation& simulation_;
   std::filesystem::path folder_;
@@ -119,6 +126,12 @@ class RunRecorder final : public Observer {
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
   bool stopping_ = false;
+  /// Runs whose steps can be given up: where the last one ended, and whether its row and its frame are written.
+  struct LastStep {
+    StepReport report;
+    std::vector<std::byte> state;
+    bool row = false, frame = false;
+  } last_step_;
   // Of this process; a resumed run does not know how long the earlier ones took.
   double output_seconds_ = 0;
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
