@@ -69,22 +69,6 @@ def other_commands():
     check(done.returncode == 2 and perikit_lines(done.stderr, "found 2 processes (OMPI_COMM_WORLD_SIZE); allowed: one, but for `perikit run`") == 1, "perikit study on 2 ranks")
 
 
-def disk_full():
-    """Rank 0 cannot write its files; the others wait for it in the next step."""
-    text = scene('type = "conventional"')
-    file = WORK + "/full.toml"
-    shutil.rmtree(WORK + "/full", ignore_errors=True)
-    with open(file, "w") as out:
-        out.write(text)
-    words = " ".join(command(PROGRAM, file, WORK + "/full", 3, 1))
-    began = time.time()
-    done = subprocess.run(["bash", "-c", "ulimit -f 40; exec " + words], env=dict(ENVIRONMENT, TMPDIR="/tmp"), capture_output=True, text=True, timeout=120)
-    check(done.returncode == 1 and perikit_lines(done.stderr, "the run failed") == 1 and time.time() - began < LIMIT,
-          "no room for a file: status %d after %.1f s" % (done.returncode, time.time() - began))
-    if done.returncode != 1:
-        print(done.stderr)
-
-
 def start(text, folder, ranks, options=()):
     shutil.rmtree(folder, ignore_errors=True)
     with open(folder + ".toml", "w") as out:
@@ -100,16 +84,35 @@ def wait_for(folder, frames):
     raise RuntimeError("no frames in " + folder)
 
 
+LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 20.0\ntime_step = 0.02').replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
+
+
+def output_fails():
+    """Rank 0 cannot write a frame; the others wait for it in the next step."""
+    folder = WORK + "/output"
+    process = start(LONG, folder, 3)
+    wait_for(folder, 2)
+    began = time.time()
+    os.rename(folder + "/frames", folder + "/earlier")
+    with open(folder + "/frames", "w"):
+        pass
+    _, err = process.communicate(timeout=120)
+    # Until the next frame is due the run goes on.
+    check(process.returncode == 1 and perikit_lines(err, "the run failed") == 1 and time.time() - began < 3 * LIMIT,
+          "no folder for frames: status %d after %.1f s" % (process.returncode, time.time() - began))
+    if process.returncode != 1:
+        print(err)
+
+
 def stops():
     """A signal to one rank, to mpirun, and a rank that is killed: the run goes on from its checkpoint on another number of ranks."""
-    text = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 40.0\ntime_step = 0.02').replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
-    done = run(PROGRAM, text, WORK + "/whole", 0)
+    done = run(PROGRAM, LONG, WORK + "/whole", 0)
     check(done.returncode == 0, "a run without a stop")
     children = lambda process: [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()]
     for name, target, number in (("SIGTERM to one rank", lambda p: children(p)[1], signal.SIGTERM), ("SIGTERM to mpirun", lambda p: p.pid, signal.SIGTERM),
                                  ("kill -9 of one rank", lambda p: children(p)[2], signal.SIGKILL)):
         folder = WORK + "/stopped"
-        process = start(text, folder, 3)
+        process = start(LONG, folder, 3)
         wait_for(folder, 3)
         began = time.time()
         os.kill(target(process), number)
@@ -119,7 +122,7 @@ def stops():
         if number == signal.SIGTERM and name == "SIGTERM to one rank":
             check(perikit_lines(err, "stopped by a signal") == 1 and process.returncode == 1, name + ": one message")
         for ranks in ((2,) if name == "SIGTERM to one rank" else (1,)):
-            done = run(PROGRAM, text, folder, ranks, 1, ("--resume",))
+            done = run(PROGRAM, LONG, folder, ranks, 1, ("--resume",))
             found = differences(WORK + "/whole", folder) if done.returncode == 0 else [done.stderr]
             check(not found, "%s, then --resume on %d ranks: %s" % (name, ranks, "; ".join(found) or "the run without a stop"))
 
@@ -129,7 +132,7 @@ os.makedirs(WORK, exist_ok=True)
 refusals()
 throws()
 other_commands()
-disk_full()
+output_fails()
 stops()
 print("%d checks failed" % len(failed))
 sys.exit(1 if failed else 0)
