@@ -79,18 +79,15 @@ void add_commands(CLI::App& app, Options& options) {
                             "CSV of operations a point and step; default: the one that comes with perikit");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
-  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")
-      ->required();
+  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   add("contract", "Run the contract suites on every part of a library", contract)
-      ->add_option("library", options.library, "Library of parts (FILE.so)")
-      ->required();
+      ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)
       ->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
   CLI::App* describe_command =
       add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
-  describe_command->add_option("part", options.part,
-                               "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
+  describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");
   describe_command->add_flag("--markdown", options.markdown, "The reference page: everything, as Markdown");
 }
 
@@ -99,8 +96,7 @@ int refuse(const CLI::App& app, const CLI::ParseError& error, const std::string&
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
   if (std::ranges::find(commands, word) == commands.end() && !word.starts_with('-')) {
-    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "),
-               did_you_mean(word, commands));
+    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "), did_you_mean(word, commands));
   } else {
     fmt::print(stderr, "{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " ");
   }

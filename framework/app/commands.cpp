@@ -51,9 +51,7 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 
 }  // namespace
 
-std::string version() {
-  return PERIKIT_VERSION;
-}
+std::string version() { return PERIKIT_VERSION; }
 
 void run(const Options& options) {
   const auto registry = open_registry(options);
@@ -69,10 +67,9 @@ void run(const Options& options) {
                        library_fingerprints(*registry));
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
-    const std::string from =
-        recorder.resumed_step() >= 0
-            ? fmt::format("resumed after step {}, time {:.6g} s", recorder.resumed_step(), simulation.problem().state().time)
-            : "no checkpoint to resume from: the run starts from its initial state";
+    const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
+                                                                        recorder.resumed_step(), simulation.problem().state().time)
+                                                          : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
     if (!options.quiet && first) fmt::print("{}\n", from);
   }
@@ -182,8 +179,7 @@ void contract(const Options& options) {
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
-  throw InputError({program.string()}, "",
-                   fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
+  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace perikit::app

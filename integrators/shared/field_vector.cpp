@@ -17,15 +17,9 @@ struct Content {
   FieldView view;
 };
 
-Content& content(N_Vector v) {
-  return *static_cast<Content*>(v->content);
-}
-double* data(N_Vector v) {
-  return content(v).view.data;
-}
-std::size_t size(N_Vector v) {
-  return content(v).view.size();
-}
+Content& content(N_Vector v) { return *static_cast<Content*>(v->content); }
+double* data(N_Vector v) { return content(v).view.data; }
+std::size_t size(N_Vector v) { return content(v).view.size(); }
 
 /// z[k] <- value(k) for all k.
 template <class Value>
@@ -93,12 +87,8 @@ void set_operations(N_Vector v) {
     combine(a, content(x).view, b, content(y).view, content(z).view);
   };
   ops->nvconst = [](realtype c, N_Vector z) { fill(c, content(z).view); };
-  ops->nvprod = [](N_Vector x, N_Vector y, N_Vector z) {
-    assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] * b[k]; });
-  };
-  ops->nvdiv = [](N_Vector x, N_Vector y, N_Vector z) {
-    assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] / b[k]; });
-  };
+  ops->nvprod = [](N_Vector x, N_Vector y, N_Vector z) { assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] * b[k]; }); };
+  ops->nvdiv = [](N_Vector x, N_Vector y, N_Vector z) { assign(z, [a = data(x), b = data(y)](std::size_t k) { return a[k] / b[k]; }); };
   ops->nvscale = [](realtype c, N_Vector x, N_Vector z) { assign(z, [c, a = data(x)](std::size_t k) { return c * a[k]; }); };
   ops->nvabs = [](N_Vector x, N_Vector z) { assign(z, [a = data(x)](std::size_t k) { return std::abs(a[k]); }); };
   ops->nvinv = [](N_Vector x, N_Vector z) { assign(z, [a = data(x)](std::size_t k) { return 1 / a[k]; }); };
@@ -119,9 +109,7 @@ SundialsContext::SundialsContext() {
   if (SUNContext_Create(nullptr, &context_) != 0) throw RunError("SUNDIALS gives no context");
 }
 
-SundialsContext::~SundialsContext() {
-  SUNContext_Free(&context_);
-}
+SundialsContext::~SundialsContext() { SUNContext_Free(&context_); }
 
 FieldVector wrap(const Problem& problem, FieldView view, SUNContext context) {
   FieldVector v(N_VNewEmpty(context));
@@ -131,8 +119,6 @@ FieldVector wrap(const Problem& problem, FieldView view, SUNContext context) {
   return v;
 }
 
-FieldView field_of(N_Vector v) {
-  return content(v).view;
-}
+FieldView field_of(N_Vector v) { return content(v).view; }
 
 }  // namespace perikit

@@ -81,8 +81,8 @@ class Stepper {
     for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
   }
 
-  /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of
-  /// the prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
+  /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of the
+  /// prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
   void add_work(double dt, ConstFieldView old_external) {
     double work = 0;
     ExactSum held;
@@ -124,7 +124,7 @@ class Stepper {
   double uniform_;
   bool loaded_;
   FieldView external_;
-  std::vector<double> held_, before_, speed_, full_;  ///< by constrained component
+  std::vector<double> held_, before_, speed_, full_;   ///< by constrained component
 };
 
 }  // namespace
@@ -136,12 +136,11 @@ double Verlet::stable_step(Problem& problem) const {
 }
 
 double Verlet::steps_to_end(double time, double step) const {
-  constexpr double most = 1e15;  // whole numbers that a double holds
+  constexpr double most = 1e15;   // whole numbers that a double holds
   const double steps = std::max(1.0, std::ceil((options_.end_time - time) / step * (1 - 1e-12)));
   if (steps <= most) return steps;
-  throw options_.values.error(
-      "end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps", options_.end_time,
-                              steps, step, most));
+  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps",
+                                                      options_.end_time, steps, step, most));
 }
 
 std::string Verlet::plan(Problem& problem) {
@@ -155,12 +154,12 @@ void Verlet::run(Problem& problem, Observer& observer) {
   State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
   const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
-  double& first = plan[0];  // step at which the plan was made
-  double& start = plan[1];  // and its time
+  double& first = plan[0];     // step at which the plan was made
+  double& start = plan[1];     // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
-  double& counter = plan[4];  // steps of the plan
-  double& broke = plan[5];    // whether bonds have failed since the last estimate
+  double& counter = plan[4];   // steps of the plan
+  double& broke = plan[5];     // whether bonds have failed since the last estimate
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
     first = static_cast<double>(state.step);
@@ -225,8 +224,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step,
-                                 counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
+                                 state.step, counter, dt));
       }
     }
     observer.step_done(report());

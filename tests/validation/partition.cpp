@@ -73,8 +73,7 @@ contract::BodyOptions body_of(int dimension, bool cloud) {
   body.sets = fmt::format("low = \"x < 1.5\"\nhigh = \"x > {}\"\n", body.cells - (dimension > 1 ? 2 : 0) - 1.5);
   const std::string load = dimension == 3 ? "[0.02, 0.01, 0.0]" : dimension == 2 ? "[0.02, 0.01]" : "[0.02]";
   const std::string fixed = dimension == 3 ? "[0, 0, 0]" : dimension == 2 ? "[0, 0]" : "[0]";
-  body.conditions =
-      fmt::format("[[boundary]]\nset = \"low\"\ndisplacement = {}\n[[load]]\nset = \"high\"\nforce = {}\n", fixed, load);
+  body.conditions = fmt::format("[[boundary]]\nset = \"low\"\ndisplacement = {}\n[[load]]\nset = \"high\"\nforce = {}\n", fixed, load);
   return body;
 }
 
@@ -106,8 +105,7 @@ void compare(const std::string& text, const std::vector<int>& shares, bool break
 std::vector<std::string> kinematics_tables() {
   std::vector<std::string> tables;
   for (const std::string& name : registry().names(Kind::kinematics))
-    for (const std::string& example : registry().describe(Kind::kinematics, name).examples)
-      tables.push_back(fmt::format("type = \"{}\"\n{}", name, example));
+    for (const std::string& example : registry().describe(Kind::kinematics, name).examples) tables.push_back(fmt::format("type = \"{}\"\n{}", name, example));
   tables.push_back("type = \"conventional\"\nstabilization = { type = \"silling\", coefficient = 0.5 }");
   tables.push_back("type = \"conventional\"\nstabilization = { type = \"wan\" }");
   tables.push_back("type = \"conventional\"\norder = 2\nstabilization = { type = \"wan\" }");

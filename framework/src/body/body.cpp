@@ -89,8 +89,8 @@ Body::Body(const Body& whole, const Images& images, std::uint16_t image_material
   copy_sets(whole, place, image_material);
 }
 
-/// Sets and materials of the points that have a place here, by internal index of `whole`; all other points have the material
-/// `others`. Dead cells look like points of the first one, so that most groups of eight have one law.
+/// Sets and materials of the points that have a place here, by internal index of `whole`; all other points have the material `others`. Dead
+/// cells look like points of the first one, so that most groups of eight have one law.
 void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others) {
   material_ids_.assign(stride_, 0);
   for (const std::int32_t p : internal_) material_ids_[static_cast<std::size_t>(p)] = others;
@@ -101,9 +101,7 @@ void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, 
   }
   for (const std::int32_t p : whole.internal_) {
     const std::int32_t own = place[static_cast<std::size_t>(p)];
-    if (own >= 0)
-      material_ids_[static_cast<std::size_t>(own)] =
-          whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
+    if (own >= 0) material_ids_[static_cast<std::size_t>(own)] = whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];
   }
 }
 
@@ -134,8 +132,7 @@ void Body::place_on_lattice(const Lattice& old, double volume, const std::vector
     }
     const std::int64_t index = lattice.index(k[0], k[1], k[2]);
     if (taken[static_cast<std::size_t>(index)])
-      throw std::domain_error(
-          fmt::format("found an image of a point on another point at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]));
+      throw std::domain_error(fmt::format("found an image of a point on another point at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]));
     taken[static_cast<std::size_t>(index)] = true;
     internal_.push_back(static_cast<std::int32_t>(index));
   }
@@ -183,9 +180,7 @@ void Body::number_cloud() {
   }
 }
 
-std::int32_t Body::input_of(std::size_t internal_index) const noexcept {
-  return input_[internal_index];
-}
+std::int32_t Body::input_of(std::size_t internal_index) const noexcept { return input_[internal_index]; }
 
 Point Body::position(std::size_t p) const noexcept {
   if (lattice_) return lattice_->position(static_cast<std::int64_t>(p));

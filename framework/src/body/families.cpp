@@ -18,7 +18,7 @@ struct CellList {
   Point lower{};
   double size = 0;
   std::array<std::int64_t, 3> count{1, 1, 1};
-  std::vector<std::int32_t> first;  ///< by box
+  std::vector<std::int32_t> first;   ///< by box
   std::vector<std::int32_t> points;
 
   CellList(std::span<const double> rows, std::size_t n, int dimension, double horizon) {
@@ -47,14 +47,12 @@ struct CellList {
     std::partial_sum(first.begin(), first.end(), first.begin());
     points.resize(n);
     std::vector<std::int32_t> next(first.begin(), first.end() - 1);
-    for (std::size_t p = 0; p < n; ++p)
-      points[static_cast<std::size_t>(next[static_cast<std::size_t>(box[p])]++)] = static_cast<std::int32_t>(p);
+    for (std::size_t p = 0; p < n; ++p) points[static_cast<std::size_t>(next[static_cast<std::size_t>(box[p])]++)] = static_cast<std::int32_t>(p);
   }
 
   std::array<std::int64_t, 3> of(const double* x) const {
     std::array<std::int64_t, 3> k{};
-    for (std::size_t c = 0; c < 3; ++c)
-      k[c] = std::clamp<std::int64_t>(static_cast<std::int64_t>((x[c] - lower[c]) / size), 0, count[c] - 1);
+    for (std::size_t c = 0; c < 3; ++c) k[c] = std::clamp<std::int64_t>(static_cast<std::int64_t>((x[c] - lower[c]) / size), 0, count[c] - 1);
     return k;
   }
   std::int64_t flat(const std::array<std::int64_t, 3>& k) const { return k[0] + count[0] * (k[1] + count[1] * k[2]); }

@@ -19,9 +19,7 @@ namespace perikit {
 namespace {
 
 /// The number of the material of ghosts and images, after those of the scene.
-std::uint16_t image_material(const Scene& scene) {
-  return static_cast<std::uint16_t>(scene.regions.size() + 1);
-}
+std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint16_t>(scene.regions.size() + 1); }
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
@@ -91,8 +89,7 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
   return factory.stabilization(*scene.stabilization);
 }
 
-std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body,
-                                         const Formulation& formulation) {
+std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
   try {
     return Families::make(body, factory.influence(*scene.influence), needs);
@@ -108,15 +105,13 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
     if (laws.records()[id].material->state_components(laws.space()) == 0) continue;
     const PartValues& part = *sources[id];
     const auto refuse = [&](const std::string& with, const std::string& allowed) {
-      throw InputError(
-          part.values.position("type"), part.values.path() + ".type",
-          fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
+      throw InputError(part.values.position("type"), part.values.path() + ".type",
+                       fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
     if (quasi_static)
       refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
              "an explicit integrator, or another material");
-    if (formulation.force_state == ForceState::local)
-      refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+    if (formulation.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
 }
 
@@ -151,8 +146,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   set_initial_state(scene, body, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
-  ProblemValues values{
-      body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
+  ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }
 

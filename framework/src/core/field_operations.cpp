@@ -17,15 +17,12 @@ double dot(ConstFieldView a, ConstFieldView b) {
   return total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return a.data[k] * b.data[k]; }));
 }
 
-double norm(ConstFieldView a) {
-  return std::sqrt(dot(a, a));
-}
+double norm(ConstFieldView a) { return std::sqrt(dot(a, a)); }
 
 double largest_magnitude(ConstFieldView a) {
   std::vector<double> most((a.size() + sum_block - 1) / sum_block, 0.0);
   parallel_for(most.size(), [&](std::size_t b) {
-    for (std::size_t k = b * sum_block; k < std::min(a.size(), (b + 1) * sum_block); ++k)
-      most[b] = std::max(most[b], std::abs(a.data[k]));
+    for (std::size_t k = b * sum_block; k < std::min(a.size(), (b + 1) * sum_block); ++k) most[b] = std::max(most[b], std::abs(a.data[k]));
   });
   return communicator().largest(most.empty() ? 0.0 : *std::max_element(most.begin(), most.end()));
 }
@@ -37,8 +34,7 @@ void combine(double a, ConstFieldView x, double b, ConstFieldView y, FieldView s
 }
 
 void copy(ConstFieldView from, FieldView to) {
-  over_blocks(to.size(),
-              [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
+  over_blocks(to.size(), [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
 }
 
 void fill(double value, FieldView x) {

@@ -13,15 +13,9 @@ namespace {
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 }
 
-int thread_count() noexcept {
-  return threads;
-}
-void set_thread_count(int n) noexcept {
-  threads = counts_operations ? 1 : std::max(1, n);
-}
-int thread_index() noexcept {
-  return detail::team_index();
-}
+int thread_count() noexcept { return threads; }
+void set_thread_count(int n) noexcept { threads = counts_operations ? 1 : std::max(1, n); }
+int thread_index() noexcept { return detail::team_index(); }
 
 namespace detail {
 void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)) {

@@ -1,7 +1,6 @@
 #pragma once
-/// Fixed blocks of work, which of them reach which, and their colours: blocks of one colour touch disjoint sets of points, so
-/// that they may scatter at the same time, and colours run one after the other, so that sums never depend on the number of
-/// threads.
+/// Fixed blocks of work, which of them reach which, and their colours: blocks of one colour touch disjoint sets of points, so that
+/// they may scatter at the same time, and colours run one after the other, so that sums never depend on the number of threads.
 
 #include <cstdint>
 #include <vector>
@@ -13,8 +12,8 @@ namespace perikit {
 /// Units are any fixed grouping of points in which every block is one.
 struct BlockReach {
   std::size_t units = 0;
-  std::vector<std::int32_t> own;                   ///< unit of block b
-  std::vector<std::vector<std::int32_t>> touches;  ///< units that hold the points of block b and of all their families
+  std::vector<std::int32_t> own;                     ///< unit of block b
+  std::vector<std::vector<std::int32_t>> touches;    ///< units that hold the points of block b and of all their families
 };
 
 class Colouring {

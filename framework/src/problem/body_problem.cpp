@@ -92,9 +92,7 @@ void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const
   images()->fold(full, K);
 }
 
-EvaluationStatus BodyProblem::sample(PointSamples& samples) {
-  return terms().sample(seen(state().displacement(), seen_), samples);
-}
+EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
 
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
@@ -155,8 +153,7 @@ EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K)
 AssembledSize BodyProblem::assembled_size() {
   refuse_ranks(parts_);
   AssembledSize size = terms().assembled_size();
-  if (images())
-    size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);  // it is there twice
+  if (images()) size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);   // it is there twice
   return size;
 }
 
@@ -178,8 +175,7 @@ bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
     if (ghosts_) ghosts_->forward(end);
     if (images()) images()->extend(end);
   };
-  return parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step,
-                                velocity.data ? half_step : Motion());
+  return parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step, velocity.data ? half_step : Motion());
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {

@@ -26,9 +26,7 @@ std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
-bool reached(double time, double wanted) {
-  return time >= wanted - 1e-9 * std::abs(wanted);
-}
+bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
 bool ended(const OutputProgress& run, std::int64_t step, double time) {
   return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
@@ -90,17 +88,11 @@ void share(Checkpoint& checkpoint) {
 
 }  // namespace
 
-void request_stop() noexcept {
-  stop = true;
-}
-bool stop_requested() noexcept {
-  return stop;
-}
+void request_stop() noexcept { stop = true; }
+bool stop_requested() noexcept { return stop; }
 
 std::vector<std::string> history_columns(const Scene& scene) {
-  std::vector<std::string> columns{"step",           "time",          "time_step",         "strain_energy",
-                                   "kinetic_energy", "external_work", "dissipated_energy", "iterations",
-                                   "residual"};
+  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -148,8 +140,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
 void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
-  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml"))
-    check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
+  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml")) check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
   std::error_code missing;
   if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
     throw InputError({scene.file.string()}, "output",
@@ -199,9 +190,7 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept {
-  return stopping_;
-}
+bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return ended(done_, step, time);
@@ -219,8 +208,7 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 ||
-         (done_.steps_expected > 0 && step >= done_.steps_expected);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
 bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
@@ -236,14 +224,12 @@ bool RunRecorder::wants_sample(std::int64_t step, double time) {
 }
 
 void RunRecorder::step_done(const StepReport& report) {
-  if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
+  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    done_.history_every = asked > 0               ? asked
-                          : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows)
-                                                  : 1;
+    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
   const auto before = std::chrono::steady_clock::now();
@@ -253,15 +239,12 @@ void RunRecorder::step_done(const StepReport& report) {
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;
   done_.frames += frame;
-  while (done_.next_time < std::ssize(frame_times_) &&
-         reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)]))
-    ++done_.next_time;
+  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
   }
-  if (report.step == 0)
-    done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
+  if (report.step == 0) done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   if (simulation_.quasi_static()) last_step_ = {report, simulation_.problem().snapshot(), row || stopping_, frame || stopping_};
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
@@ -284,10 +267,7 @@ void RunRecorder::stopped_within_step() {
 }
 
 void RunRecorder::working(std::string_view what) {
-  if (line_due())
-    show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what,
-                     std::chrono::duration<double>(shown_ - start_).count()),
-         false);
+  if (line_due()) show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what, std::chrono::duration<double>(shown_ - start_).count()), false);
 }
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
@@ -330,9 +310,7 @@ void RunRecorder::write_history(const StepReport& report) {
 
 bool RunRecorder::line_due() {
   const auto now = std::chrono::steady_clock::now();
-  if (!show_progress_ ||
-      now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000)))
-    return false;
+  if (!show_progress_ || now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000))) return false;
   shown_ = now;
   return true;
 }
@@ -355,16 +333,12 @@ void RunRecorder::progress(const StepReport& report) {
   const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
   const double left = done > 0 ? spent * (1 - done) / done : 0.0;
   if (!simulation_.dynamic()) {
-    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time,
-                     report.end_time, report.iterations, report.residual, left),
-         end);
+    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time, report.end_time, report.iterations,
+                     report.residual, left), end);
     return;
   }
-  const double rate = static_cast<double>(report.step - first_step_) *
-                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
-                   report.end_time, report.time_step, rate, left),
-       end);
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time, report.time_step, rate, left), end);
 }
 
 }  // namespace perikit

@@ -11,6 +11,7 @@
 
 #include "perikit/fields/point_fields.hpp"
 #include "run/gathering.hpp"
+#include "run/reduction.hpp"
 
 namespace perikit {
 
@@ -35,11 +36,11 @@ double product(const std::vector<double>& u, const std::vector<double>& v) {
   return std::inner_product(u.begin(), u.end(), v.begin(), 0.0);
 }
 
-/// Turns three columns until they are orthogonal (one-sided Jacobi). Returns the rotation, by columns: turned column k is the sum
-/// over c of rotation[k][c] times column c.
+/// Turns three columns until they are orthogonal (one-sided Jacobi). Returns the rotation, by columns: turned column k is the sum over c of
+/// rotation[k][c] times column c.
 std::array<Point, 3> orthogonalized(std::array<std::vector<double>, 3>& x) {
   std::array<Point, 3> rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  for (int sweep = 0; sweep < 8; ++sweep) {  // each squares what is left of the cosines
+  for (int sweep = 0; sweep < 8; ++sweep) {   // each squares what is left of the cosines
     for (const auto& [i, j] : {std::pair{0u, 1u}, std::pair{0u, 2u}, std::pair{1u, 2u}}) {
       const double a = product(x[i], x[i]), b = product(x[j], x[j]), c = product(x[i], x[j]);
       if (c == 0) continue;
@@ -61,7 +62,7 @@ double fitted(const HistoryDescription& record, const Body& body, const std::vec
   const auto& members = body.set(record.set);
   const double n = static_cast<double>(members.size());
   const auto mean_of = [n](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0) / n; };
-  std::array<std::vector<double>, 3> x;  // places, from their centre
+  std::array<std::vector<double>, 3> x;   // places, from their centre
   Point centre{};
   for (std::size_t c = 0; c < 3; ++c) {
     for (const std::int32_t p : members) x[c].push_back(body.position(static_cast<std::size_t>(p))[c]);
@@ -76,7 +77,7 @@ double fitted(const HistoryDescription& record, const Body& body, const std::vec
   double fit = mean;
   for (std::size_t k = 0; k < 3; ++k) {
     const double extent = product(x[k], x[k]);
-    if (extent <= 1e-18 * largest) continue;  // the points have no extent along this axis, and no slope
+    if (extent <= 1e-18 * largest) continue;   // the points have no extent along this axis, and no slope
     double along = 0;
     for (std::size_t c = 0; c < 3; ++c) along += axes[k][c] * (record.at[c] - centre[c]);
     fit += along * product(x[k], off) / extent;

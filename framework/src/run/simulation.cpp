@@ -15,7 +15,7 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   integrator_ = factory.integrator(*scene_.integrator);
   traits_ = integrator_->traits();
   problem_ = build_problem(scene_, factory, traits_);
-  if (traits_.dynamic) problem_->masses().by_point();  // refuses missing densities
+  if (traits_.dynamic) problem_->masses().by_point();   // refuses missing densities
   if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
     throw InputError(
         scene_.initial_velocity_position, "initial.velocity",
@@ -31,10 +31,8 @@ void Simulation::refuse_gradients() const {
     std::vector<std::string> others;
     for (const PointField& other : point_fields())
       if (!other.of_gradients) others.push_back(other.name);
-    throw InputError(
-        position, key,
-        fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
-                    field, scene_.kinematics->type, fmt::join(others, ", ")));
+    throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
+                                                field, scene_.kinematics->type, fmt::join(others, ", ")));
   };
   for (const std::string& field : scene_.output.fields) check(field, scene_.output.fields_position, "output.fields");
   for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
@@ -42,9 +40,7 @@ void Simulation::refuse_gradients() const {
   }
 }
 
-void Simulation::run(Observer& observer) {
-  integrator_->run(*problem_, observer);
-}
+void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer); }
 
 namespace {
 
@@ -83,22 +79,15 @@ std::string Simulation::summary() {
                       static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
-    text += fmt::format(
-        "warning       {} points have {}\n", report.singular_families,
-        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
+    text += fmt::format("warning       {} points have {}\n", report.singular_families,
+                        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
-    text +=
-        "warning       the displacement at the start is one increment from the undeformed body for materials whose stress "
-        "depends on the path\n";
+    text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
   }
-  if (report.fallbacks > 0)
-    text +=
-        fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
-  if (report.dropped_parts > 0)
-    text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n",
-                        report.dropped_parts);
+  if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
+  if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
   text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6,
@@ -115,31 +104,18 @@ std::string Simulation::explanation(const Registry& registry) const {
   std::vector<SkipNote> notes = problem_->terms().report().skips;
   std::size_t known = 0;
   for (const Kind kind : all_kinds) known += registry.names(kind).size();
-  notes.push_back({"libraries that the scene does not name", "parts are found by manifest",
-                   fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
-  if (!scene_.damage)
-    notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
-  if (scene_.damage)
-    notes.push_back({"checks of bonds that cannot have failed yet",
-                     "each group of eight points knows how far its nearest bond is from failing",
-                     "counted in run.log at the end"});
+  notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});
+  if (!scene_.damage) notes.push_back({"bond state, damage checks, recomputed shape tensors", "no [damage]", "a bit a bond and one pass a step"});
+  if (scene_.damage) notes.push_back({"checks of bonds that cannot have failed yet", "each group of eight points knows how far its nearest bond is from failing", "counted in run.log at the end"});
   if (scene_.skip && traits_.dynamic && problem_->terms().conservative()) {
-    notes.push_back({"parts of the body that no wave has reached",
-                     "blocks of points at rest whose families' families are at rest have no forces",
-                     "counted in run.log at the end"});
+    notes.push_back({"parts of the body that no wave has reached", "blocks of points at rest whose families' families are at rest have no forces", "counted in run.log at the end"});
     if (const std::size_t held = problem_->constraints().points_held_at_rest(); held > 0) {
-      notes.push_back(
-          {"points held at rest",
-           "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
-           fmt::format("the blocks of {} points, less those in reach of others", held)});
+      notes.push_back({"points held at rest", "no wave ever reaches them; within the reach of others their stress acts on those, and reactions come with it",
+                       fmt::format("the blocks of {} points, less those in reach of others", held)});
     }
   }
-  if (!traits_.dynamic)
-    notes.push_back(
-        {"velocity, mass", "not a dynamic run",
-         fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
-  if (problem_->constant_stiffness())
-    notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
+  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
+  if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
   const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
   notes.push_back({"fields that nobody asked for", "computed when written",

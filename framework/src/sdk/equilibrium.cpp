@@ -13,12 +13,8 @@
 namespace perikit {
 
 Equilibrium::Equilibrium(Problem& problem, double tolerance)
-    : problem_(problem),
-      tolerance_(tolerance),
-      u_(problem.make_field()),
-      scratch_(problem.make_field()),
-      free_(problem.constraints().free()),
-      external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
+    : problem_(problem), tolerance_(tolerance), u_(problem.make_field()), scratch_(problem.make_field()),
+      free_(problem.constraints().free()), external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
 
 void Equilibrium::begin(double t, ConstFieldView u) {
   t_ = t;
@@ -100,12 +96,10 @@ void Equilibrium::note(std::string_view line) {
   if (now - logged_ < std::chrono::seconds(5)) return;
   logged_ = now;
   std::string lines = take_notes();
-  lines.pop_back();  // a log has line ends of its own
+  lines.pop_back();   // a log has line ends of its own
   observer_->log(lines);
 }
 
-std::string Equilibrium::take_notes() {
-  return std::exchange(notes_, {});
-}
+std::string Equilibrium::take_notes() { return std::exchange(notes_, {}); }
 
 }  // namespace perikit

@@ -4,8 +4,8 @@
 
 namespace perikit {
 
-/// Evaluation points at the points of a cloud, point gradients of order 1: gradient, law and Q of one block after the other, then
-/// forces, gathered from both ends of each bond.
+/// Evaluation points at the points of a cloud, point gradients of order 1: gradient, law and Q of one block after the other, then forces,
+/// gathered from both ends of each bond.
 template <int D>
 class CloudPoints final : public EvaluationSpace {
  public:
@@ -24,10 +24,10 @@ class CloudPoints final : public EvaluationSpace {
   const CloudFamilies& families_;
   const Laws& laws_;
   std::size_t points_;
-  const Row* position_;  ///< {x, y, z, V}
+  const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_;
-  AlignedVector<Row> u_, w_;  ///< mirrors
-  AlignedVector<Row> flux_;   ///< Q, D rows a point
+  AlignedVector<Row> u_, w_;                   ///< mirrors
+  AlignedVector<Row> flux_;                    ///< Q, D rows a point
   ScratchPool scratch_;
 };
 

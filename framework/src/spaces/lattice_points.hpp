@@ -2,13 +2,13 @@
 #include <vector>
 
 #include "families/lattice_families.hpp"
-#include "spaces/evaluation_space.hpp"
 #include "spaces/lattice_gradient.hpp"
+#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
 
-/// Evaluation points at the points of a lattice, point gradients of order 1. An evaluation takes a few rows of a block at a time:
-/// gradient, law, divergence. The stress K^-1 of the rows, Q, stays in the nearest caches and is stored nowhere.
+/// Evaluation points at the points of a lattice, point gradients of order 1. An evaluation takes a few rows of a block at a time: gradient,
+/// law, divergence. The stress K^-1 of the rows, Q, stays in the nearest caches and is stored nowhere.
 template <int D>
 class LatticePoints final : public EvaluationSpace {
  public:
@@ -18,15 +18,15 @@ class LatticePoints final : public EvaluationSpace {
   std::size_t blocks() const noexcept override { return tiles_.blocks.size(); }
   bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
-  void bonds_changed(std::span<const std::int32_t>) override {}  // patterns are read where they are needed
+  void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed
   void report(ModelReport& report) const override;
 
  private:
   /// Memory of a thread for a few rows of a block.
   struct Rows {
-    Field flux;                       ///< Q
-    std::vector<std::int32_t> index;  ///< of the chunks: `own` of the block, then those beyond the ends of its rows
-    std::vector<std::int64_t> at;     ///< where their Q is
+    Field flux;                        ///< Q
+    std::vector<std::int32_t> index;   ///< of the chunks: `own` of the block, then those beyond the ends of its rows
+    std::vector<std::int64_t> at;      ///< where their Q is
     std::size_t own = 0;
   };
   void one_by_one(std::size_t b, Pass& pass);
@@ -41,8 +41,8 @@ class LatticePoints final : public EvaluationSpace {
   const LatticeTiles& tiles_;
   const Laws& laws_;
   LatticeOperator<D> operator_;
-  std::vector<Rows> rows_;           ///< by thread
-  std::int64_t gap_ = 0, most_ = 0;  ///< cells between rows there; of all rows at once
+  std::vector<Rows> rows_;             ///< by thread
+  std::int64_t gap_ = 0, most_ = 0;    ///< cells between rows there; of all rows at once
   ScratchPool scratch_;
 };
 

@@ -7,9 +7,9 @@
 #include "families/cloud_rows.hpp"
 #include "families/family_classes.hpp"
 #include "families/lattice_families.hpp"
-#include "spaces/evaluation_space.hpp"
 #include "spaces/local_stencil.hpp"
 #include "spaces/mirrored_stencil.hpp"
+#include "spaces/evaluation_space.hpp"
 #include "spaces/sparse_stencils.hpp"
 
 namespace perikit {
@@ -41,9 +41,9 @@ class Weighted final : public EvaluationSpace {
   /// Up to eight points with one stored stencil, up to eight points of a cloud with stored stencils, or a single point that makes
   /// its own.
   struct Group {
-    std::uint32_t first;   ///< into members_: eight entries where there is one stencil, the last ones may repeat the first
-    std::int32_t family;   ///< class (lattices)
-    std::int32_t stencil;  ///< index of the stored one, or -1
+    std::uint32_t first;       ///< into members_: eight entries where there is one stencil, the last ones may repeat the first
+    std::int32_t family;       ///< class (lattices)
+    std::int32_t stencil;      ///< index of the stored one, or -1
     std::uint8_t count;
     bool contiguous;           ///< eight points in a row
     std::uint8_t live = 0xff;  ///< lanes whose points have not left
@@ -52,15 +52,15 @@ class Weighted final : public EvaluationSpace {
     FamilyArrays family;
     LocalStencil<D> stencil;
     AlignedVector<double> share, u, w, t, m, dm;
-    double owner_H[72], owner_dH[72];    ///< of the owners, where the map is selective: [component][8]
-    double pressure[2][8];               ///< on their gradients, and its rate
-    std::vector<std::int32_t> original;  ///< which of the set-up's evaluation points they are; empty: the same
+    double owner_H[72], owner_dH[72];     ///< of the owners, where the map is selective: [component][8]
+    double pressure[2][8];                ///< on their gradients, and its rate
+    std::vector<std::int32_t> original;   ///< which of the set-up's evaluation points they are; empty: the same
   };
   /// With damage: where the points are.
   struct Place {
     std::uint32_t block, group;
     std::uint8_t lane;
-    bool left;  ///< its bonds have failed: it makes its own stencil
+    bool left;                 ///< its bonds have failed: it makes its own stencil
   };
 
   // Set-up (weighted_groups.cpp).
@@ -97,13 +97,12 @@ class Weighted final : public EvaluationSpace {
   std::uint8_t lanes(const Group& g, const Pass& pass) const noexcept;
   /// W of an evaluation point of p with a share of 1.
   double weight(std::int32_t p) const noexcept;
-  /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch. share: c
-  /// of the selective map; 1 in groups, which points leave with the first bond that fails.
+  /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch. share: c of the
+  /// selective map; 1 in groups, which points leave with the first bond that fails.
   void keep_owner_gradients(int points, double share, Memory& m, BatchScratch& s, bool tangent) const noexcept;
   /// No gradient at evaluation points slot ... slot + slots - 1, of eight owners side by side, of the owners that are not kept.
   static void clear_lanes(std::uint8_t kept, int slot, int slots, double* H, double* dH) noexcept;
-  /// Of the owners side by side, owner l at lanes l, l + wide, ...: pressure on their gradients and its rate += those of the
-  /// lanes.
+  /// Of the owners side by side, owner l at lanes l, l + wide, ...: pressure on their gradients and its rate += those of the lanes.
   static void add_pressures(int lanes, int wide, const BatchScratch& s, bool tangent, Memory& m) noexcept;
   /// s.P of lanes 0 ... 7 <- the stress that these pressures are on the kept gradients of the owners.
   void owner_stresses(const Memory& m, bool tangent, BatchScratch& s) const noexcept;
@@ -124,11 +123,11 @@ class Weighted final : public EvaluationSpace {
   std::vector<SparseStencils<D>> sparse_;  ///< clouds with few evaluation points: by block
   std::vector<Group> groups_;
   std::vector<std::size_t> block_first_;
-  std::vector<std::size_t> number_;  ///< by group, where laws have a history
+  std::vector<std::size_t> number_;        ///< by group, where laws have a history
   std::size_t numbers_ = 0;
   Colouring cloud_colouring_;
   std::size_t fallbacks_ = 0, dropped_ = 0;
-  bool singles_ = false;                         ///< some points are evaluated one by one: they use rows
+  bool singles_ = false;  ///< some points are evaluated one by one: they use rows
   std::vector<Place> place_;                     ///< by point, once bonds have failed
   std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;

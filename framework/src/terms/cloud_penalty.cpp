@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "families/quiet_blocks.hpp"
-#include "spaces/cloud_gradient.hpp"
 #include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
+#include "families/quiet_blocks.hpp"
+#include "spaces/cloud_gradient.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
 namespace perikit {
@@ -161,7 +161,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
 
   const CloudFamilies& families_;
   CloudGradient<D> gradient_;
-  const Row* position_;  ///< {x, y, z, V}
+  const Row* position_;          ///< {x, y, z, V}
   std::size_t points_;
   AlignedVector<Column> M_;
   AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns

@@ -52,10 +52,10 @@ class PairForces final : public Term {
   bool share_;
   PairFields fields_;
   std::unique_ptr<PairLoop> loop_;
-  Field scale_;               ///< d/m_i; 0 without bonds
-  Field dilatation_modulus_;  ///< k_i
+  Field scale_;                  ///< d/m_i; 0 without bonds
+  Field dilatation_modulus_;     ///< k_i
   Field theta_, q_, rate_;
-  Field density_;  ///< work field of energy_of
+  Field density_;                ///< work field of energy_of
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
 };

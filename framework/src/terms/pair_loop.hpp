@@ -7,8 +7,8 @@
 #include <memory>
 #include <type_traits>
 
-#include "families/blocks.hpp"
 #include "families/bond_monitor.hpp"
+#include "families/blocks.hpp"
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
@@ -25,25 +25,25 @@ enum class PairWork { dilatation, dilatation_rate, force, tangent, energy };
 struct PairPass {
   PairWork work;
   ConstFieldView u, w;
-  ConstFieldView q, dq;  ///< phi' d/m and its rate by point; empty without dilatation
+  ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
-  double* energies = nullptr;          ///< by block
-  const std::uint8_t* only = nullptr;  ///< by group of eight points: others are left alone (dilatation and energy)
+  double* energies = nullptr;     ///< by block
+  const std::uint8_t* only = nullptr;   ///< by group of eight points: others are left alone (dilatation and energy)
 };
 
 /// Point quantities that bonds need.
 struct PairFields {
-  Field modulus;  ///< c_i; empty where `uniform` holds
+  Field modulus;                  ///< c_i; empty where `uniform` holds
   double uniform = 0;
-  Field correction;  ///< by axis; empty without surface correction
+  Field correction;               ///< by axis; empty without surface correction
 };
 
 struct PairLoopParts {
   const Families& families;
   const Formulation& formulation;
   const PairFields& fields;
-  bool half;   ///< each bond once, for both ends
-  bool quiet;  ///< without the parts that no wave has reached
+  bool half;                      ///< each bond once, for both ends
+  bool quiet;                     ///< without the parts that no wave has reached
 };
 
 class PairLoop {
@@ -69,10 +69,8 @@ class PairLoop {
   template <class Moves>
   void look(const PairPass& pass, const Moves& moves) {
     reach_ = pass.q.data ? 2 : 1;
-    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
-      quiet_.look(reach_, moves);
-    else
-      quiet_.wake();
+    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation)) quiet_.look(reach_, moves);
+    else quiet_.wake();
   }
   /// Each bond once, for both ends.
   bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
@@ -83,22 +81,15 @@ class PairLoop {
       auto body = [&](std::size_t b) {
         if (quiet_.awake(b, reach_)) block(constant, b);
       };
-      if (at_once(pass))
-        colouring.for_each(body);
-      else
-        parallel_for(blocks(), body);
+      if (at_once(pass)) colouring.for_each(body);
+      else parallel_for(blocks(), body);
     };
     switch (pass.work) {
-      case PairWork::dilatation:
-        return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
-      case PairWork::dilatation_rate:
-        return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
-      case PairWork::force:
-        return sweep(std::integral_constant<PairWork, PairWork::force>());
-      case PairWork::tangent:
-        return sweep(std::integral_constant<PairWork, PairWork::tangent>());
-      case PairWork::energy:
-        return sweep(std::integral_constant<PairWork, PairWork::energy>());
+      case PairWork::dilatation: return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
+      case PairWork::dilatation_rate: return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
+      case PairWork::force: return sweep(std::integral_constant<PairWork, PairWork::force>());
+      case PairWork::tangent: return sweep(std::integral_constant<PairWork, PairWork::tangent>());
+      case PairWork::energy: return sweep(std::integral_constant<PairWork, PairWork::energy>());
     }
   }
   void reset_bad() noexcept { bad_ = -1; }
@@ -106,8 +97,7 @@ class PairLoop {
   /// Keeps the smallest index; from any thread.
   void report_bad(std::int64_t point) noexcept {
     std::int64_t known = bad_;
-    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {
-    }
+    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {}
   }
 
  private:
@@ -126,8 +116,8 @@ std::unique_ptr<PairLoop> make_cloud_pairs(const PairLoopParts& parts);
 struct PairScratch {
   alignas(64) double e[batch_points];
   alignas(64) double de[batch_points];
-  alignas(64) double n[3][batch_points];            ///< deformed direction
-  alignas(64) double inverse_length[batch_points];  ///< of the deformed bond
+  alignas(64) double n[3][batch_points];          ///< deformed direction
+  alignas(64) double inverse_length[batch_points];///< of the deformed bond
   alignas(64) double modulus[batch_points];
   alignas(64) double energy[batch_points];
   alignas(64) double force[batch_points];

@@ -17,14 +17,13 @@ template <int D>
 class StencilPenalty final : public ZeroEnergyPenalty {
   /// What a point, or all points with whole families on a lattice, has in common: by bond, and M.
   struct Stencil {
-    std::vector<Row> spring;    ///< {xi, w}
-    std::vector<Row> gradient;  ///< g
-    Row M[D];                   ///< columns
+    std::vector<Row> spring;           ///< {xi, w}
+    std::vector<Row> gradient;         ///< g
+    Row M[D];                          ///< columns
   };
 
  public:
-  explicit StencilPenalty(const PenaltyParts& parts)
-      : ZeroEnergyPenalty(parts), rows_(parts.families), stencil_(rows_.size(), -1) {
+  explicit StencilPenalty(const PenaltyParts& parts) : ZeroEnergyPenalty(parts), rows_(parts.families), stencil_(rows_.size(), -1) {
     const BlockReach reach = cloud_reach(rows_.lists(), rows_.size());
     colouring_ = Colouring(reach);
     if (parts.skip) quiet_ = QuietBlocks(reach);
@@ -33,8 +32,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
   void bonds_changed(std::span<const std::int32_t> points) override {
     for (const std::int32_t p : points)
-      set_stencil(
-          static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
+      set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
   void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
@@ -51,9 +49,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     std::vector<double> energies(energy ? rows_.size() : 0, 0.0);
     quiet_.look(1, [&](std::size_t b) {
       bool any = false;
-      over_rows(b, [&](std::size_t r) {
-        for (int c = 0; c < D; ++c) any |= u_[r][c] != 0;
-      });
+      over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
       return any;
     });
     colouring_.for_each([&](std::size_t b) {
@@ -181,8 +177,8 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   QuietBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient
   std::vector<Stencil> stencils_;
-  std::int32_t whole_ = -1;       ///< that of whole families
-  AlignedVector<Row> u_, force_;  ///< by row
+  std::int32_t whole_ = -1;            ///< that of whole families
+  AlignedVector<Row> u_, force_;       ///< by row
 };
 
 }  // namespace

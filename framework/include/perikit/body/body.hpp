@@ -53,9 +53,9 @@ struct BodyPart {
 /// What a body is beside its points.
 struct BodyFrame {
   Space space = Space::solid;
-  double section = 1;  ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
-  double spacing = 0;  ///< of the lattice, or the mean one of a cloud [m]
-  double horizon = 0;  ///< delta [m]
+  double section = 1;          ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
+  double spacing = 0;          ///< of the lattice, or the mean one of a cloud [m]
+  double horizon = 0;          ///< delta [m]
   std::vector<Crack> cracks;
 };
 
@@ -69,8 +69,8 @@ class Body {
   /// A rank's part of another body, in the same order. Far points have a material of their own; sets keep the rank's own points.
   Body(const Body& whole, const BodyPart& part, std::uint16_t far_material);
 
-  /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws
-  /// std::domain_error where two points of a lattice would be one.
+  /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws std::domain_error
+  /// where two points of a lattice would be one.
   Body(const Body& whole, const Images& images, std::uint16_t image_material);
 
   /// members: internal indices, each once, in the order that the set shall have. "all" exists from the beginning.
@@ -97,12 +97,10 @@ class Body {
   std::int32_t input_of(std::size_t internal_index) const noexcept;
 
   Point position(std::size_t internal_index) const noexcept;
-  double volume(std::size_t internal_index) const noexcept {
-    return positions_.empty() ? uniform_volume_ : positions_[4 * internal_index + 3];
-  }
+  double volume(std::size_t internal_index) const noexcept { return positions_.empty() ? uniform_volume_ : positions_[4 * internal_index + 3]; }
   /// Clouds: rows of 4, {x, y, z, V}.
   std::span<const double> rows() const noexcept { return positions_; }
-  double uniform_volume() const noexcept { return uniform_volume_; }  ///< of lattices [m^3]
+  double uniform_volume() const noexcept { return uniform_volume_; }   ///< of lattices [m^3]
   bool alive(std::size_t internal_index) const noexcept { return alive_[internal_index / 8] >> (internal_index % 8) & 1; }
   /// Bit p % 8 of byte p / 8.
   std::span<const std::uint8_t> alive_bits() const noexcept { return alive_; }
@@ -144,9 +142,9 @@ class Body {
   std::size_t stride_ = 0, margin_ = 0;
   std::optional<Lattice> lattice_;
   std::vector<std::int32_t> internal_;
-  AlignedVector<double> positions_;  ///< clouds: rows of 4, {x, y, z, V}
+  AlignedVector<double> positions_;     ///< clouds: rows of 4, {x, y, z, V}
   double uniform_volume_ = 0;
-  std::vector<std::int32_t> input_;  ///< inverse of internal_
+  std::vector<std::int32_t> input_;     ///< inverse of internal_
   std::vector<std::uint8_t> alive_;
   std::map<std::string, std::vector<std::int32_t>> sets_;
   std::vector<std::uint16_t> material_ids_;
@@ -165,8 +163,7 @@ struct FamilyLists {
   std::vector<std::int32_t> neighbour;
 };
 
-/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws std::domain_error for coincident
-/// points.
+/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws std::domain_error for coincident points.
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon);
 
 /// By point: whether it is one of `from`, or in the family of one. For points of bodies far larger than a family.

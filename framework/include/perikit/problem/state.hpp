@@ -21,15 +21,15 @@ struct Energies {
   double strain = 0, kinetic = 0, external_work = 0, dissipated = 0;
 };
 
-/// Fields have `dimension` components unless it says otherwise, and `stride` points per component; dead points (padding) hold
-/// zero and stay zero. Every run variable of an integrator is declared here, so that snapshots hold it and a run goes on bitwise.
+/// Fields have `dimension` components unless it says otherwise, and `stride` points per component; dead points (padding) hold zero
+/// and stay zero. Every run variable of an integrator is declared here, so that snapshots hold it and a run goes on bitwise.
 class State {
  public:
   /// Of the points of `body`, which must outlive the state. Everything is zero at first.
   explicit State(const Body& body);
   State(State&&) = default;
 
-  double time = 0;  ///< [s], or the load parameter in [0, 1]
+  double time = 0;          ///< [s], or the load parameter in [0, 1]
   std::int64_t step = 0;
   Energies energies;
 
@@ -37,7 +37,7 @@ class State {
   ConstFieldView displacement() const noexcept { return displacement_; }
   /// [N] on each point, of the last evaluation.
   FieldView internal_force() noexcept { return internal_force_; }
-  FieldView velocity() { return declare("velocity"); }  ///< allocated on first use; at full steps where a sample was asked for
+  FieldView velocity() { return declare("velocity"); }              ///< allocated on first use; at full steps where a sample was asked for
   FieldView external_force() { return declare("external_force"); }  ///< [N]; allocated on first use
 
   /// A further field, zero at first. Views of it stay valid.
