@@ -46,6 +46,20 @@ void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
   }
 }
 
+template <int D>
+void CloudBonds<D>::set_factors(std::span<const double> factors) {
+  factor_ = factors.empty() ? nullptr : factors.data();
+  if (!pairs_) return;
+  far_factor_.resize(factors.size());
+  const FamilyLists& lists = families_.lists();
+  parallel_for(factor_ ? blocks() : 0, [&](std::size_t b) {
+    over_points(b, [&](std::size_t p) {
+      for (auto k = static_cast<std::size_t>(upper_[p]); k < static_cast<std::size_t>(lists.first[p + 1]); ++k)
+        far_factor_[k] = factors[static_cast<std::size_t>(families_.index(lists.neighbour[k], static_cast<std::int32_t>(p)))];
+    });
+  });
+}
+
 /// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
 template <int D>
 void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
@@ -85,6 +99,10 @@ void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lan
     const double factor = !real ? 0.0 : formulation_.weight == BondWeight::kernel ? influence[k] : families_.b(k);
     s.weight[l] = scale_[p] * position_[j][3] * factor;
     s.far_weight[l] = scale_[j] * x[3] * factor;
+    if (factor_) {
+      s.weight[l] *= factor_[k];
+      if (pairs_) s.far_weight[l] *= far_factor_[k];
+    }
     s.owner[l] = static_cast<std::int32_t>(p);
     s.far[l] = static_cast<std::int32_t>(j);
   }
@@ -129,6 +147,7 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
     if (pass.work.work() == Work::sample) pass.work.add_samples(n, s, *pass.sums);
+    if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;
     bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
     scatter(p, n, s, both_ends, tangent);
@@ -237,10 +256,18 @@ void CloudBonds<D>::run(Pass& pass) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
   }
-  if (pass.alone() || tangent) quiet_.wake();
-  else quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
-  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) gradients(b, pass); });
+  if (pass.everywhere())
+    quiet_.wake();
+  else
+    quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  const auto awake = [&](auto&& block) {
+    return [&](std::size_t b) {
+      if (quiet_.awake(b, 2)) block(b);
+    };
+  };
+  parallel_for(blocks(), [&](std::size_t b) {
+    if (quiet_.begins(b)) gradients(b, pass);
+  });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
   colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
   if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, tangent); }));

@@ -102,8 +102,10 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
   const Place& place = place_[static_cast<std::size_t>(p)];
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
-  if (pass.work.history()) find_numbers(p, groups_[place.group], m);
-  else m.original.clear();
+  if (pass.work.history() || factor_)
+    find_numbers(p, groups_[place.group], m);
+  else
+    m.original.clear();
   return evaluate_family(p, number_of(place.group) + place.lane, m, s, pass, energy);
 }
 
@@ -130,11 +132,14 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     if (selective_ && first == 0) keep_owner_gradients(1, families_.left(static_cast<std::size_t>(p)), m, s, tangent);
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
-      s.weight[l] = volume * stencil.share(first + l);
-      const int k = first + l - owners_;
-      s.number[l] = k < 0 ? -1 : number + 8 * (m.original.empty() ? k : m.original[static_cast<std::size_t>(k)]);
+      const int k = first + l - owners_, original = k < 0 || m.original.empty() ? k : m.original[static_cast<std::size_t>(k)];
+      s.weight[l] = volume * stencil.share(first + l) * factor(p, original);
+      s.number[l] = k < 0 ? -1 : number + 8 * original;
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
+    if (pass.work.balance() && alone)
+      for (int l = std::max(0, owners_ - first); l < n; ++l)
+        pass.work.balance()->factors[factor_of(p, first + l - owners_)] = s.psi[l];
     if (sample) pass.work.add_samples(n, s, *pass.sums);
     if (alone) continue;
     if (selective_) add_pressures(n, 1, s, tangent, m);
@@ -262,12 +267,15 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       const int k = first + l / 8 - owners_;
       const bool in = here >> lane & 1;
       s.owner[l] = members[lane < members.size() ? lane : 0];
-      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) : 0.0;
+      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) * factor(s.owner[l], k) : 0.0;
       s.number[l] = k < 0 || !in ? -1 : number + 8 * k + static_cast<std::int64_t>(lane);
     }
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
     if (bad >= 0) return s.owner[bad];
     if (sample) pass.work.add_samples(8 * n, s, *pass.sums);
+    for (int l = 0; l < 8 * n && alone && pass.work.balance(); ++l)
+      if (const int k = first + l / 8 - owners_; k >= 0 && l % 8 < g.count)
+        pass.work.balance()->factors[factor_of(s.owner[l], k)] = s.psi[l];
     if (alone) continue;
     if (selective_) add_pressures(8 * n, 8, s, tangent, m);
     scatter(first, n);
@@ -310,8 +318,12 @@ void Weighted<D>::run(Pass& pass) {
   }
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { block(b, pass); });
   if (singles_) out_rows_.assign(stride, Row{});
-  if (pass.work.tangent()) quiet_.wake();
-  else quiet_.look(1, [&](std::size_t b) { return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points(), cloud_block); });
+  if (pass.everywhere())
+    quiet_.wake();
+  else
+    quiet_.look(1, [&](std::size_t b) {
+      return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points(), cloud_block);
+    });
   (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
     if (quiet_.awake(b, 1)) block(b, pass);
   });

@@ -9,6 +9,7 @@
 #include "families/lattice_families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/terms/terms.hpp"
+#include "spaces/consistency.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
 #include "terms/zero_energy_penalty.hpp"
@@ -45,6 +46,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   } else {
     auto mechanics = std::make_unique<Mechanics>(SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share});
     mechanics_ = mechanics.get();
+    if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
   }
   if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));

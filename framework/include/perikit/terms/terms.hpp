@@ -21,6 +21,7 @@ namespace perikit {
 
 class Families;
 class Mechanics;
+struct CloudConsistency;
 class Term;
 
 /// What the terms of a formulation are made of. families, laws and damage must outlive them.
@@ -28,10 +29,11 @@ struct TermParts {
   Families* families = nullptr;
   Formulation formulation;
   const Laws* laws = nullptr;
-  std::shared_ptr<const Stabilization> stabilization;   ///< null: none. Only over point gradients
-  bool skip = true;                           ///< leave out work whose result is known; changes no bit
-  bool share = true;                          ///< savings by symmetry and uniformity; change rounding
-  const BodyDamage* damage = nullptr;         ///< null: bonds never fail
+  std::shared_ptr<const Stabilization> stabilization;  ///< null: none. Only over point gradients
+  bool skip = true;                                    ///< leave out work whose result is known; changes no bit
+  bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
+  const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
+  std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
 };
 
 class Terms {
