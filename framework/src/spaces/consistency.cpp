@@ -71,7 +71,7 @@ class System {
   /// diagonal gives.
   void scale() {
     Field probe = make(), image = make();
-    fill_with_noise(free_, 1, probe);
+    fill_with_noise(free_, 1, body_.places(), probe);
     project(probe);
     std::fill_n(probe.component(d()), body_.stride(), 0.0);
     apply(probe, 0, image);
