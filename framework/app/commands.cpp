@@ -13,9 +13,11 @@
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "new_project.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
+#include "ranks.hpp"
 
 namespace perikit::app {
 
@@ -28,7 +30,10 @@ std::unique_ptr<Registry> open_registry(const Options& options) {
 }
 
 Scene read(const Options& options, Registry& registry) {
-  if (options.threads > 0) set_thread_count(options.threads);
+  if (options.threads > 0)
+    set_thread_count(options.threads);
+  else if (communicator().size() > 1)
+    set_thread_count(cores_of_rank());
   return read_scene(options.scene, registry, {options.overrides, options.trust});
 }
 
@@ -54,8 +59,9 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   Simulation simulation(scene, *registry);
   const double set_up = seconds_since(start);
-  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
-  if (options.explain) fmt::print("{}", simulation.explanation(*registry));
+  const bool first = communicator().rank() == 0;     // which alone speaks
+  const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
                        library_fingerprints(*registry), options.force);
@@ -65,8 +71,10 @@ void run(const Options& options) {
                                                                         recorder.resumed_step(), simulation.problem().state().time)
                                                           : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
-    if (!options.quiet) fmt::print("{}\n", from);
+    if (!options.quiet && first) fmt::print("{}\n", from);
   }
+  if (communicator().size() > 1)
+    if (const std::string warning = crowded(thread_count()); !warning.empty()) recorder.log(warning);
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused())
     recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
@@ -80,7 +88,7 @@ void run(const Options& options) {
   }
   const std::string closing = recorder.closing(set_up);
   log_end(recorder, closing);
-  if (!options.quiet)
+  if (!options.quiet && first)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format(
@@ -96,6 +104,7 @@ void check(const Options& options) {
   const Scene scene = read(options, *registry);
   Simulation simulation(scene, *registry);
   std::string summary = simulation.summary();   // which may still refuse
+  if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks);
   if (options.explain) summary += simulation.explanation(*registry);
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.

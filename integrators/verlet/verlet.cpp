@@ -84,7 +84,8 @@ class Stepper {
   /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of the
   /// prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
   void add_work(double dt, ConstFieldView old_external) {
-    double work = 0, held = 0;
+    double work = 0;
+    ExactSum held;
     if (loaded_) {
       const double now = dot(external_, v_);
       work = dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
@@ -92,10 +93,10 @@ class Stepper {
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
-      held += 0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]];
+      held.add(0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]]);
       speed_[k] = now;
     }
-    state_.energies.external_work += work + communicator().sum(held);
+    state_.energies.external_work += work + total_over_ranks(held);
   }
 
   /// Velocities of the prescribed components at full step t.

@@ -38,7 +38,7 @@ TEST_CASE("state: what is read is what was written, and what was not written is 
   one.declare("temperature", 1).data[2] = 300;
   one.declare_numbers("plan", 2)[1] = 5;
   ByteWriter out;
-  one.write(out);
+  one.write(body, out);
   const FieldView u = two.displacement(), forgotten = two.declare("forgotten");
   forgotten.data[0] = 1;
   const std::vector<std::byte> bytes = out.take();

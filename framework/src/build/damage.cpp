@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "families/families.hpp"
+#include "perikit/core/communicator.hpp"
+#include "perikit/problem/ghosts.hpp"
 
 namespace perikit {
 
@@ -34,11 +36,10 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation, bool ranks) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
-  if (ranks) refuse("a body on several ranks", "one rank");
   if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
 }
 
@@ -63,12 +64,12 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static, bool ranks) {
+                                               const ImageMap* images, const Partition* partition, bool quasi_static) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation, ranks);
+  refuse_unsuited(scene, parts.formulation);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
@@ -100,6 +101,12 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   if (images)
     for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
       if (field->size() > 0) images->copy_from_sources(*field);
+  if (partition) {
+    Ghosts ghosts(*partition, body, 1);
+    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+      if (field->size() > 0) ghosts.forward(*field);
+    equal = communicator().largest(equal ? 0 : 1) == 0;
+  }
   if (equal) damage->failure = Field();
   return damage;
 }

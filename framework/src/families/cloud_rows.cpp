@@ -27,7 +27,8 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
     units.push_back(static_cast<std::int32_t>(b));
     for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
+        const auto unit =
+            static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
         if (unit != units.back()) units.push_back(unit);
       }
     }
@@ -35,6 +36,11 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
     units.erase(std::unique(units.begin(), units.end()), units.end());
   }
   return reach;
+}
+
+Colouring cloud_colouring(const Body& body, const BlockReach& reach, std::size_t block_points) {
+  const std::vector<std::int32_t>* prescribed = body.block_colours(block_points);
+  return prescribed ? Colouring(*prescribed) : Colouring(reach);
 }
 
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {

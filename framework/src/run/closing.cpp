@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace perikit {
@@ -36,7 +37,9 @@ std::string RunRecorder::closing(double set_up) const {
     text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
                         steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
   }
-  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most\n", static_cast<double>(problem.bytes()) / 1e6, peak_bytes() / 1e6);
+  const double arrays = communicator().largest(static_cast<double>(problem.bytes())), peak = communicator().largest(peak_bytes());
+  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most{}\n", arrays / 1e6, peak / 1e6,
+                      communicator().size() > 1 ? ", on the rank with most" : "");
   const Energies& e = problem.state().energies;
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, e.external_work);

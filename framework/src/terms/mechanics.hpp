@@ -12,12 +12,12 @@ class Mechanics final : public Term {
  public:
   explicit Mechanics(const SpaceParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) override;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
   void bonds_changed(std::span<const std::int32_t> points) override { space_->bonds_changed(points); }
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
   void report(ModelReport& report) const override;
@@ -31,6 +31,7 @@ class Mechanics final : public Term {
 
  private:
   BatchWork work(Work kind, bool energy) const noexcept;
+  void add_owned(const std::vector<double>& energies, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;

@@ -142,15 +142,13 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-double PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+void PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
   if (density_.size() == 0) density_ = body_.make_field(2);
   if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
   loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
-  double energy = 0;
-  for (std::size_t p = 0; p < body_.stride(); ++p) {
-    if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
-  }
-  return energy;
+  for (std::size_t p = 0; p < body_.stride(); ++p)
+    if (marks[p / padding] && body_.alive(p) && body_.owns(p))
+      energy.add(body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]));
 }
 
 template <int D>
@@ -184,7 +182,8 @@ void PairForces<D>::set_correction() {
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
+                                       const std::uint8_t* only) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -194,7 +193,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
-  if (energies) energies->assign(batches, 0.0);
+  std::vector<ExactSum> energies(energy ? static_cast<std::size_t>(thread_count()) : 0);
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
@@ -202,29 +201,31 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
-    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
-                                       energies || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    formulation_.dilatation->evaluate(
+        {n, theta, dilatation_modulus_.data() + first, energy || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energies && body_.alive(p)) (*energies)[b] += body_.volume(p) * phi[l];
+      if (energy && body_.alive(p) && body_.owns(p))
+        energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
     }
   });
+  for (const ExactSum& of_thread : energies) energy->add(of_thread);
   return -1;
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, double* energy) {
-  std::vector<double> volumetric, bonds(energy ? loop_->blocks() : 0, 0.0);
+std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
+  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? &volumetric : nullptr, nullptr);
+    const std::int64_t bad = dilatation(u, {}, energy, nullptr);
     if (bad >= 0) return bad;
   }
   const std::int64_t bad = loop_->run({PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr});
-  for (const std::vector<double>* parts : {&volumetric, &bonds})
-    for (const double e : *parts) *energy += e;
+  for (std::size_t b = 0; b < bonds.size(); ++b)
+    if (loop_->owns(b)) energy->add(bonds[b]);
   return bad;
 }
 

@@ -20,14 +20,14 @@ class PairForces final : public Term {
  public:
   explicit PairForces(const PairParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) override;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   /// strain_energy_density only.
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override { return formulation_.dilatation ? 2 : 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   /// Half of each bond of the marked groups, and their dilatation.
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage& damage) override;
   void report(ModelReport& report) const override;
@@ -39,9 +39,10 @@ class PairForces final : public Term {
   void warn(const PairPoint& point, const MaterialRecord& record);
   void set_correction();
   PairPoint point(std::size_t p) const;
-  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
-  /// only: groups of points to do, null for all.
-  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only = nullptr);
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
+  /// density. only: groups of points to do, null for all.
+  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
+                          const std::uint8_t* only = nullptr);
 
   const Families& families_;
   const Body& body_;

@@ -7,6 +7,7 @@
 
 #include "assembly/assembly.hpp"
 #include "families/families.hpp"
+#include "perikit/core/exact_sum.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
 #include "perikit/operators/samples.hpp"
@@ -16,8 +17,8 @@ namespace perikit {
 class Term {
  public:
   virtual ~Term() = default;
-  /// force += -dE/du [N]; *energy += E [J] where wanted.
-  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) = 0;
+  /// force += -dE/du [N]; *energy += E of what this rank owns [J] where wanted.
+  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) = 0;
   /// Kw += -d(force)/du w [N].
   virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// Adds to the energy density, and sets what else it knows.
@@ -29,8 +30,8 @@ class Term {
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
 
   // Where bonds fail.
-  /// E of what the points of the marked groups own [J].
-  virtual double energy_of(ConstFieldView u, const GroupMarks& marks) = 0;
+  /// energy += E of what those points of the marked groups own that this rank owns [J].
+  virtual void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) = 0;
   /// What follows from the bonds of these points is to be computed anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.

@@ -7,6 +7,7 @@
 #include "assembly/block_pattern.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/terms/terms.hpp"
 #include "spaces/consistency.hpp"
 #include "terms/mechanics.hpp"
@@ -65,16 +66,19 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   if (bad < 0) return status;
   const Body& body = parts_.families->body();
   const Point x = body.position(static_cast<std::size_t>(bad));
-  status.point = body.input_of(static_cast<std::size_t>(bad));
+  status.point = body.number(static_cast<std::size_t>(bad));
+  if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(bad)];
   status.description = fmt::format("point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
   return status;
 }
 
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
-  if (energy) *energy = 0;
+  ExactSum sum;
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces(u, force, energy);
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
+    bad = (*term)->add_forces(u, force, energy ? &sum : nullptr);
+  if (energy) *energy = total_over_ranks(sum);
   return status(bad);
 }
 
@@ -155,14 +159,16 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion& motion) {
   if (!failing_) return {};
   const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
-    double sum = 0;
-    for (const auto& term : terms_) sum += term->energy_of(at, marks);
-    return sum;
+    ExactSum sum;
+    for (const auto& term : terms_) term->energy_of(at, marks, sum);
+    return total_over_ranks(sum);
   };
   return failing_->fracture.update(u, time_step, motion, energy, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
-std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
+std::vector<BondChange> Terms::changed_bonds() const {
+  return failing_ ? failing_->fracture.changed() : parts_.families->changed();
+}
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {
   if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });

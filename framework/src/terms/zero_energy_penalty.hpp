@@ -14,19 +14,19 @@ namespace perikit {
 
 class ZeroEnergyPenalty : public Term {
  public:
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) final;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
   int steps() const noexcept final { return 2; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
   const NearestFailure* watch(const BodyDamage&) final { return nullptr; }
   void report(ModelReport& report) const final;
-  QuietCounts quiet_counts() const noexcept final { return {}; }   // counted with the gradients
+  QuietCounts quiet_counts() const noexcept final { return {}; }  // counted with the gradients
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
-  /// force += -factor dE/du [N]; *energy += E [J] where wanted.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, double* energy) = 0;
+  /// force += -factor dE/du [N]; *energy += E of what this rank owns [J] where wanted.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) = 0;
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;

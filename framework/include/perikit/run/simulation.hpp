@@ -41,6 +41,8 @@ class Simulation {
   void evaluate_conditions();
   /// InputError where nothing holds a piece of a body whose equilibrium is looked for.
   void watch_pieces();
+  /// What the integrator intends, a line.
+  std::string plan();
 
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
@@ -107,6 +109,7 @@ class RunRecorder final : public Observer {
   bool interrupted() const noexcept override;
   void stopped_within_step() override;
 
+  /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
   /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
@@ -144,6 +147,7 @@ class RunRecorder final : public Observer {
   std::filesystem::path folder_;
   std::unique_ptr<OutputFolder> output_;
   bool show_progress_;
+  bool first_;  ///< rank 0, which alone writes
   PointFields fields_;
   std::vector<std::string> frame_fields_;
   std::vector<std::string> columns_;
