@@ -28,13 +28,17 @@ def perikit_lines(text, message):
     return sum(message in line for line in text.splitlines())
 
 
+def without_velocity(text):
+    return text.replace('"velocity", ', "").replace('quantity = "velocity"', 'quantity = "displacement"')
+
+
 def throws():
     """One rank throws, the others wait for it."""
     messages = {"input": (2, "thrown on purpose: input"), "run": (1, "the run failed: thrown on purpose: run"),
                 "memory": (1, "the run failed: not enough memory"), "other": (1, "internal error: thrown on purpose: other")}
     for rank, place, error in ((2, "construction", "input"), (0, "plan", "other"), (1, "step", "run"), (2, "step", "memory"), (0, "step", "run")):
         text = scene('type = "conventional"', integrator='type = "failing"\nrank = %d\nat = "%s"\nerror = "%s"' % (rank, place, error))
-        text = text.replace('"velocity", ', "").replace('{ name = "middle", set = "middle", quantity = "velocity", component = "x", reduce = "max" },', "")
+        text = without_velocity(text)
         status, message = messages[error]
         began = time.time()
         done = run(PROGRAM, text, WORK + "/throws", 3, 1, ("--plugin-path", FAILING))
@@ -50,7 +54,7 @@ def refusals():
     conventional = 'type = "conventional"'
     for what, text, words in (
             ("a scene with a mistake", scene('type = "conventonal"'), "did you mean"),
-            ("newton", scene(conventional, integrator='type = "newton"').replace('"velocity", ', "").replace("velocity", "displacement"), 'found "newton" on 3 ranks'),
+            ("newton", without_velocity(scene(conventional, integrator='type = "newton"')), 'found "newton" on 3 ranks'),
             ("a plane of symmetry", scene(conventional, extra='[[symmetry]]\naxis = "y"\n'), "found a plane of symmetry on 3 ranks"),
             ("periodic sides", scene(conventional, extra='[[periodic]]\naxis = "y"\n'), "found periodic sides on 3 ranks"),
             ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
@@ -77,14 +81,14 @@ def start(text, folder, ranks, options=()):
 
 
 def wait_for(folder, frames):
-    for _ in range(600):
+    for _ in range(4000):
         if len(glob.glob(folder + "/frames/*.h5")) >= frames and os.path.exists(folder + "/checkpoint.h5"):
             return
         time.sleep(0.05)
     raise RuntimeError("no frames in " + folder)
 
 
-LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 20.0\ntime_step = 0.02').replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
+LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 12.0\ntime_step = 0.02', cells=[22, 18]).replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
 
 
 def output_fails():
@@ -96,7 +100,7 @@ def output_fails():
     os.rename(folder + "/frames", folder + "/earlier")
     with open(folder + "/frames", "w"):
         pass
-    _, err = process.communicate(timeout=120)
+    _, err = process.communicate(timeout=300)
     # Until the next frame is due the run goes on.
     check(process.returncode == 1 and perikit_lines(err, "the run failed") == 1 and time.time() - began < 3 * LIMIT,
           "no folder for frames: status %d after %.1f s" % (process.returncode, time.time() - began))
