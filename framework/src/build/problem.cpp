@@ -102,12 +102,17 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
   if (parts.body->lattice())
     refuse("on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0");
   if (parts.partition) refuse("with several ranks", "one rank");
-  if (!formulation.bond && !(formulation.weighted && formulation.parts(parts.body->dimension()) != 1))
-    refuse(fmt::format("with kinematics \"{}\", which has no weights to choose", scene.kinematics->type),
-           "kinematics with evaluation points at bonds or parts of families");
+  const auto of = [&](const char* what) { return fmt::format("with kinematics \"{}\"{}", scene.kinematics->type, what); };
+  if (formulation.pairs)
+    refuse(of(", a pair law, which has neither weights nor gradients to choose"), "kinematics with gradients");
   if (formulation.force_state == ForceState::local)
     refuse("with force_state = \"local\", whose forces are not -dE/du", "force_state = \"variational\"");
-  if (formulation.selective()) refuse("with kinematics \"selective\"", "false");
+  const bool moves_gradients = formulation.point || formulation.selective();
+  if (moves_gradients && formulation.order > 1) refuse(of(" of order 2 or more"), "order = 1");
+  if (formulation.selective() && formulation.weighted)
+    refuse(of(" over this base"), "a base with a point gradient in its bonds: baqp, projection, bond_augmented");
+  if (formulation.weighted && formulation.parts(parts.body->dimension()) == 1)
+    refuse(of(" and one part"), "several parts, or kinematics \"conventional\"");
   auto consistency = std::make_shared<CloudConsistency>();
   if (const ImageMap* images = parts.images.get()) {
     consistency->extend = [images](FieldView u) { images->extend(u); };

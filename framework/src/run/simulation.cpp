@@ -5,6 +5,7 @@
 #include "perikit/build/problem.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
+#include "run/doubts.hpp"
 #include "run/earlier_results.hpp"
 
 namespace perikit {
@@ -106,6 +107,7 @@ std::string Simulation::summary() {
   }
   for (const std::string& warning : problem_->warnings()) text += fmt::format("warning       {}\n", warning);
   for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
+  for (const std::string& warning : doubts(scene_, *problem_)) text += fmt::format("warning       {}\n", warning);
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
   if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
