@@ -5,9 +5,16 @@ PERIKIT_PLUGIN(registrar) {
   ParameterTable table;
   table.number("end_time", "s", "End of the run; hit exactly by equal steps.").require().positive();
   table.number("time_step", "s", "Largest step; found from the stiffness where it is not given.").positive();
-  table.number("safety", "-", "Factor to the estimated stable step.").by_default("0.9").positive().at_most(1.0);
-  table.choice("estimate", {"eigenvalue", "bond_based"}, "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.").by_default("\"eigenvalue\"");
-  table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.").by_default("500").at_least(1);
+  table.number("safety", "-", "Factor to the estimated stable step; without it 0.9, and 0.5 where bonds may fail.")
+      .positive()
+      .at_most(1.0);
+  table
+      .choice("estimate", {"eigenvalue", "bond_based"},
+              "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.")
+      .by_default("\"eigenvalue\"");
+  table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.")
+      .by_default("500")
+      .at_least(1);
   table.at_most_of(1, {"time_step", "safety"});
   registrar.integrator(
       {.name = "verlet",

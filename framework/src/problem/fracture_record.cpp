@@ -6,8 +6,9 @@
 
 namespace perikit {
 
-bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const Motion& motion) {
-  const BondUpdate update = terms.update_bonds(u, time_step, motion);
+bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
+                            BondReaction* reaction) {
+  const BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.released;
   if (update.dissipated < 0) {

@@ -28,6 +28,7 @@ class SceneReader {
   void read_family(const toml::table& root);
   void read_parts(const toml::table& root);
   void read_regions(const toml::table& root);
+  void read_interfaces(const toml::table& root);
   void read_cracks(const toml::table& root);
   void read_initial(const toml::table& root);
   void read_boundaries(const toml::table& root);
@@ -56,7 +57,7 @@ class SceneReader {
 
   PartCatalogue& parts_;
   TomlReader reader_;
-  bool lattice_seed_ = false;   ///< body.lattice has a seed of its own
+  bool lattice_seed_ = false;  ///< body.lattice has a seed of its own
   ResolvedWriter writer_;
   Scene scene_;
   std::vector<std::string> set_names_;

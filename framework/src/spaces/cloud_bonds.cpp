@@ -6,13 +6,26 @@ namespace perikit {
 
 template <int D>
 CloudBonds<D>::CloudBonds(const SpaceParts& parts)
-    : families_(*parts.families.cloud()), formulation_(parts.formulation), laws_(parts.laws), selective_(formulation_.selective()),
-      mean_(formulation_.base == BondBase::mean), pairs_(formulation_.pair_symmetric && parts.share), two_states_(pairs_ && (selective_ || !laws_.single())),
-      points_(families_.body().points()), position_(reinterpret_cast<const Row*>(families_.body().rows().data())), gradient_of_(families_, formulation_.order),
-      upper_(points_), scale_(points_), u_(points_), gradient_(D * points_), flux_(D * points_), force_(points_) {
+    : families_(*parts.families.cloud()),
+      formulation_(parts.formulation),
+      laws_(parts.laws),
+      selective_(formulation_.selective()),
+      mean_(formulation_.base == BondBase::mean),
+      pairs_(formulation_.pair_symmetric && parts.share),
+      two_states_(pairs_ && (selective_ || !laws_.single())),
+      points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
+      gradient_of_(families_, formulation_.order),
+      upper_(points_),
+      scale_(points_),
+      u_(points_),
+      gradient_(D * points_),
+      flux_(D * points_),
+      force_(points_) {
   const BlockReach reach = cloud_reach(families_.lists(), points_);
   colouring_ = Colouring(reach);
   quiet_ = parts.quiet_blocks(reach);
+  local_ = parts.local_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
@@ -36,14 +49,15 @@ void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
 
 /// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
 template <int D>
-void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
-                           double* A) const noexcept {
+void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H,
+                           double* du, double* A) const noexcept {
   for (int l = 0; l < n; ++l) {
     const auto j = static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(begin + l)]);
     const Row d = u[j] - u[p];
     for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
     for (int e = 0; e < D; ++e) {
-      const Row h = mean_ ? 0.5 * (H[D * p + static_cast<std::size_t>(e)] + H[D * j + static_cast<std::size_t>(e)]) : H[D * p + static_cast<std::size_t>(e)];
+      const Row h = mean_ ? 0.5 * (H[D * p + static_cast<std::size_t>(e)] + H[D * j + static_cast<std::size_t>(e)])
+                          : H[D * p + static_cast<std::size_t>(e)];
       for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
     }
   }
@@ -88,7 +102,8 @@ void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, B
   }
   for (int c = 0; c < volume_components; ++c) {
     std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
-    for (int l = 0; l < lanes && both_ends; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
+    for (int l = 0; l < lanes && both_ends; ++l)
+      s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
   }
 }
 
@@ -106,8 +121,15 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     gather(p, begin, n, u_, gradient_, s.du, s.A);
     if (tangent) gather(p, begin, n, w_, direction_, s.dw, s.dA);
     if (selective_) volumes_of_bonds(p, lanes, both_ends, s);
-    const FamilyView view{D, n, families_.body().horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, s.bond[2], s.bond[2] + 2 * batch_points,
-                          s.bond[2] + batch_points, families_.inverse_shape(p), 0};
+    const FamilyView view{D,
+                          n,
+                          families_.body().horizon(),
+                          {xi, xi + batch_points, xi + 2 * batch_points},
+                          s.bond[2],
+                          s.bond[2] + 2 * batch_points,
+                          s.bond[2] + batch_points,
+                          families_.inverse_shape(p),
+                          0};
     formulation_.bond->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
     bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
@@ -115,7 +137,9 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     if (pass.work.history()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
-    if (pass.work.work() == Work::sample) pass.work.add_samples(n, s, *pass.sums);
+    const auto owner = static_cast<std::int32_t>(p);
+    pass.work.screen(&owner, 1, selective_ && both_ends ? 2 * lanes : n, s);
+    if (pass.work.work() == Work::sample) pass.add_samples(n, s);
     if (pass.alone()) continue;
     bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
     scatter(p, n, s, both_ends, tangent);
@@ -156,7 +180,9 @@ template <int D>
 static OwnerGradients gather_gradients(const AlignedVector<Row>& rows, std::size_t first, std::size_t n, double* H) noexcept {
   for (int c = 0; c < D; ++c)
     for (int e = 0; e < D; ++e)
-      for (std::size_t l = 0; l < padding; ++l) H[static_cast<std::size_t>(c * D + e) * padding + l] = l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
+      for (std::size_t l = 0; l < padding; ++l)
+        H[static_cast<std::size_t>(c * D + e) * padding + l] =
+            l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
   return {static_cast<int>(padding), padding, H, nullptr};
 }
 
@@ -170,7 +196,8 @@ void CloudBonds<D>::volumes(std::size_t b, bool tangent) noexcept {
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
     owner_volume(laws_.space(), owners, volume, padding);
     for (std::size_t l = 0; l < n; ++l)
-      for (const int c : {volume_jacobian, volume_root, volume_rate}) volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
+      for (const int c : {volume_jacobian, volume_root, volume_rate})
+        volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
   }
 }
 
@@ -188,7 +215,8 @@ void CloudBonds<D>::pressures(std::size_t b, bool tangent) noexcept {
     add_owner_stress(laws_.space(), owners, pressure[0], pressure[1], stress, padding);
     for (std::size_t l = 0; l < n; ++l)
       for (int c = 0; c < D; ++c)
-        for (int e = 0; e < D; ++e) flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
+        for (int e = 0; e < D; ++e)
+          flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
   }
 }
 
@@ -210,7 +238,8 @@ void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
   double energy = 0;
   for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
-    if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0) return pass.report(static_cast<std::int64_t>(p));
+    if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0)
+      return pass.report(static_cast<std::int64_t>(p));
   }
   if (pass.energies) pass.energies[b] = energy;
 }
@@ -225,25 +254,41 @@ void CloudBonds<D>::run(Pass& pass) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
   }
-  if (pass.alone() || tangent) quiet_.wake();
-  else quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
-  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) gradients(b, pass); });
+  if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
+  if (pass.alone() || pass.nearby || tangent)
+    quiet_.wake();
+  else
+    quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  // The stress on Hbar reaches one family beyond the bonds, its divergence two; what they read is cleared up to three.
+  const auto works = [&](std::size_t b, int k) { return pass.nearby ? near(b, k) : quiet_.awake(b, 2); };
+  const auto awake = [&](int k, auto&& block) {
+    return [&, k](std::size_t b) {
+      if (works(b, k)) block(b);
+    };
+  };
+  parallel_for(blocks(), [&](std::size_t b) {
+    if (pass.nearby ? near(b, 3) : quiet_.begins(b)) gradients(b, pass);
+  });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
-  colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
-  if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, tangent); }));
+  colouring_.for_each(awake(0, [&](std::size_t b) { bonds(b, pass); }));
+  if (selective_) parallel_for(blocks(), awake(1, [&](std::size_t b) { pressures(b, tangent); }));
   auto stress_on_points = [&](std::size_t b) {
-    if (!quiet_.awake(b, 2)) return;
+    if (!works(b, 1)) return;
     over_points(b, [&](std::size_t p) {
-      if (gradient_of_.stored()) gradient_of_.scatter(p, &flux_[D * p], force_);
-      else gradient_of_.times_inverse(p, &flux_[D * p], &flux_[D * p]);
+      if (gradient_of_.stored())
+        gradient_of_.scatter(p, &flux_[D * p], force_);
+      else
+        gradient_of_.times_inverse(p, &flux_[D * p], &flux_[D * p]);
     });
   };
-  if (gradient_of_.stored()) colouring_.for_each(stress_on_points);
-  else parallel_for(blocks(), stress_on_points);
+  if (gradient_of_.stored())
+    colouring_.for_each(stress_on_points);
+  else
+    parallel_for(blocks(), stress_on_points);
   if (pass.bad >= 0) return;
   parallel_for(blocks(), [&](std::size_t b) {
-    const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
+    if (pass.nearby && !near(b, 2)) return;
+    const bool gather = !gradient_of_.stored() && (pass.nearby || quiet_.awake(b, last));
     over_points(b, [&](std::size_t p) {
       const Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
@@ -280,8 +325,11 @@ template <int D>
 void CloudBonds<D>::report(ModelReport& report) const {
   report.fallbacks += gradient_of_.fallbacks();
   report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
-  report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size()) * sizeof(std::int64_t) + scale_.size() * sizeof(double) + scratch_.bytes() +
-                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() + pressure_.size()) * sizeof(Row);
+  report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size()) * sizeof(std::int64_t) +
+                  scale_.size() * sizeof(double) + scratch_.bytes() +
+                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() +
+                   pressure_.size()) *
+                      sizeof(Row);
   if (pairs_) report.skips.push_back(second_evaluation(families_.bonds()));
 }
 

@@ -36,6 +36,15 @@ class EvaluationSpace {
 
  protected:
   QuietBlocks quiet_;
+  QuietBlocks local_;  ///< the blocks around those of Pass::nearby; only where bonds may fail
+
+  /// At the beginning of a pass with Pass::nearby: holds(b) says whether block b has a marked group. Then pass k of it has
+  /// something to do in block b where near(b, k): k = 0 in these blocks alone, k in those that k steps of families reach.
+  template <class Holds>
+  void look_around(const Holds& holds) {
+    local_.look(3, holds);
+  }
+  bool near(std::size_t b, int k) const noexcept { return local_.awake(b, k); }
 };
 
 /// What a space is made of. All but the kinematics must outlive it.
@@ -43,10 +52,12 @@ struct SpaceParts {
   const Families& families;
   const Formulation& formulation;
   const Laws& laws;
-  bool skip = true;                           ///< leave out work whose result is known; changes no bit
-  bool share = true;                          ///< savings by symmetry and uniformity; change rounding
+  bool skip = true;    ///< leave out work whose result is known; changes no bit
+  bool share = true;   ///< savings by symmetry and uniformity; change rounding
+  bool fails = false;  ///< bonds may fail
 
   bool history() const noexcept { return laws.state_components() > 0; }
+  QuietBlocks local_blocks(const BlockReach& reach) const { return fails ? QuietBlocks(reach) : QuietBlocks(); }
   QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }
 };
 

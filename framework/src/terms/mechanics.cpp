@@ -13,11 +13,13 @@ Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
   if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
 }
 
-BatchWork Mechanics::work(Work kind, bool energy) const noexcept { return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()}; }
+BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), screen};
+}
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
-  const BatchWork work = this->work(Work::force, energy != nullptr);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);   // summed in the order of the blocks
+  const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
+  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);  // summed in the order of the blocks
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
   if (energy) *energy = std::accumulate(energies.begin(), energies.end(), *energy);
@@ -45,6 +47,18 @@ double Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks) {
   return std::accumulate(energies.begin(), energies.end(), 0.0);
 }
 
+void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {
+  const BatchWork work = this->work(Work::force, false);
+  Pass pass{work, u, {}, force, nullptr, nullptr, -1, {}, nullptr, nullptr, marks.data()};
+  space_->run(pass);
+}
+
+void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+  const BatchWork work = this->work(Work::sample, false);
+  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), nullptr, &samples};
+  space_->run(pass);
+}
+
 std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
   const Body& body = parts_.families.body();
   const int components = parts_.laws.components();
@@ -67,7 +81,9 @@ std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
   return pass.bad;
 }
 
-int Mechanics::steps() const noexcept { return parts_.formulation.bond && parts_.formulation.base == BondBase::mean ? 3 : 2; }
+int Mechanics::steps() const noexcept {
+  return parts_.formulation.bond && parts_.formulation.base == BondBase::mean ? 3 : 2;
+}
 
 std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const {
   return with_dimension(parts_.families.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> {

@@ -22,15 +22,15 @@ struct ProblemParts {
   ProblemParts();
   ProblemParts(ProblemParts&&) noexcept;
   ~ProblemParts();
-  std::unique_ptr<const Partition> partition;   ///< null where one rank has the whole body
-  std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
-  std::unique_ptr<const ImageMap> images;       ///< null without
+  std::unique_ptr<const Partition> partition;  ///< null where one rank has the whole body
+  std::unique_ptr<const Body> body;            ///< of this rank, with the images of its points
+  std::unique_ptr<const ImageMap> images;      ///< null without
   std::unique_ptr<Laws> laws;
-  std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
+  std::unique_ptr<Families> families;  ///< of the body: everything that looks at bonds borrows them
   FractureRecord fracture;
   std::unique_ptr<Terms> terms;
-  std::string kinematics;                       ///< names, for messages
-  std::vector<std::string> materials;           ///< by material of the body
+  std::string kinematics;              ///< names, for messages
+  std::vector<std::string> materials;  ///< by material of the body
 };
 
 class BodyProblem final : public Problem {
@@ -48,11 +48,12 @@ class BodyProblem final : public Problem {
   /// Of the present state.
   EvaluationStatus sample(PointSamples& samples);
   bool constant_stiffness() const noexcept override;
-  bool advance(double time_step, ConstFieldView velocity = {}) override;
+  bool advance(double time_step, FieldView velocity = {}) override;
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
-  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another problem.
+  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another
+  /// problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
 
@@ -60,7 +61,9 @@ class BodyProblem final : public Problem {
   const Terms& terms() const noexcept { return *parts_.terms; }
   /// The body of all ranks.
   const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
-  std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
+  std::string fracture_summary() const {
+    return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated);
+  }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
 
@@ -76,9 +79,12 @@ class BodyProblem final : public Problem {
   template <class Fill>
   void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
 
+  /// What bonds that failed inside of the last step mean for forces, velocity and work.
+  void react(BondReaction& reaction, FieldView velocity);
+
   Field seen_, seen_direction_;
-  BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
-  std::unique_ptr<Companion> companion_;        ///< made when asked for
+  BlockMatrix tangent_of_terms_, companion_of_terms_;  ///< with images
+  std::unique_ptr<Companion> companion_;               ///< made when asked for
 };
 
 }  // namespace perikit
