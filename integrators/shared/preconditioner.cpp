@@ -114,11 +114,24 @@ class CompanionCycle final : public Preconditioner {
   Multigrid multigrid_;
 };
 
+/// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing
+/// of stiffness against changes of volume, would need too many of them (measured: framework/docs/performance.md).
+bool factorisation_pays(Problem& problem) {
+  if (problem.dimension() == 3) return false;
+  double stiffest = 0;  // largest ratio of bulk to shear modulus
+  for (const std::int32_t p : problem.body().owned()) {
+    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
+    if (moduli.mu > 0) stiffest = std::max(stiffest, moduli.bulk() / moduli.mu);
+  }
+  const bool few = problem.body().points() <= 4000;
+  const bool resists_volume = stiffest > 50 && problem.body().space() != Space::plane_stress;
+  return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
+}
+
 }  // namespace
 
 Preconditioner::Preconditioner(Problem& problem)
-    : state_(problem.state().declare("preconditioner_state")),
-      numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
+    : state_(problem.state().declare("preconditioner_state")), numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;
@@ -160,8 +173,7 @@ std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Pro
   if (name == "auto" && communicator().size() > 1) {
     chosen = "none";  // the assembled tangent needs the whole body on one rank
   } else if (name == "auto") {
-    chosen =
-        problem.dimension() < 3 && static_cast<double>(problem.assembled_size().bytes) <= 2e9 ? "factorisation" : "companion";
+    chosen = factorisation_pays(problem) ? "factorisation" : "companion";
   }
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
   if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);

@@ -28,7 +28,15 @@ class Stepper {
         uniform_(problem.masses().uniform()),
         loaded_(problem.loads().any()),
         external_(loaded_ ? state_.external_force() : FieldView{}) {
-    if (loaded_) problem.loads().evaluate(state_.time, external_);
+    if (loaded_) load();
+  }
+
+  /// Loads at the present state.
+  void load() {
+    const EvaluationStatus status = problem_.external_forces(u_, state_.time, external_);
+    if (!status.ok())
+      throw RunError(
+          fmt::format("step {}, time {:.6g} s: loads that follow the surface: {}", state_.step, state_.time, status.description));
   }
 
   void evaluate(double* energy, double dt) {
@@ -206,7 +214,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     stepper.evaluate(sample ? &state.energies.strain : nullptr, dt);
     if (old_external.size() > 0) {
       std::copy_n(stepper.external().data, old_external.size(), old_external.data());
-      problem.loads().evaluate(t_next, stepper.external());
+      stepper.load();
     }
     stepper.prescribed_speed(t_next, speeds);
     stepper.add_work_of_loads(dt, old_external);

@@ -2,6 +2,7 @@
 
 #include "perikit/core/spectral.hpp"
 #include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/free_stretch.hpp"
 
 namespace perikit {
 
@@ -47,6 +48,15 @@ struct Hencky {
       const Tensor<T, S> dtau = add_diagonal((2.0 * mu) * rotate(e.vectors, log_change), lambda * inner(G, dH));
       return (dtau - P * transpose(dH)) * G;
     };
+  }
+
+  /// tau33 = 0 is linear in logarithms: ln(free stretch) = -lambda/(lambda + 2 mu) ln J over the plane, in a bar -lambda/(2
+  /// (lambda + mu)) ln F11.
+  template <class T, class S, class K>
+  T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    const T plane = log1p(jacobian_minus_one(with_free_part(H, T(0.0))));
+    return expm1(-lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane);
   }
 
  private:

@@ -35,6 +35,14 @@ struct LinearElastic {
   auto tangent(const Tensor<T, S>&, const K& k) const noexcept {
     return [this, k](const Tensor<T, S>& dH) { return P(dH, k); };
   }
+
+  template <class T, class S, class K>
+  T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    T plane = 0.0;
+    for (int i = 0; i < S::dimension; ++i) plane += H(i, i);
+    return -lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane;
+  }
 };
 
 }  // namespace perikit

@@ -6,6 +6,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/material.hpp"
+#include "perikit/sdk/rubber_free_stress.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
@@ -13,7 +14,8 @@ namespace perikit {
 /// Compressible Mooney-Rivlin rubber [Scabbia et al. 2025, eqs. 3-7].
 ///   psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J),  I1, I2 invariants of C
 ///   P = tau F^-T,  tau = dev(2 C1 J^(-2/3) b + 2 C2 J^(-4/3) (I1 b - b^2)) + J psi_vol'(J) I,  b = F F^T.
-/// Written in e = b - I, every term of the order of e: I1 b - b^2 = I2 I - cof b (Cayley-Hamilton), cof b = I + tr(e) I - e + cof e.
+/// Written in e = b - I, every term of the order of e: I1 b - b^2 = I2 I - cof b (Cayley-Hamilton), cof b = I + tr(e) I - e + cof
+/// e.
 struct MooneyRivlin {
   static constexpr MaterialTraits traits{.constants = 3};
   Volumetric volumetric = Volumetric::quadratic;
@@ -78,6 +80,12 @@ struct MooneyRivlin {
       const Tensor<T, S> dtau = on_d * dd + turn + inner(G, dH) * by_volume;
       return (dtau - P * transpose(dH)) * G;
     };
+  }
+
+  template <class T, class S, class K>
+  auto free_stress(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    return rubber_free_stress(H, T(C1), T(C2), T(kappa), volumetric);
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/rubber_free_stress.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
@@ -62,6 +63,12 @@ struct NeoHookean {
       const Tensor<T, S> turned = G * (transpose_times(dH, G));
       return a * dH + (T(-2.0 / 3) * a * volume) * F + (c_by_volume * volume - shape) * G - c * turned;
     };
+  }
+
+  template <class T, class S, class K>
+  auto free_stress(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [mu, kappa] = k;
+    return rubber_free_stress(H, T(0.5 * mu), T(0.0), T(kappa), volumetric);
   }
 };
 

@@ -32,6 +32,18 @@ struct SaintVenantKirchhoff {
     const Tensor<T, S> second = add_diagonal(mu * c, (0.5 * lambda) * trace(c));
     return second + H * second;
   }
+
+  /// S33 = 0 is linear in C - I: C33 - 1 = -lambda/(lambda + 2 mu) tr (C - I over the plane), in a bar -lambda/(2 (lambda + mu))
+  /// (C11 - 1).
+  template <class T, class S, class K>
+  T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    T plane = 0.0;
+    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
+    for (int i = 0; i < S::dimension; ++i) plane += c(i, i);
+    const T square = -lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane;
+    return square / (1.0 + sqrt(1.0 + square));
+  }
 };
 
 }  // namespace perikit

@@ -19,14 +19,15 @@ namespace perikit::contract {
 struct Subject {
   Registry registry;
   std::vector<std::pair<Kind, std::string>> parts;
+  bool third_party = false;  ///< parts of a library that is not of this build
 };
 Subject& subject();
 
 /// Every part to test of one kind with each of its example tables (at least one run a part).
 struct Example {
   std::string part;
-  std::string table;   ///< TOML keys without `type`
-  std::string stabilization = {};   ///< of a kinematics: its inline table, or empty
+  std::string table;               ///< TOML keys without `type`
+  std::string stabilization = {};  ///< of a kinematics: its inline table, or empty
   bool keeps_angular_momentum = true;
 };
 std::vector<Example> examples(Kind kind);
@@ -36,20 +37,20 @@ std::vector<Example> kinematics_examples();
 /// What a test body looks like. Spacing is 1 unless scaled.
 struct BodyOptions {
   int dimension = 3;
-  bool cloud = false;         ///< jittered
-  bool crack = false;         ///< about a tenth of the bonds cut
+  bool cloud = false;  ///< jittered
+  bool crack = false;  ///< about a tenth of the bonds cut
   bool two_materials = false;
   std::string influence = "gaussian";
   std::string material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
-  double scale = 1.0;         ///< of all lengths
-  double modulus = 1.0;       ///< of all moduli
-  int cells = 0;              ///< along the longest axis; 0: small
-  bool skip = true, share = true;   ///< [run]
+  double scale = 1.0;              ///< of all lengths
+  double modulus = 1.0;            ///< of all moduli
+  int cells = 0;                   ///< along the longest axis; 0: small
+  bool skip = true, share = true;  ///< [run]
   double horizon_ratio = 2.515;
   std::string plane = "strain";
   std::string integrator = "type = \"evaluate\"";
-  std::string sets;           ///< further lines of [sets]
-  std::string conditions;     ///< further sections: initial, boundaries, loads
+  std::string sets;        ///< further lines of [sets]
+  std::string conditions;  ///< further sections: initial, boundaries, loads
 };
 
 /// Scene text for a kinematics (its table, `type` included).

@@ -12,6 +12,12 @@ class ForwardingProblem : public Problem {
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
     return of_.evaluate_forces(u, force, energy, time_step);
   }
+  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override {
+    return of_.external_forces(u, t, force);
+  }
+  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override {
+    return of_.add_load_stiffness(u, t, w, Kw);
+  }
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
     return of_.tangent_action(u, w, Kw);
   }

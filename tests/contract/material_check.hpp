@@ -19,6 +19,7 @@ struct MaterialOptions {
   std::string law;                                 ///< name for messages
   double least_stretch = 0.2, most_stretch = 5.0;  ///< of the random deformations, where all stretches are given
   double least_free = 0.8, most_free = 1.2;        ///< the same where a stretch is free (some laws have no solution far out)
+  double smallest_strain = 1e-10;                  ///< that P and psi keep eight digits of; larger for laws written in F
   std::vector<bool> moduli = {};                   ///< which constants are moduli [Pa]; empty: all
   std::uint64_t seed = 20240229;
 };

@@ -2,6 +2,8 @@
 
 #include <memory>
 
+#include "perikit/core/tensor.hpp"
+#include "perikit/sdk/law_material.hpp"
 #include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
@@ -22,6 +24,45 @@ class Bonds final : public BondKinematics {
       for (int k = 0; k < family.bonds; ++k) g[k] = 0.7 * family.xi[c][k] / (family.length[k] * family.length[k]);
   }
 };
+
+/// Between projection and baqp: three tenths of the far end's gradient.
+class Blend final : public BondKinematics {
+ public:
+  BondTraits traits() const noexcept override { return {.base = BondBase::blend, .far_share = 0.3, .g_from_xi_only = true}; }
+  void correction(const FamilyView& family, double* g, std::size_t stride) const noexcept override {
+    for (int c = 0; c < family.dimension; ++c, g += stride)
+      for (int k = 0; k < family.bonds; ++k) g[k] = family.xi[c][k] / (family.length[k] * family.length[k]);
+  }
+};
+
+/// Rubber after Yeoh, written in F as in a textbook: rounding leaves a stress and an energy at rest.
+struct TextbookRubber {
+  static constexpr MaterialTraits traits{.constants = 2};
+  void constants(const MaterialInput& input, double* k) const {
+    k[0] = input.value("C1");
+    k[1] = input.value("kappa");
+  }
+  Moduli small_strain(const double* k) const noexcept { return {k[1] - 4 * k[0] / 3, 2 * k[0]}; }
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const Tensor<T, S> F = add_diagonal(H, T(1.0));
+    const T J = 1.0 + jacobian_minus_one(H), i = inner(F, F) / rational_power<2, 3>(J) - 3.0;
+    return k[0] * i + 0.1 * k[0] * i * i + 0.01 * k[0] * i * i * i + 0.5 * k[1] * (J - 1.0) * (J - 1.0);
+  }
+};
+
+template <class Law>
+void add_rubber(Registrar& registrar, const char* name) {
+  ParameterTable table;
+  table.material("density", "kg/m^3", "Mass per volume.").positive();
+  table.material("C1", "Pa", "Half of the shear modulus.").require();
+  table.material("kappa", "Pa", "Bulk modulus.").require();
+  registrar.material({.name = name,
+                      .summary = name,
+                      .parameters = std::move(table),
+                      .examples = {"density = 1000.0\nC1 = 1.7e5\nkappa = 1.0e7"}},
+                     [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<Law>>(); });
+}
 
 /// One domain per bond: the family, in which the bond itself counts twenty times.
 class Domains final : public WeightedKinematics {
@@ -87,6 +128,8 @@ void add(Registrar& registrar, const char* name) {
 PERIKIT_PLUGIN(registrar) {
   add<Points>(registrar, "their_points");
   add<Bonds>(registrar, "their_bonds");
+  add<Blend>(registrar, "their_blend");
+  add_rubber<TextbookRubber>(registrar, "their_rubber");
   add<Domains>(registrar, "their_domains");
   add<Pairs>(registrar, "their_pairs");
   add<Selective<Bonds>>(registrar, "their_selective_bonds");

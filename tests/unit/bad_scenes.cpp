@@ -74,6 +74,10 @@ const Case cases[]{
     // constants
     {4, "w = \"1\"", 4, "constants.w", "found the string \"1\"; allowed: a number"},
     {4, "w = inf", 4, "constants.w", "found the number inf"},
+    {4, "w = \"2*v\"", 4, "constants.w", "unknown name 'v'"},
+    {4, "w = \"2*x\"", 4, "constants.w", "depends on the position"},
+    {4, "w = \"2*w\"", 4, "constants.w", "found \"2*w\", which depends on itself"},
+    {4, "w = \"2*v\"\nv = \"w + 1\"", 5, "constants.v", "found \"w + 1\", which depends on itself"},
     {4, "x = 1", 4, "constants.x", "which expressions use already"},
     {4, "sin = 1", 4, "constants.sin", "which expressions use already"},
     {4, "\"a b\" = 1", 4, "constants.a b", "allowed: letters, digits and _"},

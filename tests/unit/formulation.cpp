@@ -38,7 +38,9 @@ class NoDilatation final : public DilatationLaw {
 
 class Pairs : public PairKinematics {
  public:
-  PairTraits traits() const noexcept override { return {.influence = false, .constant_moduli = true, .surface_correction = true}; }
+  PairTraits traits() const noexcept override {
+    return {.influence = false, .constant_moduli = true, .surface_correction = true};
+  }
   PairModuli moduli(const PairPoint&) const noexcept override { return {}; }
   std::string warning(const PairPoint&) const override { return {}; }
   void bond_law(const BondBatch&) const noexcept override {}
@@ -70,7 +72,9 @@ std::string refusal(std::shared_ptr<const Kinematics> kinematics) {
   return "not refused";
 }
 
-int classes(const Formulation& f) { return !!f.point + !!f.bond + !!f.weighted + !!f.pairs; }
+int classes(const Formulation& f) {
+  return !!f.point + !!f.bond + !!f.weighted + !!f.pairs;
+}
 
 }  // namespace
 
@@ -86,7 +90,7 @@ TEST_CASE("formulation: each class of kinematics is known by what it states") {
   CHECK(points.parts(2) == 1);
   REQUIRE(bonds.bond);
   CHECK(bonds.order == 2);
-  CHECK(bonds.base == BondBase::mean);
+  CHECK(bonds.far_share == 0.5);
   CHECK(bonds.weight == BondWeight::kernel);
   CHECK(bonds.pair_symmetric);
   CHECK(bonds.g_from_xi_only);
@@ -125,4 +129,35 @@ TEST_CASE("formulation: what is none of the classes, or several, and maps over a
   CHECK(refusal(std::make_shared<Mapped<Pairs>>()) == bad_base);
   CHECK(refusal(std::make_shared<Mapped<Unclassed>>()) == bad_base);
   CHECK(refusal(std::make_shared<Mapped<Mapped<Bonds>>>()) == bad_base);
+}
+
+TEST_CASE("the formulas by which public headers say where a value is stored") {
+  std::vector<double> stored(64);
+  for (std::size_t k = 0; k < stored.size(); ++k) stored[k] = static_cast<double>(k);
+  FamilyView family;
+  family.inverse_shape = stored.data();
+  CHECK(family.shape(2, 5) == 2);  // one owner: the bond does not matter
+  family.inverse_shape_stride = 8;
+  CHECK(family.shape(2, 5) == 21);  // component by component, 8 bonds each
+  MaterialBatch batch;
+  batch.constants = stored.data();
+  CHECK(batch.constant(3, 4) == 3);
+  batch.constant_stride = 16;
+  CHECK(batch.constant(3, 4) == 52);
+}
+
+TEST_CASE("a base may give the far end any share, and only the mean of both ends is the same from both") {
+  struct Blend final : BondKinematics {
+    double far_share;
+    bool symmetric;
+    Blend(double share, bool both) : far_share(share), symmetric(both) {}
+    BondTraits traits() const noexcept override {
+      return {.base = BondBase::blend, .far_share = far_share, .pair_symmetric = symmetric};
+    }
+    void correction(const FamilyView&, double*, std::size_t) const noexcept override {}
+  };
+  CHECK(make_formulation(std::make_shared<Blend>(0.3, false)).far_share == 0.3);
+  CHECK(make_formulation(std::make_shared<Blend>(0.5, true)).far_share == 0.5);
+  CHECK_THROWS_AS(make_formulation(std::make_shared<Blend>(0.3, true)), std::invalid_argument);
+  CHECK_THROWS_AS(make_formulation(std::make_shared<Blend>(-0.1, false)), std::invalid_argument);
 }

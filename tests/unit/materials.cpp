@@ -253,3 +253,25 @@ TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
       check(Plane(), Space::plane_strain);
     }
 }
+
+namespace {
+
+/// A law with a pressure that somebody forgot.
+struct StressedLaw {
+  static constexpr MaterialTraits traits{.constants = 1};
+  void constants(const MaterialInput& input, double* k) const { k[0] = input.value("kappa"); }
+  Moduli small_strain(const double* k) const noexcept { return {k[0], 0}; }
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const T j = jacobian_minus_one(H);
+    return k[0] * (0.5 * j * j + 1e-3 * j);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a law that is stressed at rest by more than rounding is refused") {
+  double k = 0;
+  const MaterialInput input{[](std::string_view) { return true; }, [](std::string_view) { return 2.0; }};
+  CHECK_THROWS_WITH_AS(LawMaterial<StressedLaw>().constants(input, &k), doctest::Contains("stressed"), std::domain_error);
+}

@@ -289,3 +289,23 @@ TEST_CASE("run.seed is the seed of the lattice that has none of its own") {
   own.replace(own.find("lower = ["), 0, "seed = 3\n");
   CHECK(parse(own).body.lattice->seed == 3);
 }
+
+TEST_CASE("constants may use others, wherever they stand") {
+  std::string text = cook;
+  const std::string one = "[constants]\n";
+  text.replace(text.find(one), one.size(), one + "a_half = \"b/n\"\nb = \"2*c + pi - pi\"\nc = 4\nn = 16\n");
+  const Scene scene = parse(text);
+  CHECK(scene.constants.at("b") == doctest::Approx(8.0));
+  CHECK(scene.constants.at("a_half") == doctest::Approx(0.5));
+}
+
+TEST_CASE("values without t ramp in quasi-static runs unless the scene says otherwise") {
+  std::string text = cook;
+  const std::string load = "force = [0, 1.0]\n", timed = "traction = [\"t\", 0]\n";
+  text.replace(text.find(load), load.size(), load + "ramp = false\n");
+  const Scene scene = parse(text);
+  CHECK(scene.loads.at(0).ramp.given == false);
+  CHECK(!scene.loads.at(1).ramp.given);
+  text.replace(text.find(timed), timed.size(), timed + "ramp = true\n");
+  CHECK_THROWS_WITH_AS(parse(text), doctest::Contains("load.1.ramp: found true with a value that mentions t"), InputError);
+}

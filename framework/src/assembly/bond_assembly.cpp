@@ -24,7 +24,7 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
     : rows_(rows),
       laws_(parts.laws),
       formulation_(parts.formulation),
-      mean_(formulation_.base == BondBase::mean),
+      far_share_(formulation_.far_share),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
       colouring_(cloud_reach(rows.lists(), rows.size())) {
   read_bonds();
@@ -105,7 +105,8 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const double* far = Hbar_.data() + entries * j;
   for (std::size_t c = 0; c < D; ++c) {
     double A[D], H[D];
-    for (std::size_t e = 0; e < D; ++e) A[e] = mean_ ? 0.5 * (own[c * D + e] + far[c * D + e]) : own[c * D + e];
+    for (std::size_t e = 0; e < D; ++e)
+      A[e] = far_share_ == 0 ? own[c * D + e] : (1 - far_share_) * own[c * D + e] + far_share_ * far[c * D + e];
     bond_shape_row<D>(A, u.component(static_cast<int>(c))[q] - u.component(static_cast<int>(c))[p], bond.xi, bond.correction, H);
     for (std::size_t e = 0; e < D; ++e) {
       m.batch.H(lane, static_cast<int>(c * D + e)) = H[e];
@@ -115,7 +116,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
 }
 
 // On y = [columns of A_b, du]: H_ae = sum_s R_es y_as with R_es = delta_es - xi_s g_e (s < D), g_e (s = D), so that the matrix of
-// the bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (1/2 or 1, -1) of i and (1/2 or 0, 1) of j.
+// the bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (1 - far_share, -1) of i and (far_share, 1) of j.
 template <int D>
 void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept {
   const Bond& bond = bond_[k];
@@ -127,8 +128,8 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
   }
   double near_share[slots], far_share[slots];
   for (std::size_t s = 0; s < D; ++s) {
-    near_share[s] = mean_ ? 0.5 : 1.0;
-    far_share[s] = mean_ ? 0.5 : 0.0;
+    near_share[s] = 1 - far_share_;
+    far_share[s] = far_share_;
   }
   near_share[D] = -1;
   far_share[D] = 1;
@@ -235,8 +236,8 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     add_row(static_cast<std::size_t>(rows_.lists().neighbour[k]), bond_[bond_[k].reverse].gradient, false);
 
   m.places.open(K, row);
-  // Only with the mean base do gradients two bonds away matter; the others have none in C.
-  const std::size_t gradients = mean_ ? near.size() : bonds + 1;
+  // Only where the far end has a share do gradients two bonds away matter; the others have none in C.
+  const std::size_t gradients = far_share_ > 0 ? near.size() : bonds + 1;
   for (std::size_t n = 0; n < near.size(); ++n) {
     const double* C = m.C.data() + strip * n;
     double* block = m.places.block(K, near[n], entries);
@@ -249,8 +250,7 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     };
     const auto j = static_cast<std::size_t>(near[n]);
     add_gradient(&own_gradient_[D * j], near[n]);
-    for (std::size_t k = rows_.first(j); k < rows_.first(j + 1); ++k)
-      add_gradient(bond_[k].gradient, rows_.lists().neighbour[k]);
+    for (std::size_t k = rows_.first(j); k < rows_.first(j + 1); ++k) add_gradient(bond_[k].gradient, rows_.lists().neighbour[k]);
   }
 }
 
@@ -264,12 +264,12 @@ std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
   over_rows(rows, [&](std::size_t r) {
     point_gradients(r, u);
     std::fill_n(diagonal_.data() + coupling * r, coupling, 0.0);
-    std::fill_n(off_diagonal_.data() + coupling * rows_.first(r), coupling * (rows_.first(r + 1) - rows_.first(r)),
-                0.0);
+    std::fill_n(off_diagonal_.data() + coupling * rows_.first(r), coupling * (rows_.first(r + 1) - rows_.first(r)), 0.0);
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::int64_t point = add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
+    const std::int64_t point =
+        add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
     if (point >= 0) bad.report(point);
   });
   if (bad.point() >= 0) return bad.point();
@@ -279,8 +279,7 @@ std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
 
 template <int D>
 std::size_t BondAssembly<D>::bytes() const noexcept {
-  return bond_.size() * sizeof(Bond) +
-         (rows_.size() * (coupling + entries + D) + rows_.bonds() * coupling) * sizeof(double);
+  return bond_.size() * sizeof(Bond) + (rows_.size() * (coupling + entries + D) + rows_.bonds() * coupling) * sizeof(double);
 }
 
 template class BondAssembly<1>;

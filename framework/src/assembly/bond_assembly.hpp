@@ -54,7 +54,8 @@ class BondAssembly final : public Assembly {
   const BlockRows& rows_;
   const Laws& laws_;
   const Formulation& formulation_;
-  bool mean_, symmetric_;
+  double far_share_;
+  bool symmetric_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
   AlignedVector<double> Hbar_;                     ///< by row

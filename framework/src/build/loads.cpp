@@ -1,7 +1,10 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "build/conditions.hpp"
 #include "build/face_shares.hpp"
+#include "build/surface_areas.hpp"
 #include "families/families.hpp"
 
 namespace perikit {
@@ -41,29 +44,72 @@ void keep_owned(const Partition& partition, const Body& part, Load& load) {
   load.share.resize(kept);
 }
 
+void refuse_pressure(const Scene& scene, const LoadDescription& load, const TermParts& parts, const Partition* partition) {
+  const auto refuse = [&](const std::string& text) { throw InputError(load.position, "load.pressure", text); };
+  if (partition) refuse("found with several ranks; allowed: one rank");
+  if (!load.follower) return;
+  if (parts.formulation.pairs)
+    refuse("found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
+  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return !boundary.face.empty(); }))
+    refuse(
+        "found with follower = true and a [[boundary]] with a face, whose images have no deformation gradient of their own; "
+        "allowed: a boundary that holds a set");
+}
+
+void add_pressure(const Scene& scene, const LoadDescription& description, const TermParts& parts, const Partition* partition,
+                  const ImageMap* images, bool quasi_static, std::vector<Load>& loads,
+                  std::vector<FollowingPressure>& pressures) {
+  refuse_pressure(scene, description, parts, partition);
+  const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
+  SurfaceAreas areas = surface_areas(description, parts, images);
+  if (description.follower) {
+    pressures.push_back({value, std::move(areas.points), std::move(areas.area)});
+    return;
+  }
+  for (int axis = 0; axis < parts.families->body().dimension(); ++axis) {
+    Load load;
+    load.components.push_back({axis, value});
+    for (std::size_t k = 0; k < areas.points.size(); ++k) {
+      const double area = areas.area[k][static_cast<std::size_t>(axis)];
+      if (area == 0) continue;
+      load.points.push_back(areas.points[k]);
+      load.share.push_back(-area);
+    }
+    if (!load.points.empty()) loads.push_back(std::move(load));
+  }
+}
+
 }  // namespace
 
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static) {
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images,
+                  bool quasi_static) {
   const Body& body = parts.families->body();
   TermParts whole = parts;
   std::unique_ptr<Families> of_whole;
-  const bool faces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
+  const bool faces =
+      std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
   if (partition && faces) {
     of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
     whole.families = of_whole.get();
   }
   std::vector<Load> loads;
+  std::vector<FollowingPressure> pressures;
   for (const LoadDescription& description : scene.loads) {
+    refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
+    if (description.type == LoadDescription::Type::pressure) {
+      add_pressure(scene, description, parts, partition, images, quasi_static, loads, pressures);
+      continue;
+    }
     Load load = distributed(description, partition ? partition->whole() : body, whole, images);
     if (partition) keep_owned(*partition, body, load);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;
-      load.components.push_back({static_cast<int>(c), function_of(value, quasi_static)});
+      load.components.push_back({static_cast<int>(c), function_of(value, description.ramp, quasi_static)});
     }
     if (!load.components.empty()) loads.push_back(std::move(load));
   }
-  return Loads(body, std::move(loads), images);
+  return Loads(body, std::move(loads), std::move(pressures), images);
 }
 
 }  // namespace perikit

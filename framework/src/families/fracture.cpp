@@ -49,7 +49,8 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     at_ = families_.body().make_field(d);
   }
   begin(before_);
-  reaction->impulse = families_.body().make_field(2 * d);
+  reaction->impulse = families_.body().make_field(d);
+  reaction->drift = families_.body().make_field(d);
   const std::vector<double> moments = this->moments(changes, before_, u);
   // Those of each half of the step at the mean of their moments.
   for (const bool early : {true, false}) {
@@ -68,11 +69,9 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     // half it belongs to the beginning of the step and has moved the points since.
     const double owed = (moment - 0.5) * time_step;
     Field& impulse = reaction->impulse;
-    const Owing act = [&](double sign, const GroupMarks& marks) {
-      body.forces(at_, marks, sign * owed, {impulse.data(), impulse.stride(), d});
-    };
+    const Owing act = [&](double sign, const GroupMarks& marks) { body.forces(at_, marks, sign * owed, impulse); };
     fail(std::move(of_half), u, at_, act, body, update);
-    for (std::size_t k = 0; early && k < u.size(); ++k) impulse.component(d)[k] = time_step * impulse.data()[k];
+    for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
   }
   return update;
 }

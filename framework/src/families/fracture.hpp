@@ -28,9 +28,7 @@ class Fracture {
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
-  /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds. reaction->impulse has
-  /// the impulses in its first components and, in as many more, the time step times those that belong to the beginning of the
-  /// step [N s^2].
+  /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds.
   BondUpdate update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction, const Body& body);
 
   /// Back to these bonds, which are those of `Families::changed` at another time.

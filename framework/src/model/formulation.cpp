@@ -1,8 +1,8 @@
-#include "model/kinematics_class.hpp"
-
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "model/kinematics_class.hpp"
 
 namespace perikit {
 
@@ -13,7 +13,10 @@ void read_traits(Formulation& f) {
   if (f.bond) {
     const BondTraits traits = f.bond->traits();
     f.order = traits.order;
-    f.base = traits.base;
+    f.far_share = traits.base == BondBase::own ? 0.0 : traits.base == BondBase::mean ? 0.5 : traits.far_share;
+    if (!(f.far_share >= 0 && f.far_share <= 1)) throw std::invalid_argument("its far_share is not between 0 and 1");
+    if (traits.pair_symmetric && f.far_share != 0.5)
+      throw std::invalid_argument("it is pair_symmetric with another base than the mean of both ends");
     f.weight = traits.weight;
     f.pair_symmetric = traits.pair_symmetric;
     f.g_from_xi_only = traits.g_from_xi_only;

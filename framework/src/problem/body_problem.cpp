@@ -81,6 +81,34 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   return status;
 }
 
+EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldView force) {
+  if (!loads().follow()) {
+    loads().evaluate(t, force);
+    return {};
+  }
+  PointSamples samples;
+  EvaluationStatus status = terms().sample(seen(u, seen_), samples);
+  if (!status.ok()) return status;
+  if (images()) images()->mirror_gradients(samples.H);
+  loads().evaluate(t, force, &samples.H);
+  return status;
+}
+
+EvaluationStatus BodyProblem::add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) {
+  const double largest = largest_magnitude(w);
+  if (!loads().follow() || largest == 0) return {};
+  // cof F is quadratic in u: central differences have no error but rounding.
+  const double step = 1e-3 * body().spacing() / largest;
+  Field moved = make_field(), force = make_field();
+  for (const double sign : {1.0, -1.0}) {
+    combine(1, u, sign * step, w, moved);
+    const EvaluationStatus status = external_forces(moved, t, force);
+    if (!status.ok()) return status;
+    combine(1, Kw, -sign / (2 * step), force, Kw);
+  }
+  return {};
+}
+
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
   EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
   finish(Kw, status);
@@ -133,9 +161,7 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
 /// the impulse upon it; its work is that of all other forces, with the opposite sign.
 void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
   EvaluationStatus status;
-  const int d = velocity.components;
-  const FieldView impulse{reaction.impulse.data(), reaction.impulse.stride(), d},
-      drift{reaction.impulse.component(d), impulse.stride, d};
+  const FieldView impulse = reaction.impulse, drift = reaction.drift;
   finish(impulse, status);
   finish(drift, status);
   const FieldView u = state().displacement();

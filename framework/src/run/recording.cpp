@@ -23,7 +23,9 @@ std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
-bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
+bool reached(double time, double wanted) {
+  return time >= wanted - 1e-9 * std::abs(wanted);
+}
 
 bool ended(const OutputProgress& run, std::int64_t step, double time) {
   return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
@@ -69,11 +71,17 @@ ReferenceData reference_of(const BodyProblem& problem) {
 
 }  // namespace
 
-void request_stop() noexcept { stop = true; }
-bool stop_requested() noexcept { return stop; }
+void request_stop() noexcept {
+  stop = true;
+}
+bool stop_requested() noexcept {
+  return stop;
+}
 
 std::vector<std::string> history_columns(const Scene& scene) {
-  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
+  std::vector<std::string> columns{"step",           "time",          "time_step",         "strain_energy",
+                                   "kinetic_energy", "external_work", "dissipated_energy", "iterations",
+                                   "residual"};
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -101,18 +109,22 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
   make_folder(folder_);
-  remove_file(temporary_name(checkpoint_file(folder_)));   // of a run that was killed
+  remove_file(temporary_name(checkpoint_file(folder_)));  // of a run that was killed
   const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
-  if (earlier) start_from_checkpoint();
-  else start_fresh(start);
-  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  if (earlier)
+    start_from_checkpoint();
+  else
+    start_fresh(start);
+  writer_ =
+      std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
 
 void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
-  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml")) check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
+  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml"))
+    check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
   std::error_code missing;
   if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
     throw InputError({scene.file.string()}, "output",
@@ -157,7 +169,9 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept { return stopping_; }
+bool RunRecorder::cancelled() const noexcept {
+  return stopping_;
+}
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return ended(done_, step, time);
@@ -175,7 +189,8 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 ||
+         (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
 bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
@@ -184,19 +199,21 @@ bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::wants_sample(std::int64_t step, double time) {
-  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
-  // run after the next step.
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
+  // the run after the next step.
   stopping_ = stop_requested();
   return stopping_ || frame_due(step, time) || history_due(step);
 }
 
 void RunRecorder::step_done(const StepReport& report) {
-  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
+  if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
+    done_.history_every = asked > 0               ? asked
+                          : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows)
+                                                  : 1;
   }
   fields_.renew();
   const auto before = std::chrono::steady_clock::now();
@@ -206,20 +223,45 @@ void RunRecorder::step_done(const StepReport& report) {
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;
   done_.frames += frame;
-  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
+  while (done_.next_time < std::ssize(frame_times_) &&
+         reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)]))
+    ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
   }
-  if (report.step == 0) done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
+  if (report.step == 0)
+    done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
+  if (simulation_.quasi_static()) last_step_ = {report, simulation_.problem().snapshot(), row || stopping_, frame || stopping_};
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   progress(report);
 }
 
+bool RunRecorder::interrupted() const noexcept {
+  return stop_requested();
+}
+
+void RunRecorder::stopped_within_step() {
+  stopping_ = true;
+  simulation_.problem().restore(last_step_.state);
+  fields_.renew();
+  if (!last_step_.row) write_history(last_step_.report);
+  if (!last_step_.frame) write_frame(last_step_.report);
+  keep_checkpoint(last_step_.report);
+  log(fmt::format("stopped within step {}, which was given up", last_step_.report.step + 1));
+}
+
+void RunRecorder::working(std::string_view what) {
+  if (line_due())
+    show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what,
+                     std::chrono::duration<double>(shown_ - start_).count()),
+         false);
+}
+
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  history_->sync();   // frames are on the disk already
+  history_->sync();  // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
                              simulation_.problem().snapshot()});
 }
@@ -235,26 +277,32 @@ void RunRecorder::write_history(const StepReport& report) {
   BodyProblem& problem = simulation_.problem();
   Energies& energies = problem.state().energies;
   if (simulation_.dynamic()) energies.kinetic = kinetic_energy(problem, problem.state().velocity());
-  std::vector<double> row{static_cast<double>(report.step), report.time, report.time_step, energies.strain, energies.kinetic,
-                          energies.external_work, energies.dissipated, static_cast<double>(report.iterations), report.residual};
-  for (const HistoryDescription& record : simulation_.scene().output.history) row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
+  std::vector<double> row{static_cast<double>(report.step),
+                          report.time,
+                          report.time_step,
+                          energies.strain,
+                          energies.kinetic,
+                          energies.external_work,
+                          energies.dissipated,
+                          static_cast<double>(report.iterations),
+                          report.residual};
+  for (const HistoryDescription& record : simulation_.scene().output.history)
+    row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
   history_->row(row);
   ++rows_written_;
 }
 
-void RunRecorder::progress(const StepReport& report) {
-  if (!show_progress_) return;
+bool RunRecorder::line_due() {
   const auto now = std::chrono::steady_clock::now();
-  const bool terminal = isatty(fileno(stderr));
-  const bool end = last(report.step, report.time);
-  if (!end && now - shown_ < (terminal ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000))) return;
+  if (!show_progress_ ||
+      now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000)))
+    return false;
   shown_ = now;
-  const double spent = std::chrono::duration<double>(now - start_).count();
-  const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
-  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  const std::string line = fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time,
-                                       report.time_step, rate, done > 0 ? spent * (1 - done) / done : 0.0);
-  if (terminal) {
+  return true;
+}
+
+void RunRecorder::show(const std::string& line, bool end) {
+  if (isatty(fileno(stderr))) {
     fmt::print(stderr, "\r\033[K{}", line);
     line_open_ = !end;
     if (end) std::fputc('\n', stderr);
@@ -262,6 +310,25 @@ void RunRecorder::progress(const StepReport& report) {
     fmt::print(stderr, "{}\n", line);
   }
   std::fflush(stderr);
+}
+
+void RunRecorder::progress(const StepReport& report) {
+  const bool end = last(report.step, report.time);
+  if (!line_due() && !(end && show_progress_)) return;
+  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
+  const double left = done > 0 ? spent * (1 - done) / done : 0.0;
+  if (!simulation_.dynamic()) {
+    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time,
+                     report.end_time, report.iterations, report.residual, left),
+         end);
+    return;
+  }
+  const double rate = static_cast<double>(report.step - first_step_) *
+                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
+                   report.end_time, report.time_step, rate, left),
+       end);
 }
 
 }  // namespace perikit

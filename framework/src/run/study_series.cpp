@@ -57,4 +57,58 @@ std::string level_table(const StudyTable& table) {
   return text;
 }
 
+namespace {
+
+bool positive(const std::optional<double>& value) {
+  return value && std::isfinite(*value) && *value > 0;
+}
+
+/// Rows of the table in groups that differ in this key alone, each group by ascending value.
+std::vector<std::vector<const StudyRow*>> along(const StudyTable& table, std::size_t key) {
+  std::vector<std::vector<const StudyRow*>> groups;
+  for (const StudyRow& row : table.rows) {
+    if (!positive(row.values[key].number)) continue;
+    const auto same = [&](const auto& group) {
+      for (std::size_t k = 0; k < row.values.size(); ++k)
+        if (k != key && row.values[k].toml != group.front()->values[k].toml) return false;
+      return true;
+    };
+    const auto group = std::ranges::find_if(groups, same);
+    if (group == groups.end())
+      groups.push_back({&row});
+    else
+      group->push_back(&row);
+  }
+  for (auto& group : groups)
+    std::ranges::stable_sort(
+        group, [&](const StudyRow* a, const StudyRow* b) { return *a->values[key].number < *b->values[key].number; });
+  return groups;
+}
+
+}  // namespace
+
+std::string order_table(const StudyTable& table) {
+  const Study& study = table.study;
+  const bool by_plot = study.plot && std::ranges::find(study.keys, study.plot->x, &StudyKey::key) != study.keys.end();
+  std::string rows;
+  for (std::size_t key = 0; key < study.keys.size(); ++key) {
+    if (by_plot && study.keys[key].key != study.plot->x) continue;
+    for (const auto& group : along(table, key))
+      for (std::size_t q = 0; q < study.quantities.size(); ++q)
+        for (std::size_t k = 1; k < group.size(); ++k) {
+          const StudyRow &a = *group[k - 1], &b = *group[k];
+          const double x0 = *a.values[key].number, x1 = *b.values[key].number;
+          if (!positive(a.errors[q]) || !positive(b.errors[q]) || x1 <= x0) continue;
+          std::string others;
+          for (std::size_t o = 0; o < study.keys.size(); ++o)
+            if (o != key) others += fmt::format("{}{} = {}", others.empty() ? "" : ", ", study.keys[o].key, a.values[o].shown);
+          rows += fmt::format("| {} | {} | {} | {} | {} | {:.2f} |\n", study.quantities[q].error_column(), others,
+                              study.keys[key].key, a.values[key].shown, b.values[key].shown,
+                              std::log(*b.errors[q] / *a.errors[q]) / std::log(x1 / x0));
+        }
+  }
+  if (rows.empty()) return {};
+  return "| error | with | key | from | to | observed order: error ~ key^order |\n| --- | --- | --- | --- | --- | --- |\n" + rows;
+}
+
 }  // namespace perikit

@@ -20,4 +20,9 @@ std::vector<StudySeries> plotted_series(const StudyTable& table);
 /// "from which x on y stays below the level", a row a series, the first to get there first.
 std::string level_table(const StudyTable& table);
 
+/// Observed orders: the exponent in error ~ key^order between neighbouring values of a key that takes positive numbers, a row for
+/// each pair of runs that differ in nothing else. Of the key that the plot has as x, if it has one, else of all. Empty where
+/// there are none.
+std::string order_table(const StudyTable& table);
+
 }  // namespace perikit

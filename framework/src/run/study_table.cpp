@@ -81,6 +81,7 @@ std::string StudyTable::markdown() const {
   line(std::vector<std::string>(header(study).size(), "---"));
   for (const StudyRow& row : rows) line(cells(*this, row, 6));
   if (study.plot && study.plot->level) (text += '\n') += level_table(*this);
+  if (const std::string orders = order_table(*this); !orders.empty()) (text += '\n') += orders;
   return text;
 }
 

@@ -124,6 +124,12 @@ std::vector<std::string> expression_words() {
   return words;
 }
 
+std::vector<std::string> names_of_expression(const std::string& text) {
+  std::vector<std::string> names;
+  for (Name& name : names_in(text)) names.push_back(std::move(name.text));
+  return names;
+}
+
 Expression::Expression(double number) : number_(number) {}
 
 Expression::Expression(const std::variant<double, std::string>& value, const Constants& constants, bool with_time,

@@ -1,4 +1,5 @@
-// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
+// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of
+// it.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -42,25 +43,38 @@ void SceneReader::read_boundaries(const toml::table& root) {
       description.face_position = values.position(values.has("at") ? "at" : "face");
       if (!values.has("set")) description.set = "all";
     } else if (!values.has("set")) {
-      reader_.errors.add(reader_.position(*boundary), values.path() + ".set", "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
+      reader_.errors.add(reader_.position(*boundary), values.path() + ".set",
+                         "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
     }
     if (values.has("at")) {
       description.at = values.number("at");
-      if (!values.has("face")) reader_.errors.add(values.position("at"), values.path() + ".at", "found it without face; allowed: only with face");
+      if (!values.has("face"))
+        reader_.errors.add(values.position("at"), values.path() + ".at", "found it without face; allowed: only with face");
     }
     description.velocity = values.has("velocity");
     for (const char* key : {"displacement", "velocity"}) {
       if (values.has(key)) description.components = components(values, key);
     }
     description.position = values.position(description.velocity ? "velocity" : "displacement");
+    description.ramp = ramp_of(values, description.components);
     scene_.boundaries.push_back(std::move(description));
   }
 }
 
+RampDescription SceneReader::ramp_of(const ParameterValues& values, const std::vector<std::optional<Expression>>& components) {
+  if (!values.has("ramp")) return {};
+  const bool ramp = values.boolean("ramp");
+  if (ramp && std::ranges::any_of(components, [](const auto& value) { return value && value->depends_on_time(); }))
+    reader_.errors.add(values.position("ramp"), join_path(values.path(), "ramp"),
+                       "found true with a value that mentions t and says itself how it grows; allowed: values without t");
+  return {ramp, values.position("ramp")};
+}
+
 void SceneReader::check_axis(char axis, const ParameterValues& values, const char* key) {
   if (reader_.dimension <= 0 || axis - 'x' < reader_.dimension) return;
-  reader_.errors.add(values.position(key), join_path(values.path(), key),
-                     fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", values.text(key), reader_.dimension));
+  reader_.errors.add(
+      values.position(key), join_path(values.path(), key),
+      fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", values.text(key), reader_.dimension));
 }
 
 void SceneReader::read_planes(const toml::table& root) {
@@ -102,19 +116,31 @@ void SceneReader::read_loads(const toml::table& root) {
       description.type = type;
       description.components = expressions(values, key, true);
     }
+    if (values.has("pressure")) {
+      description.type = Type::pressure;
+      description.components.emplace_back(values.expression("pressure"), scene_.constants, true, values.position("pressure"),
+                                          path + ".pressure");
+      description.follower = values.boolean("follower");
+      if (!values.has("face")) description.position = values.position("pressure");
+    } else if (values.has("follower") && values.boolean("follower")) {
+      reader_.errors.add(values.position("follower"), path + ".follower",
+                         "found it without pressure; allowed: only with pressure");
+    }
     if (load->contains("traction") && !load->contains("face")) {
       reader_.errors.add(reader_.position(*load), path + ".face",
                          "found nothing beside traction; allowed: " + allowed(*table.find("face")));
     }
     if (values.has("face")) {
       description.face = values.text("face");
-      if (!load->contains("traction")) {
-        reader_.errors.add(values.position("face"), path + ".face",
-                           fmt::format("found \"{}\" without traction; allowed: only with traction", description.face));
+      if (!load->contains("traction") && !load->contains("pressure")) {
+        reader_.errors.add(
+            values.position("face"), path + ".face",
+            fmt::format("found \"{}\" without traction; allowed: only with traction or pressure", description.face));
       } else {
         check_axis(description.face[1], values, "face");
       }
     }
+    description.ramp = ramp_of(values, {description.components.begin(), description.components.end()});
     scene_.loads.push_back(std::move(description));
   }
 }
@@ -198,7 +224,8 @@ void SceneReader::read_history(const toml::table& output) {
     }
     if (values.has("at")) std::ranges::copy(values.numbers("at"), description.at.begin());
     if (values.has("exact")) {
-      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"), join_path(path, "exact"));
+      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"),
+                                join_path(path, "exact"));
     }
     scene_.output.history.push_back(std::move(description));
   }

@@ -100,12 +100,33 @@ void SceneReader::read_head(const toml::table& root) {
   writer_.lines(table, values);
 }
 
+/// A number, or an expression that names something: constants that are known already, pi, functions. What is wrong counts as 0,
+/// so that its uses are not reported as well.
+double SceneReader::constant(const std::string& name, const toml::node& node) {
+  const std::string path = join_path("constants", name);
+  const std::optional<std::string> text = node.value<std::string>();
+  if (!text || names_of_expression(*text).empty()) {
+    const auto value = reader_.value(Parameter{}, node, path);
+    return value ? std::get<double>(*value) : 0.0;
+  }
+  try {
+    const Expression expression(*text, scene_.constants, false, reader_.position(node), path);
+    if (!expression.depends_on_position()) return expression({});
+    reader_.errors.add(
+        reader_.position(node), path,
+        fmt::format("found {}, which depends on the position; allowed: numbers, and expressions in other constants",
+                    toml_string(*text)));
+  } catch (const InputError& error) {
+    reader_.errors.add(reader_.position(node), error);
+  }
+  return 0.0;
+}
+
 void SceneReader::read_constants(const toml::table& root) {
   const toml::table* constants = section(root, "constants", "constants");
   if (!constants || constants->empty()) return;
   const std::vector<std::string> taken = expression_words();
-  const Parameter number;
-  writer_.header("constants");
+  std::vector<std::pair<std::string, const toml::node*>> waiting;  // a constant may use others, wherever they stand
   for (const auto& [key, node] : *constants) {
     const std::string name(key.str()), path = join_path("constants", name);
     if (!identifier(name)) {
@@ -116,14 +137,32 @@ void SceneReader::read_constants(const toml::table& root) {
       reader_.errors.add(
           reader_.position(key.source()), path,
           fmt::format("found the name \"{}\", which expressions use already; allowed: any but {}", name, fmt::join(taken, ", ")));
-    } else if (const auto value = reader_.value(number, node, path)) {
-      scene_.constants[name] = std::get<double>(*value);
-      writer_.line(name, toml_number(std::get<double>(*value)));
     } else {
-      scene_.constants[name] = 0.0;  // known, so that its uses are not reported as well
+      waiting.emplace_back(name, &node);
     }
   }
+  const auto waits = [&](const std::string& name) {
+    return std::ranges::any_of(waiting, [&](const auto& other) { return other.first == name; });
+  };
+  const auto ready = [&](const auto& constant) {
+    const std::optional<std::string> text = constant.second->template value<std::string>();
+    return !text || std::ranges::none_of(names_of_expression(*text), waits);
+  };
+  while (!waiting.empty()) {
+    const auto next = std::ranges::find_if(waiting, ready);
+    if (next == waiting.end()) break;
+    scene_.constants[next->first] = constant(next->first, *next->second);
+    waiting.erase(next);
+  }
+  for (const auto& [name, node] : waiting) {
+    reader_.errors.add(reader_.position(*node), join_path("constants", name),
+                       fmt::format("found {}, which depends on itself; allowed: numbers, and expressions in other constants",
+                                   toml_string(node->value_or(std::string()))));
+    scene_.constants[name] = 0.0;
+  }
   reader_.constants = scene_.constants;
+  writer_.header("constants");
+  for (const auto& [name, value] : scene_.constants) writer_.line(name, toml_number(value));
 }
 
 void SceneReader::read_sets(const toml::table& root) {

@@ -21,6 +21,7 @@ class SceneReader {
   void refuse_reserved(toml::table& root);
   void read_head(const toml::table& root);
   void read_constants(const toml::table& root);
+  double constant(const std::string& name, const toml::node& node);
   void read_body(const toml::table& root);
   void read_lattice(const toml::table& body);
   void read_points(const toml::table& body);
@@ -47,6 +48,7 @@ class SceneReader {
   void check_set(const std::string& name, const SourcePosition& position, const std::string& key);
   /// An error unless the body has this axis.
   void check_axis(char axis, const ParameterValues& values, const char* key);
+  RampDescription ramp_of(const ParameterValues& values, const std::vector<std::optional<Expression>>& components);
   /// The set that `values` names, checked.
   std::string set_of(const ParameterValues& values);
   std::vector<Expression> expressions(const ParameterValues& values, const std::string& key, bool with_time) const;

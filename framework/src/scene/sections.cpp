@@ -126,6 +126,13 @@ ParameterTable initial_parameters() {
   return table;
 }
 
+void add_ramp(ParameterTable& table) {
+  table.boolean("ramp",
+                "In quasi-static runs: whether values grow in proportion to the load parameter t. Without it those do that do "
+                "not mention t. false: they act as "
+                "they are from the start; true: only of values without t.");
+}
+
 ParameterTable boundary_parameters() {
   ParameterTable table;
   table.string("set",
@@ -136,6 +143,7 @@ ParameterTable boundary_parameters() {
       "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
   table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
   table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
+  add_ramp(table);
   table.exactly(1, {"displacement", "velocity"});
   return table;
 }
@@ -163,8 +171,13 @@ ParameterTable load_parameters() {
   table.add(ParameterType::expressions, "force", "N", "Total force on the set, shared by volume.").with_time().one_per_axis();
   table.add(ParameterType::expressions, "body_force", "N/m^3", "Force per volume.").with_time().one_per_axis();
   table.add(ParameterType::expressions, "traction", "Pa", "Force per area on `face`.").with_time().one_per_axis();
-  table.choice("face", faces(), "With traction: the side of the set that carries it.");
-  table.exactly(1, {"force", "body_force", "traction"});
+  table.expression("pressure", "Pa", "Force per area against the outward normal of the free surface of the set.").with_time();
+  table.choice("face", faces(),
+               "With traction: the side of the set that carries it. With pressure: the one side that carries it, instead of all "
+               "of the surface.");
+  table.boolean("follower", "With pressure: normal and area are those of the deformed surface.").by_default("false");
+  add_ramp(table);
+  table.exactly(1, {"force", "body_force", "traction", "pressure"});
   return table;
 }
 

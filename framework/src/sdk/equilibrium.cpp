@@ -1,5 +1,8 @@
 #include "perikit/sdk/equilibrium.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -10,13 +13,17 @@
 namespace perikit {
 
 Equilibrium::Equilibrium(Problem& problem, double tolerance)
-    : problem_(problem), tolerance_(tolerance), u_(problem.make_field()), scratch_(problem.make_field()),
-      free_(problem.constraints().free()), external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
+    : problem_(problem),
+      tolerance_(tolerance),
+      u_(problem.make_field()),
+      scratch_(problem.make_field()),
+      free_(problem.constraints().free()),
+      external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
 
 void Equilibrium::begin(double t, ConstFieldView u) {
   t_ = t;
   copy(u, u_);
-  if (external_.data) problem_.loads().evaluate(t, external_);
+  if (external_.data && !problem_.loads().follow()) problem_.loads().evaluate(t, external_);
   Field noise = problem_.make_field();
   fill_with_noise(free_, 1, noise);
   const double size = norm(noise);
@@ -32,7 +39,15 @@ double Equilibrium::missing(ConstFieldView u, FieldView w) {
   return largest_magnitude(w);
 }
 
+bool Equilibrium::goes_on() {
+  if (!observer_ || !observer_->interrupted()) return true;
+  stopped_ = true;
+  failure_ = "the run was stopped";
+  return false;
+}
+
 bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
+  if (!goes_on()) return false;
   const FieldView internal = problem_.state().internal_force();
   const EvaluationStatus status = problem_.evaluate_forces(u, internal, energy);
   if (!status.ok()) {
@@ -40,11 +55,15 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
     return false;
   }
   copy(internal, r);
+  if (problem_.loads().follow() && !problem_.external_forces(u, t_, external_).ok()) {
+    failure_ = "the pressure met an inadmissible deformation";
+    return false;
+  }
   if (external_.data) combine(1, r, 1, external_, r);
   double squares = external_.data ? dot(external_, external_) : 0.0, reactions = 0;
   for (const std::int64_t dof : problem_.constraints().dofs()) {
     const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
-    reactions += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
+    reactions += reaction * reaction - outer * outer;  // loads on prescribed components go into the reactions
   }
   squares += communicator().sum(reactions);
   mask(free_, r);
@@ -57,7 +76,10 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
 }
 
 bool Equilibrium::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  const EvaluationStatus status = problem_.tangent_action(u, w, Kw);
+  if (!goes_on()) return false;
+  if (observer_ && ++actions_ % 8 == 0) observer_->working(fmt::format("{}, {} tangent actions", last_note_, actions_));
+  EvaluationStatus status = problem_.tangent_action(u, w, Kw);
+  if (status.ok() && problem_.loads().follow()) status = problem_.add_load_stiffness(u, t_, w, Kw);
   if (!status.ok()) {
     failure_ = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
     return false;
@@ -69,8 +91,20 @@ bool Equilibrium::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
 void Equilibrium::note(std::string_view line) {
   notes_ += line;
   notes_ += '\n';
+  if (!observer_) return;
+  actions_ = 0;
+  last_note_ = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+  observer_->working(fmt::format("t = {:.4g}: {}", t_, last_note_));
+  const auto now = std::chrono::steady_clock::now();
+  if (now - logged_ < std::chrono::seconds(5)) return;
+  logged_ = now;
+  std::string lines = take_notes();
+  lines.pop_back();  // a log has line ends of its own
+  observer_->log(lines);
 }
 
-std::string Equilibrium::take_notes() { return std::exchange(notes_, {}); }
+std::string Equilibrium::take_notes() {
+  return std::exchange(notes_, {});
+}
 
 }  // namespace perikit

@@ -1,6 +1,7 @@
 #pragma once
-/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points. The formula stands in
-/// bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes around them.
+/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points. The formula
+/// stands in bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes
+/// around them.
 
 #include <cstdint>
 
@@ -19,8 +20,10 @@ struct BondVectors {
 
 template <bool per_slot>
 inline Pack bond_value(const double* x, int lane) noexcept {
-  if constexpr (per_slot) return Pack(x[lane / static_cast<int>(padding)]);
-  else return Pack::load(x + lane);
+  if constexpr (per_slot)
+    return Pack(x[lane / static_cast<int>(padding)]);
+  else
+    return Pack::load(x + lane);
 }
 
 /// Row c of H_b, H_ce = A_ce + (du_c - A_ck xi_k) g_e, for numbers or packs.
@@ -39,7 +42,7 @@ T bond_shape_row_adjoint(T (&P)[D], const T (&xi)[D], const T (&g)[D]) noexcept 
   return t;
 }
 
-/// H from A = (Hbar_i + Hbar_j)/2 or Hbar_i, and u_b = u_j - u_i. H has D*D components; lateral components are left alone.
+/// H from A = (1 - s) Hbar_i + s Hbar_j and u_b = u_j - u_i. H has D*D components; lateral components are left alone.
 template <int D, bool per_slot>
 void bond_gradient(int lanes, const BondVectors& v, const double* A, const double* du, double* H) noexcept {
   for (int l = 0; l < lanes; l += pack_width) {
@@ -76,14 +79,15 @@ void bond_adjoint(int lanes, const BondVectors& v, const double* WP, double* t, 
 }
 
 /// Lattices: H of `slots` bonds of each of the eight points p ... p + 7, straight from the fields, lanes slot by slot.
-/// mean: A = (Hbar_i + Hbar_j)/2, else Hbar_i.
-template <int D, bool per_slot, bool mean>
-void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p, const BondVectors& v, ConstFieldView u, ConstFieldView Hbar,
-                           double* H) noexcept {
+/// both: A = (1 - far_share) Hbar_i + far_share Hbar_j, else Hbar_i.
+template <int D, bool per_slot, bool both>
+void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p, const BondVectors& v, double far_share,
+                           ConstFieldView u, ConstFieldView Hbar, double* H) noexcept {
+  const Pack near(both ? 1 - far_share : 1.0), other(far_share);
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
     Pack own_u[D], own_H[D * D];
     for (int c = 0; c < D; ++c) own_u[c] = Pack::load(u.component(c) + p + l);
-    for (int c = 0; c < D * D; ++c) own_H[c] = Pack(mean ? 0.5 : 1.0) * Pack::load(Hbar.component(c) + p + l);
+    for (int c = 0; c < D * D; ++c) own_H[c] = near * Pack::load(Hbar.component(c) + p + l);
     for (int k = 0; k < slots; ++k) {
       const std::int64_t far = p + shifts[k] + l;
       const int lane = k * static_cast<int>(padding) + l;
@@ -96,7 +100,7 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
         Pack a[D], h[D];
         for (int e = 0; e < D; ++e) {
           a[e] = own_H[c * D + e];
-          if constexpr (mean) a[e] += Pack(0.5) * Pack::load(Hbar.component(c * D + e) + far);
+          if constexpr (both) a[e] += other * Pack::load(Hbar.component(c * D + e) + far);
         }
         bond_shape_row<D>(a, Pack::load(u.component(c) + far) - own_u[c], xi, g, h);
         for (int e = 0; e < D; ++e) h[e].store(H + (c * D + e) * batch_points + lane);
@@ -112,16 +116,18 @@ inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
 
 /// to[lanes of mask] += value; other cells are not touched.
 inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
-  if (mask == pack_mask(0xff, 0)) (Pack::load(to) + value).store(to);
-  else subtract_at(to, mask, -value);
+  if (mask == pack_mask(0xff, 0))
+    (Pack::load(to) + value).store(to);
+  else
+    subtract_at(to, mask, -value);
 }
 
-/// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the stress
-/// on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written.
-template <int D, bool per_slot, bool mean>
-void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v, const double* WP,
-                          FieldView force, FieldView stress) noexcept {
-  const Pack share(mean ? 0.5 : 1.0);
+/// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the
+/// stress on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written.
+template <int D, bool per_slot, bool both>
+void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v,
+                          double far_share, const double* WP, FieldView force, FieldView stress) noexcept {
+  const Pack near(both ? 1 - far_share : 1.0), other(far_share);
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
     // Every loop over components is unrolled whole: sums of the owners stay in registers.
     Pack own_t[D], own_S[D * D];
@@ -140,19 +146,23 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
         PERIKIT_UNROLL for (int e = 0; e < D; ++e) row[e] = Pack::load(WP + (c * D + e) * batch_points + lane);
         t[c] = bond_shape_row_adjoint<D>(row, xi, g);
         own_t[c] += t[c];
-        PERIKIT_UNROLL for (int e = 0; e < D; ++e) own_S[c * D + e] += S[c * D + e] = share * row[e];
+        PERIKIT_UNROLL for (int e = 0; e < D; ++e) own_S[c * D + e] += near * (S[c * D + e] = row[e]);
       }
       const auto scatter = [&](auto&& add) {
         PERIKIT_UNROLL for (int c = 0; c < D; ++c) add(force.component(c) + far, -t[c]);
-        if constexpr (mean) {
-          PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) add(stress.component(c) + far, S[c]);
+        if constexpr (both) {
+          PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) add(stress.component(c) + far, other * S[c]);
         }
       };
-      if (mask == pack_mask(0xff, 0)) scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
-      else scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
+      if (mask == pack_mask(0xff, 0))
+        scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
+      else
+        scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
     }
-    PERIKIT_UNROLL for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
-    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c)(Pack::load(force.component(c) + p + l) + own_t[c])
+        .store(force.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c)(Pack::load(stress.component(c) + p + l) + own_S[c])
+        .store(stress.component(c) + p + l);
   }
 }
 

@@ -10,7 +10,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       formulation_(parts.formulation),
       laws_(parts.laws),
       selective_(formulation_.selective()),
-      mean_(formulation_.base == BondBase::mean),
+      far_share_(formulation_.far_share),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
       points_(families_.body().points()),
@@ -56,8 +56,8 @@ void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const Align
     const Row d = u[j] - u[p];
     for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
     for (int e = 0; e < D; ++e) {
-      const Row h = mean_ ? 0.5 * (H[D * p + static_cast<std::size_t>(e)] + H[D * j + static_cast<std::size_t>(e)])
-                          : H[D * p + static_cast<std::size_t>(e)];
+      const Row& own = H[D * p + static_cast<std::size_t>(e)];
+      const Row h = far_share_ == 0 ? own : (1 - far_share_) * own + far_share_ * H[D * j + static_cast<std::size_t>(e)];
       for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
     }
   }
@@ -151,7 +151,6 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
 template <int D>
 void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
   Row own{}, own_stress[D] = {};
-  const double share = mean_ ? 0.5 : 1.0;
   for (int l = 0; l < n; ++l) {
     const auto j = static_cast<std::size_t>(s.far[l]);
     Row t{};
@@ -160,9 +159,9 @@ void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool bo
     force_[j] -= t;
     for (int e = 0; e < D; ++e) {
       Row stress{};
-      for (int c = 0; c < D; ++c) stress[c] = share * s.P[(c * D + e) * batch_points + l];
-      own_stress[e] += stress;
-      if (mean_) flux_[D * j + static_cast<std::size_t>(e)] += stress;
+      for (int c = 0; c < D; ++c) stress[c] = s.P[(c * D + e) * batch_points + l];
+      own_stress[e] += (1 - far_share_) * stress;
+      if (far_share_ > 0) flux_[D * j + static_cast<std::size_t>(e)] += far_share_ * stress;
     }
   }
   const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };

@@ -29,7 +29,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       formulation_(parts.formulation),
       laws_(parts.laws),
       selective_(formulation_.selective()),
-      mean_(formulation_.base == BondBase::mean),
+      far_share_(formulation_.far_share),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
       operator_(families_),
@@ -173,19 +173,20 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   const int lanes = slots * chunk_points;
   const std::int64_t* shifts = families_.slots.shifts.data() + slot;
   const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* to) {
-    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, slots, p, vectors, u, Hbar, to);
+    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, slots, p, vectors, far_share_, u, Hbar, to);
   };
   const auto adjoint = [&](auto per_slot, auto of_both) {
-    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, pattern.mask.data() + slot, slots, p, vectors, s.P, pass.out,
-                                                           flux_);
+    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, pattern.mask.data() + slot, slots, p, vectors, far_share_, s.P,
+                                                           pass.out, flux_);
   };
   // The kernels are compiled for each way of reading the bond vectors and each base.
   const auto choose = [&](const auto& kernel, auto... arguments) {
     using std::false_type, std::true_type;
+    const bool both = far_share_ > 0;
     if (vectors.per_slot)
-      mean_ ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
+      both ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
     else
-      mean_ ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
+      both ? kernel(false_type(), true_type(), arguments...) : kernel(false_type(), false_type(), arguments...);
   };
   choose(gradient, pass.u, ConstFieldView(gradient_), H);
   if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);

@@ -82,7 +82,7 @@ std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
 }
 
 int Mechanics::steps() const noexcept {
-  return parts_.formulation.bond && parts_.formulation.base == BondBase::mean ? 3 : 2;
+  return parts_.formulation.bond && parts_.formulation.far_share > 0 ? 3 : 2;
 }
 
 std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const {

@@ -27,11 +27,11 @@ void clear(double* values, std::size_t size) {
 void warn_of_energy(const TermParts& parts, ModelReport& report) {
   const Formulation& f = parts.formulation;
   const bool by_bond = f.weighted && f.parts(parts.families->body().dimension()) == 0;
-  const char* const what = f.point && !parts.stabilization     ? "one gradient per point without a stabilization"
-                           : f.bond && f.base == BondBase::own ? "bond gradients that rest on the gradient of one end alone"
-                           : by_bond && f.selective()          ? "a selective map over weighted gradients of bonds"
-                           : f.weighted && !by_bond            ? "gradients of parts of families"
-                                                               : nullptr;
+  const char* const what = f.point && !parts.stabilization ? "one gradient per point without a stabilization"
+                           : f.bond && f.far_share == 0    ? "bond gradients that rest on the gradient of one end alone"
+                           : by_bond && f.selective()      ? "a selective map over weighted gradients of bonds"
+                           : f.weighted && !by_bond        ? "gradients of parts of families"
+                                                           : nullptr;
   if (!what) return;
   report.warnings.push_back(
       fmt::format("{}: updates of bonds that fail create energy; which kinematics do not is measured in fracture.md, \"Every "

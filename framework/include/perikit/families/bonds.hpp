@@ -67,10 +67,10 @@ struct BondEnergy {
 /// fail where they were found.
 using StepBegin = std::function<void(FieldView)>;
 
-/// What bonds that failed inside of a step mean for the step: forces at its end were taken with them.
+/// What bonds that failed inside of a step mean for it. Its forces were taken with them.
 struct BondReaction {
-  Field force;    ///< what the forces at the end of the step change by [N]
-  Field impulse;  ///< what the bonds owed until they failed, or gave too much, after half of the step [N s]
+  Field impulse;  ///< what they still owed when they failed, or had given too much [N s]
+  Field drift;    ///< that of the first half of the step times its length: by mass, what it has moved the points [N s^2]
 };
 
 struct BondUpdate {

@@ -1,12 +1,14 @@
 #pragma once
-/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at evaluation
-/// points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the
-/// momentum balances hold for every formulation without further code. A library implements one of four small classes:
+/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at
+/// evaluation points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the
+/// tangent and the momentum balances hold for every formulation without further code. A library implements one of four small
+/// classes:
 ///
 ///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
-///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = Hbar_i or (Hbar_i + Hbar_j)/2 (baqp, projection, ...)
-///   WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1 (non_spherical, sub_horizon, ...)
-///   PairKinematics      no gradients and no material evaluations: central forces along the bonds (bond_based, ordinary)
+///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0 or 1/2
+///   (projection, baqp) or any other share WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k)
+///   K_q^-1 (non_spherical, sub_horizon, ...) PairKinematics      no gradients and no material evaluations: central forces along
+///   the bonds (bond_based, ordinary)
 ///
 /// or puts a map of the gradients over one with evaluation points at bonds or parts of families: MappedKinematics (selective).
 ///
@@ -14,8 +16,8 @@
 /// All gradients are exact for affine motion whatever the library returns.
 ///
 /// A pair law is stated by its energy, with e = |xi + u_j - u_i| - |xi| the extension of a bond:
-///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e V_j,
-///   m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
+///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e
+///   V_j, m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
 /// The engine makes extensions, dilatations, forces and tangents of it; both moduli come from the small strain of the material.
 
 #include <cstddef>
@@ -29,27 +31,32 @@ namespace perikit {
 /// One family (or a part of one) as arrays over its bonds, padded to `padding` with bonds of zero weight and unit xi.
 struct FamilyView {
   int dimension = 3;
-  int bonds = 0;                      ///< entries; padded(bonds) can be read and written
-  double horizon = 0;                 ///< delta [m]
-  const double* xi[3] = {};           ///< bond vectors [m]; unused axes null
-  const double* length = nullptr;     ///< |xi| [m]
-  const double* volume = nullptr;     ///< V_j [m^3]; 0 in the padding
-  const double* omega = nullptr;      ///< influence (with bond integrity); 0 in the padding
-  /// Inverse of the owner's shape tensor, symmetric: xx | xx yy xy | xx yy zz xy xz yz. Component c of bond k at
-  /// inverse_shape[c * inverse_shape_stride + k * (inverse_shape_stride != 0)]: one owner, or one per bond.
+  int bonds = 0;                   ///< entries; padded(bonds) can be read and written
+  double horizon = 0;              ///< delta [m]
+  const double* xi[3] = {};        ///< bond vectors [m]; unused axes null
+  const double* length = nullptr;  ///< |xi| [m]
+  const double* volume = nullptr;  ///< V_j [m^3]; 0 in the padding
+  const double* omega = nullptr;   ///< influence (with bond integrity); 0 in the padding
+  /// Inverse of the owner's shape tensor, symmetric: xx | xx yy xy | xx yy zz xy xz yz. Read it by `shape`.
   const double* inverse_shape = nullptr;
-  std::size_t inverse_shape_stride = 0;
+  std::size_t inverse_shape_stride = 0;  ///< 0: one owner of all bonds; else each bond has its own
+
+  /// Component c of it for bond k, and where it is stored.
+  double shape(int c, int k) const noexcept { return *shape_of(c, k); }
+  const double* shape_of(int c, int k) const noexcept {
+    return inverse_shape_stride == 0 ? inverse_shape + c : inverse_shape + static_cast<std::size_t>(c) * inverse_shape_stride + k;
+  }
 };
 
 /// What the moduli of a pair law at one point may depend on.
 struct PairPoint : FamilyPoint {
-  double weighted_volume = 0;         ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
-  double intact = 1;                  ///< share of the family's influence that is not broken
+  double weighted_volume = 0;  ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
+  double intact = 1;           ///< share of the family's influence that is not broken
 };
 
 struct PairModuli {
-  double bond = 0;                    ///< c_i
-  double dilatation = 0;              ///< k_i
+  double bond = 0;        ///< c_i
+  double dilatation = 0;  ///< k_i
 };
 
 /// Arrays over n bonds that can be read (bonds at rest) and written up to padded(n). A null output is not wanted; the others are
@@ -68,38 +75,46 @@ struct BondBatch {
 /// Arrays over n points, as above.
 struct DilatationBatch {
   int n = 0;
-  const double* theta = nullptr;      ///< [-]
-  const double* modulus = nullptr;    ///< k_i
-  double* energy = nullptr;           ///< phi [J/m^3]
-  double* pressure = nullptr;         ///< dphi/dtheta [Pa]; exactly 0 at theta = 0
-  double* stiffness = nullptr;        ///< d2phi/dtheta2 [Pa]
+  const double* theta = nullptr;    ///< [-]
+  const double* modulus = nullptr;  ///< k_i
+  double* energy = nullptr;         ///< phi [J/m^3]
+  double* pressure = nullptr;       ///< dphi/dtheta [Pa]; exactly 0 at theta = 0
+  double* stiffness = nullptr;      ///< d2phi/dtheta2 [Pa]
 };
 
-enum class BondBase { own, mean };              ///< A_b: the gradient of the owner, or the mean of both ends
-enum class BondWeight { volume, kernel };       ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
-enum class ForceState { variational, local };   ///< forces: -dE/du, or each bond's own force state alone
-enum class PartWeight { equal, volume };        ///< W_q of the admissible parts of a point: equal shares of V_i, or shares as their volumes
-enum class GradientMap { identity, selective }; ///< selective: the volume change of every evaluation point is that of its owner
+enum class BondBase {
+  own,
+  mean,
+  blend
+};  ///< A_b: the gradient of the owner, the mean of both ends, or (1 - far_share) of the owner's and far_share of the other
+enum class BondWeight { volume, kernel };      ///< W_ij = V_i w_ij, w_ij = V_j / sum V_j or omega V_j / sum omega V_j
+enum class ForceState { variational, local };  ///< forces: -dE/du, or each bond's own force state alone
+enum class PartWeight {
+  equal,
+  volume
+};  ///< W_q of the admissible parts of a point: equal shares of V_i, or shares as their volumes
+enum class GradientMap { identity, selective };  ///< selective: the volume change of every evaluation point is that of its owner
 
 struct BondTraits {
-  int order = 1;                            ///< of the point gradient
+  int order = 1;  ///< of the point gradient
   BondBase base = BondBase::own;
+  double far_share = 0.5;  ///< of `blend`, in [0, 1]
   BondWeight weight = BondWeight::volume;
-  bool pair_symmetric = false;              ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
-  bool g_from_xi_only = false;              ///< g is odd in xi and independent of omega and the shape tensor
+  bool pair_symmetric = false;  ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
+  bool g_from_xi_only = false;  ///< g is odd in xi and independent of omega and the shape tensor
 };
 
 struct WeightedTraits {
-  BondWeight weight = BondWeight::volume;       ///< of evaluation points that belong to bonds
-  PartWeight part_weight = PartWeight::equal;   ///< of evaluation points that belong to parts of the family
-  /// local (one evaluation point per bond only, for comparison): T_ij = (V of the domain / V of the family) omega P_ij K_ij^-1 xi_ij. Not
-  /// conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
+  BondWeight weight = BondWeight::volume;      ///< of evaluation points that belong to bonds
+  PartWeight part_weight = PartWeight::equal;  ///< of evaluation points that belong to parts of the family
+  /// local (one evaluation point per bond only, for comparison): T_ij = (V of the domain / V of the family) omega P_ij K_ij^-1
+  /// xi_ij. Not conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
   ForceState force_state = ForceState::variational;
 };
 
 struct PairTraits {
-  bool influence = true;                    ///< w or theta depends on omega
-  bool constant_moduli = false;             ///< c_i depends on the material alone, not on the family
+  bool influence = true;         ///< w or theta depends on omega
+  bool constant_moduli = false;  ///< c_i depends on the material alone, not on the family
   /// Moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as in a whole
   /// family (w must be proportional to c_ij).
   bool surface_correction = false;
@@ -127,13 +142,13 @@ class BondKinematics : public Kinematics {
 class WeightedKinematics : public Kinematics {
  public:
   virtual WeightedTraits traits() const noexcept = 0;
-  /// Evaluation points per point of a body of this dimension; 0: one per bond. Throws InputError where the options do not suit the
-  /// dimension; asked at set-up.
+  /// Evaluation points per point of a body of this dimension; 0: one per bond. Throws InputError where the options do not suit
+  /// the dimension; asked at set-up.
   virtual int parts(int dimension) const = 0;
-  /// Influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k], at most the
-  /// view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a well-conditioned
-  /// gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family without any part, use
-  /// the whole family.
+  /// Influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k], at most
+  /// the view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a
+  /// well-conditioned gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family
+  /// without any part, use the whole family.
   virtual void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept = 0;
 };
 

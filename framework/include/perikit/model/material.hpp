@@ -10,18 +10,20 @@
 namespace perikit {
 
 struct MaterialTraits {
-  int constants = 0;          ///< doubles per point that `evaluate` reads
+  int constants = 0;  ///< doubles per point that `evaluate` reads
   bool constant_tangent = false;
-  bool objective = true;      ///< false for small-strain laws
+  bool objective = true;  ///< false for small-strain laws
   bool isotropic = true;
-  bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
+  bool hyperelastic = true;  ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
 };
 
 /// Lame constants of the law at F = I [Pa].
 struct Moduli {
   double lambda = 0, mu = 0;
   double bulk() const noexcept { return lambda + 2.0 * mu / 3.0; }
-  double youngs() const noexcept { return mu == 0 ? 0 : mu * (3 * lambda + 2 * mu) / (lambda + mu); }   // points that store nothing have neither
+  double youngs() const noexcept {
+    return mu == 0 ? 0 : mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  }  // points that store nothing have neither
   double poisson() const noexcept { return lambda == 0 ? 0 : lambda / (2 * (lambda + mu)); }
 };
 
@@ -31,20 +33,26 @@ struct Moduli {
 struct MaterialBatch {
   int n = 0;
   std::size_t stride = 0;
-  bool confined = false;            ///< lateral components of H and dH are all zero (plane and uniaxial strain); a law may rely on it
-  double time_step = 0;             ///< of laws with history [s]; 0 where no step is taken
-  const double* H = nullptr;        ///< displacement gradient [-]
-  const double* dH = nullptr;       ///< direction of dP [-]
-  const double* constants = nullptr;        ///< constant k of point p: constants[k * constant_stride + p * (constant_stride != 0)]
-  std::size_t constant_stride = 0;          ///< 0: the same constants at all points, constants[k]
-  const double* state_old = nullptr;        ///< history at the beginning of the step; null: fresh (all zeros)
-  double* state_new = nullptr;              ///< history if the step ends at H
-  std::size_t state_stride = 0;             ///< component c of the history at point p: state[c * state_stride + p]; a multiple of `padding`
-  double* psi = nullptr;            ///< [J/m^3]
-  double* P = nullptr;              ///< [Pa]
-  double* dP = nullptr;             ///< A : dH [Pa]
-  double* lateral = nullptr;        ///< H33 that plane stress (or H22 = H33 that line stress) found [-]; one component
-  double* A = nullptr;              ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
+  bool confined = false;       ///< lateral components of H and dH are all zero (plane and uniaxial strain); a law may rely on it
+  double time_step = 0;        ///< of laws with history [s]; 0 where no step is taken
+  const double* H = nullptr;   ///< displacement gradient [-]
+  const double* dH = nullptr;  ///< direction of dP [-]
+  const double* constants = nullptr;  ///< read them by `constant`
+  std::size_t constant_stride = 0;    ///< 0: the same constants at all points; else each point has its own
+  const double* state_old = nullptr;  ///< history at the beginning of the step; null: fresh (all zeros)
+  double* state_new = nullptr;        ///< history if the step ends at H
+  std::size_t state_stride = 0;  ///< component c of the history at point p: state[c * state_stride + p]; a multiple of `padding`
+  double* psi = nullptr;         ///< [J/m^3]
+  double* P = nullptr;           ///< [Pa]
+  double* dP = nullptr;          ///< A : dH [Pa]
+  double* lateral = nullptr;     ///< H33 that plane stress (or H22 = H33 that line stress) found [-]; one component
+  double* A = nullptr;           ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
+
+  /// Constant k at point p, and where it is stored.
+  double constant(std::size_t k, int p) const noexcept { return *constant_at(k, p); }
+  const double* constant_at(std::size_t k, int p) const noexcept {
+    return constant_stride == 0 ? constants + k : constants + k * constant_stride + p;
+  }
 };
 
 /// ok, or the first point of the batch whose F is inadmissible (det F <= 0 or not finite).
@@ -67,7 +75,8 @@ class Material {
   /// (nu >= 1/2, negative modulus).
   virtual void constants(const MaterialInput& input, double* out) const = 0;
   virtual Moduli small_strain(const double* constants) const noexcept = 0;
-  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history is zero.
+  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history
+  /// is zero.
   virtual int state_components(Space) const noexcept { return 0; }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;

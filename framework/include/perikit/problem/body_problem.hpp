@@ -41,6 +41,8 @@ class BodyProblem final : public Problem {
   ~BodyProblem() override;
 
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
+  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override;
+  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
   AssembledSize assembled_size() override;

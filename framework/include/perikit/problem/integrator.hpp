@@ -11,13 +11,13 @@ class Problem;
 
 /// What an integrator tells after every finished step.
 struct StepReport {
-  std::int64_t step = 0;           ///< 0 for the initial state
-  double time = 0;                 ///< [s], or the load parameter in [0, 1]
+  std::int64_t step = 0;  ///< 0 for the initial state
+  double time = 0;        ///< [s], or the load parameter in [0, 1]
   double time_step = 0;
-  int iterations = 0;              ///< of the nonlinear solver, 0 for explicit steps
-  double residual = 0;             ///< relative, 0 for explicit steps
+  int iterations = 0;   ///< of the nonlinear solver, 0 for explicit steps
+  double residual = 0;  ///< relative, 0 for explicit steps
   double end_time = 0;
-  std::int64_t steps_expected = 0; ///< 0: unknown
+  std::int64_t steps_expected = 0;  ///< 0: unknown
 };
 
 class Observer {
@@ -32,11 +32,19 @@ class Observer {
   virtual void log(std::string_view message) = 0;
   /// True when the run should end after this step.
   virtual bool cancelled() const noexcept { return false; }
+
+  // For integrators whose steps take long.
+  /// What an integrator is at within a step, told again and again.
+  virtual void working(std::string_view /*what*/) {}
+  /// True when the run should end within this step: the integrator then calls `stopped_within_step` and returns.
+  virtual bool interrupted() const noexcept { return false; }
+  /// The present step is given up. The observer puts the problem back to where the last `step_done` found it.
+  virtual void stopped_within_step() {}
 };
 
 struct IntegratorTraits {
-  bool dynamic = false;            ///< needs densities; writes velocity
-  bool quasi_static = false;       ///< time is a load parameter in [0, 1]; plain numbers of boundaries and loads ramp
+  bool dynamic = false;       ///< needs densities; writes velocity
+  bool quasi_static = false;  ///< time is a load parameter in [0, 1]; values of boundaries and loads that do not mention t ramp
 };
 
 class Integrator {

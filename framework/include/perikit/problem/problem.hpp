@@ -45,6 +45,12 @@ class Problem {
   /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length,
   /// and laws with history put theirs aside for `advance`; 0: nothing is kept.
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
+  /// force <- what acts from outside at time (or load parameter) t [N], fully overwritten: loads, of which some follow the
+  /// surface at u.
+  virtual EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) = 0;
+  /// Kw <- Kw - d(external force)/du . w, of loads that follow the surface: exact but for plane and line stress, where the
+  /// thickness comes in by differences. Assembled tangents leave it out.
+  virtual EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) = 0;
   /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
   virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K

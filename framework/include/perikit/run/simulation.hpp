@@ -10,8 +10,8 @@
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
-#include "perikit/problem/integrator.hpp"
 #include "perikit/problem/body_problem.hpp"
+#include "perikit/problem/integrator.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -25,6 +25,7 @@ class Simulation {
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   bool dynamic() const noexcept { return traits_.dynamic; }
+  bool quasi_static() const noexcept { return traits_.quasi_static; }
   /// Runs to the end. Throws RunError.
   void run(Observer& observer);
   /// Points, bonds, memory and the integrator's plan, one per line - what `perikit check` prints.
@@ -55,21 +56,22 @@ enum class RunStart {
 
 /// Where the output of a run stands: what a checkpoint holds besides the state.
 struct OutputProgress {
-  std::int64_t frames = 0, history_rows = 0;   ///< those that the scene asks for; not the ones of a stop
-  std::int64_t next_time = 0;                  ///< of [output] times
-  std::int64_t history_every = 0;              ///< 0: not known before the first step
+  std::int64_t frames = 0, history_rows = 0;  ///< those that the scene asks for; not the ones of a stop
+  std::int64_t next_time = 0;                 ///< of [output] times
+  std::int64_t history_every = 0;             ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
-  double initial_energy = 0;                   ///< strain + kinetic [J] at step 0
+  double initial_energy = 0;  ///< strain + kinetic [J] at step 0
 };
 
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
-  /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into the
-  /// problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or body, or of
-  /// other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
-  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh, std::string libraries = {});
+  /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into
+  /// the problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or
+  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
+  RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh,
+              std::string libraries = {});
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -77,10 +79,14 @@ class RunRecorder final : public Observer {
   /// Lines that begin with "warning" are told again at the end.
   void log(std::string_view message) override;
   bool cancelled() const noexcept override;
+  void working(std::string_view what) override;
+  bool interrupted() const noexcept override;
+  void stopped_within_step() override;
 
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
-  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the
+  /// run.
   std::string closing(double set_up) const;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
@@ -96,6 +102,9 @@ class RunRecorder final : public Observer {
   void write_frame(const StepReport& report);
   void write_history(const StepReport& report);
   void progress(const StepReport& report);
+  /// Whether a line of progress is due, which is then taken to be shown.
+  bool line_due();
+  void show(const std::string& line, bool end);
 
   Simulation& simulation_;
   std::filesystem::path folder_;
@@ -108,11 +117,17 @@ class RunRecorder final : public Observer {
   std::vector<double> frame_times_;
   OutputProgress done_;
   std::int64_t resumed_step_ = -1;
-  std::string body_, libraries_;   ///< fingerprints
+  std::string body_, libraries_;  ///< fingerprints
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
   bool stopping_ = false;
+  /// Runs whose steps can be given up: where the last one ended, and whether its row and its frame are written.
+  struct LastStep {
+    StepReport report;
+    std::vector<std::byte> state;
+    bool row = false, frame = false;
+  } last_step_;
   // Of this process; a resumed run does not know how long the earlier ones took.
   double output_seconds_ = 0;
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;

@@ -62,13 +62,21 @@ struct CrackDescription {  ///< 2 vertices: segment; more: polygon
   SourcePosition position;
 };
 
-/// One component of a prescribed motion: nullopt where "free". A plain number ramps linearly in quasi-static runs.
+/// Whether values of a boundary or load grow in proportion to the load parameter of a quasi-static run: as given, else those do
+/// that do not mention t.
+struct RampDescription {
+  std::optional<bool> given;
+  SourcePosition position;
+};
+
+/// One component of a prescribed motion: nullopt where "free".
 struct BoundaryDescription {
   std::string set;
   std::string face;          ///< "+x" ... "-z": of the set, is held; empty: the points of the set are
   std::optional<double> at;  ///< where the face lies [m]
   bool velocity = false;     ///< else displacement
   std::vector<std::optional<Expression>> components;
+  RampDescription ramp;
   SourcePosition position, face_position;  ///< of the displacement or velocity; of `at`, else of the face
 };
 
@@ -85,10 +93,12 @@ struct PeriodicDescription {
 };
 
 struct LoadDescription {
-  enum class Type { force, body_force, traction } type = Type::force;
+  enum class Type { force, body_force, traction, pressure } type = Type::force;
   std::string set;
-  std::vector<Expression> components;
-  std::string face;         ///< "+x" ... "-z" for traction
+  std::vector<Expression> components;  ///< of a pressure one
+  bool follower = false;               ///< a pressure on the deformed surface
+  std::string face;                    ///< "+x" ... "-z" for traction and, where given, for pressure
+  RampDescription ramp;
   SourcePosition position;  ///< of it
 };
 

@@ -1,9 +1,11 @@
 #pragma once
 /// Equilibrium of a body at one load parameter: what a solver of quasi-static problems works on.
 
+#include <chrono>
 #include <string>
 #include <string_view>
 
+#include "perikit/problem/integrator.hpp"
 #include "perikit/problem/problem.hpp"
 
 namespace perikit {
@@ -35,8 +37,8 @@ class Equilibrium {
   /// w <- U(t) - u on prescribed components, 0 elsewhere; returns its largest magnitude [m].
   double missing(ConstFieldView u, FieldView w);
 
-  /// r <- internal + external force on free components, 0 elsewhere [N]; the internal forces are kept in the problem, the strain energy
-  /// goes to `energy` where wanted. False where u is inadmissible or r not finite; failure() then says why.
+  /// r <- internal + external force on free components, 0 elsewhere [N]; the internal forces are kept in the problem, the strain
+  /// energy goes to `energy` where wanted. False where u is inadmissible or r not finite; failure() then says why.
   bool residual(ConstFieldView u, FieldView r, double* energy = nullptr);
   /// |r| and |r|/reference of the last residual.
   double residual_norm() const noexcept { return norm_; }
@@ -49,17 +51,29 @@ class Equilibrium {
   /// Kw <- K(u) w on free components, 0 elsewhere [N]. False where u is inadmissible.
   bool tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
 
-  /// A line for run.log; lines of one step are written together.
+  /// From now on `observer` hears what is going on, and evaluations fail at once when it wants the run to end.
+  void watch(Observer& observer) { observer_ = &observer; }
+  /// Whether an evaluation failed because the run is to end.
+  bool stopped() const noexcept { return stopped_; }
+
+  /// A line for run.log; lines of one step are written together, or every few seconds where it takes longer.
   void note(std::string_view line);
   std::string take_notes();
 
  private:
+  bool goes_on();
+
   Problem& problem_;
+  Observer* observer_ = nullptr;
+  bool stopped_ = false;
+  std::string last_note_;
+  std::int64_t actions_ = 0;  ///< of the tangent since the last note
+  std::chrono::steady_clock::time_point logged_ = std::chrono::steady_clock::now();
   double tolerance_;
   double t_ = 0, norm_ = 0, reference_ = 0, stiffness_ = 0;
   Field u_, scratch_;
   ConstFieldView free_;
-  FieldView external_;   ///< no data without loads
+  FieldView external_;  ///< no data without loads
   std::string failure_, notes_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 /// Plane and uniaxial stress: the stretch normal to the body is not given but follows from zero stress normal to it.
 
+#include <concepts>
 #include <limits>
 
 #include "perikit/sdk/differentiation.hpp"
@@ -26,15 +27,71 @@ Pack contraction_ratio(const Law& law, const K& k) noexcept {
   return q[0] / inner(free_direction<Pack, S>(), q);
 }
 
-/// H with its free components such that the free stress vanishes to rounding. Lanes that are not `good` on entry keep H = 0;
-/// lanes without a solution are taken from `good`. Newton in the logarithm of the stretch, where rubber laws are nearly linear,
-/// started from the exact solution for a Kirchhoff stress linear in the logarithmic strain, kept inside a bracket; each lane
-/// stops on its own.
-template <bool small_strain, class Law, class S, class K>
-Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k, Pack ratio, PackMask& good) noexcept {
+/// Kirchhoff stress along a free axis, and its derivative by the logarithm of the free stretch.
+template <class T>
+struct FreeStress {
+  T value, slope;
+};
+
+/// Laws may know the free stretch in closed form: law.free_stretch(H, k) -> H33, from the in-plane components of H, NaN where
+/// there is none;
+template <class Law, class T, class S, class K>
+concept HasFreeStretch = requires(const Law& law, const Tensor<T, S>& H, const K& k) {
+  { law.free_stretch(H, k) } -> std::same_as<T>;
+};
+/// or its equation, by invariants instead of tensors: law.free_stress(H, k) returns H33 -> FreeStress<T>.
+template <class Law, class T, class S, class K>
+concept HasFreeStress = requires(const Law& law, const Tensor<T, S>& H, const K& k, const T& h) {
+  { law.free_stress(H, k)(h) } -> std::same_as<FreeStress<T>>;
+};
+
+/// The free Kirchhoff stress of any law, over the free stretch: slope d(x residual)/dy over x.
+template <class Law, class S, class K>
+auto free_stress_of(const Law& law, const Tensor<Pack, S>& H, const K& k) noexcept {
+  if constexpr (HasFreeStress<Law, Pack, S, K>) {
+    return law.free_stress(H, k);
+  } else {
+    return [&law, H, &k](const Pack& h) {
+      const Tensor<Pack, S> N = free_direction<Pack, S>(), at = with_free_part(H, h);
+      const Pack residual = inner(N, stress(law, at, k)), stiffness = inner(N, tangent(law, at, k)(N));
+      return FreeStress<Pack>{residual, residual + (1.0 + h) * stiffness};
+    };
+  }
+}
+
+/// The zero of the free stress in the lanes that are `active`; those without one stay active. Newton in the logarithm y of
+/// the stretch, where rubber laws are nearly linear, kept inside a bracket; each lane stops on its own. size: of H.
+template <class Equation>
+Pack solve_free_equation(const Equation& equation, Pack y, Pack size, PackMask& active) noexcept {
   constexpr int max_iterations = 80;
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  const Tensor<Pack, S> N = free_direction<Pack, S>();
+  Pack h = expm1(y), lower = -infinity, upper = infinity;
+  for (int iteration = 0; iteration < max_iterations && any(active); ++iteration) {
+    const FreeStress<Pack> stress = equation(h);
+    const Pack residual = stress.value, slope = stress.slope, x = 1.0 + h;
+    const PackMask low = residual<0.0, high = residual> 0.0;
+    lower = select(low & active, y, lower);
+    upper = select(high & active, y, upper);
+    const Pack newton = min(max(-residual / slope, Pack(-1.0)), Pack(1.0));
+    Pack step = select(slope > 0.0, newton, select(low, Pack(1.0), Pack(-1.0)));
+    step = select(low & (y + step > upper), 0.5 * (upper - y), step);
+    step = select(high & (y + step < lower), 0.5 * (lower - y), step);
+    step = select(residual == 0.0, Pack(0.0), step);
+    y = select(active, y + step, y);
+    h = select(active, h + x * expm1(step), h);
+    // Convergence is quadratic: the step just taken is the last that matters. Laws written in F have no zero closer than
+    // rounding.
+    active &= abs(step) > max(1e-8 * size, Pack(4 * std::numeric_limits<double>::epsilon()));
+  }
+  return h;
+}
+
+/// H with its free components such that the free stress vanishes to rounding. Lanes that are
+/// not `good` on entry keep H = 0; lanes without a solution are taken from `good`. Where the law does not know better, Newton
+/// from the exact solution for a Kirchhoff stress linear in the logarithmic strain.
+template <bool small_strain, class Law, class S, class K>
+Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k, Pack ratio, PackMask& good) noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   H = with_free_part(H, Pack(0.0));
   Pack size = 0.0;
   for (int c = 0; c < S::components; ++c) size = max(size, abs(H[c]));
@@ -42,36 +99,25 @@ Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k
   if constexpr (!small_strain) good &= (j > -1.0) & (j < infinity);
   good &= size < infinity;
   H = Tensor<Pack, S>::map([&](int c) { return select(good, H[c], Pack(0.0)); });
-
-  Pack y = small_strain ? Pack(0.0) : -ratio * log1p(select(good, j, Pack(0.0)));
-  Pack h = small_strain ? Pack(0.0) : expm1(y);
-  Pack lower = -infinity, upper = infinity;
-  PackMask active = good;
-  for (int iteration = 0; iteration < max_iterations && any(active); ++iteration) {
-    H = with_free_part(H, h);
-    const Pack residual = inner(N, stress(law, H, k));
-    const Pack stiffness = inner(N, tangent(law, H, k)(N));
-    Pack step, next;
-    if constexpr (small_strain) {
-      step = -residual / stiffness;
-      next = h + step;
-    } else {
-      const Pack x = 1.0 + h, slope = residual + x * stiffness;  // d(x residual)/dy over x
-      const PackMask low = residual<0.0, high = residual> 0.0;
-      lower = select(low & active, y, lower);
-      upper = select(high & active, y, upper);
-      const Pack newton = min(max(-residual / slope, Pack(-1.0)), Pack(1.0));
-      step = select(slope > 0.0, newton, select(low, Pack(1.0), Pack(-1.0)));
-      step = select(low & (y + step > upper), 0.5 * (upper - y), step);
-      step = select(high & (y + step < lower), 0.5 * (lower - y), step);
-      step = select(residual == 0.0, Pack(0.0), step);
-      next = h + x * expm1(step);
-      y = select(active, y + step, y);
+  Pack h = 0.0;
+  if constexpr (HasFreeStretch<Law, Pack, S, K>) {
+    h = law.free_stretch(H, k);
+    good &= small_strain ? abs(h) < infinity : (h > -1.0) & (h < infinity);
+  } else if constexpr (small_strain) {
+    const Tensor<Pack, S> N = free_direction<Pack, S>();
+    PackMask active = good;
+    for (int iteration = 0; iteration < 80 && any(active); ++iteration) {
+      const Tensor<Pack, S> at = with_free_part(H, h);
+      const Pack step = -inner(N, stress(law, at, k)) / inner(N, tangent(law, at, k)(N));
+      h = select(active, h + step, h);
+      active &= abs(step) > 1e-8 * size;
     }
-    h = select(active, next, h);
-    active &= abs(step) > 1e-8 * size;  // convergence is quadratic: the step just taken is the last that matters
+    good &= !active;
+  } else {
+    PackMask active = good;
+    h = solve_free_equation(free_stress_of(law, H, k), -ratio * log1p(select(good, j, Pack(0.0))), size, active);
+    good &= !active;
   }
-  good &= !active;
   return with_free_part(H, select(good, h, Pack(0.0)));
 }
 

@@ -7,12 +7,15 @@
 ///     /// The step that begins at `state`: a point law with P(H, k) and tangent(H, k), and with
 ///     /// update(H, k) -> HistoryUpdate<T, S, 7>, H at the end of the step.
 ///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state) const noexcept;
+///     /// or, for laws of rates: time_step is the length of the step [s], 0 where no step is taken (samples, tangents)
+///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state, double time_step) const noexcept;
 ///   };
 ///
 /// Fresh history is all zeros: store differences from it (U - I, not U).
 
 #include <array>
 
+#include "perikit/core/simd.hpp"
 #include "perikit/core/tensor.hpp"
 
 namespace perikit {
@@ -28,6 +31,11 @@ struct HistoryUpdate {
 template <class Law>
 concept HasHistory = requires {
   Law::template state_components<Solid>;
+};
+
+template <class Law>
+concept HasTimeStep = requires(const Law& law, const std::array<Pack, Law::template state_components<Solid>>& state) {
+  law.template after<Solid>(state, 1.0);
 };
 
 template <class Law, class S>

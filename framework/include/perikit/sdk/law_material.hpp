@@ -7,18 +7,23 @@
 ///     Moduli small_strain(const double* k) const noexcept;
 ///     template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept;             // one of these
 ///     template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept;    // or both
-///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left out
+///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left
+///     out
 ///   };
 ///   auto material = std::make_unique<LawMaterial<MyLaw>>();
 ///
-/// T is a Pack, or Duals of it; k is a std::array<Pack, traits.constants>. P(0) must be exactly zero: write it in H, not in F.
-/// Stress, tangent actions, tangents and all five spaces follow; whatever the law leaves out comes from forward differentiation.
-/// A law with P alone stores no energy: it declares hyperelastic = false, and its psi reads zero. Laws with history: perikit/sdk/history.hpp.
-/// Laws with traits.objective = false are small-strain laws and accept every finite H.
-/// Uniaxial stress needs an isotropic law (both free stretches are taken equal).
+/// T is a Pack, or Duals of it; k is a std::array<Pack, traits.constants>. What rounding leaves of psi and P at H = 0 is taken
+/// off, so that a law may be written in F and its invariants; written in H it keeps all digits of small strains. A law that is
+/// stressed at rest by more than rounding is refused. Stress, tangent actions, tangents and all five spaces follow; whatever the
+/// law leaves out comes from forward differentiation. A law with P alone stores no energy: it declares hyperelastic = false, and
+/// its psi reads zero. Laws with history: perikit/sdk/history.hpp. Laws with traits.objective = false are small-strain laws and
+/// accept every finite H. Uniaxial stress needs an isotropic law (both free stretches are taken equal).
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "perikit/core/field.hpp"
@@ -26,8 +31,8 @@
 #include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/history.hpp"
 
-// Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
-// checks in the inlined bodies would take minutes to compile.
+// Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where
+// the checks in the inlined bodies would take minutes to compile.
 #if defined(__SANITIZE_ADDRESS__)
 #define PERIKIT_FLATTEN
 #else
@@ -42,7 +47,14 @@ class LawMaterial final : public Material {
   explicit LawMaterial(Law law = {}) : law_(std::move(law)) {}
 
   MaterialTraits traits() const noexcept override { return Law::traits; }
-  void constants(const MaterialInput& input, double* out) const override { law_.constants(input, out); }
+  void constants(const MaterialInput& input, double* out) const override {
+    law_.constants(input, out);
+    if constexpr (!HasHistory<Law>) {
+      check_rest<Solid>(out);
+      check_rest<Plane>(out);
+      check_rest<Line>(out);
+    }
+  }
   Moduli small_strain(const double* k) const noexcept override { return law_.small_strain(k); }
   int state_components(Space space) const noexcept override {
     const int d = dimension(space);
@@ -50,6 +62,19 @@ class LawMaterial final : public Material {
   }
 
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
+    const Status status = as_written(space, batch);
+    if (offset_at_rest_.load(std::memory_order_relaxed)) [[unlikely]]
+      take_off_rest(space, batch);
+    return status;
+  }
+
+ private:
+  static constexpr bool small_strain_law = !Law::traits.objective;
+  /// Whether psi or P of H = 0 is not exactly zero for some constants that were made: of this law whatever its parameters, since
+  /// taking off zero changes nothing.
+  inline static std::atomic<bool> offset_at_rest_ = false;
+
+  Status as_written(Space space, const MaterialBatch& batch) const noexcept {
     switch (space) {
       case Space::solid:
         return run<Solid, false>(batch);
@@ -65,8 +90,45 @@ class LawMaterial final : public Material {
     return {0};
   }
 
- private:
-  static constexpr bool small_strain_law = !Law::traits.objective;
+  /// psi and P of eight points at rest.
+  struct Rest {
+    alignas(64) double H[9 * padding] = {}, psi[padding] = {}, P[9 * padding] = {};
+    MaterialBatch batch(const double* constants, std::size_t constant_stride, int n) noexcept {
+      return {.n = n, .stride = padding, .H = H, .constants = constants, .constant_stride = constant_stride, .psi = psi, .P = P};
+    }
+  };
+
+  template <class S>
+  void check_rest(const double* k) const {
+    Rest rest;
+    run<S, false>(rest.batch(k, 0, 1));
+    double stress = 0;
+    for (int c = 0; c < S::components; ++c) stress = std::max(stress, std::abs(rest.P[c * padding]));
+    if (stress == 0 && rest.psi[0] == 0) return;
+    const Moduli moduli = law_.small_strain(k);
+    const double scale = std::abs(moduli.lambda) + 2 * std::abs(moduli.mu);
+    if (!(stress <= 1e-10 * scale) || !(std::abs(rest.psi[0]) <= 1e-10 * scale))
+      throw std::domain_error("the law is stressed, or stores energy, where nothing is deformed (H = 0)");
+    offset_at_rest_ = true;
+  }
+
+  [[gnu::noinline, gnu::cold]] void take_off_rest(Space space, const MaterialBatch& b) const noexcept {
+    const int components = tensor_components(space);
+    for (int p = 0; p < b.n; p += static_cast<int>(padding)) {
+      Rest rest;
+      const int n = std::min(static_cast<int>(padding), b.n - p);
+      as_written(space, rest.batch(b.constant_stride == 0 ? b.constants : b.constants + p, b.constant_stride, n));
+      for (int l = 0; l < n; ++l) {
+        bool refused = true;  // inadmissible points read zero
+        for (int c = 0; c < components && b.P; ++c) refused &= b.P[static_cast<std::size_t>(c) * b.stride + p + l] == 0;
+        if (b.psi) refused &= b.psi[p + l] == 0;
+        if (refused) continue;
+        if (b.psi) b.psi[p + l] -= rest.psi[l];
+        for (int c = 0; c < components && b.P; ++c)
+          b.P[static_cast<std::size_t>(c) * b.stride + p + l] -= rest.P[static_cast<std::size_t>(c) * padding + l];
+      }
+    }
+  }
 
   /// A law that is an energy alone gets its lateral stress by differentiating with respect to lateral components: it keeps them.
   template <class Confined, class Open>
@@ -82,19 +144,27 @@ class LawMaterial final : public Material {
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
     Constants k;
     for (std::size_t i = 0; i < k.size(); ++i)
-      k[i] = b.constant_stride == 0 ? Pack(b.constants[i]) : Pack::load(b.constants + i * b.constant_stride + p);
+      k[i] = b.constant_stride == 0 ? Pack(b.constant(i, p)) : Pack::load(b.constant_at(i, p));
     return k;
   }
 
   /// A displacement gradient, or a direction of one.
   template <class S>
   static Tensor<Pack, S> load(const double* x, std::size_t stride, int p) noexcept {
-    return Tensor<Pack, S>::map(
-        [&](int c) { return always_zero<S>(row<S>(c)) ? Pack(0.0) : Pack::load(x + c * stride + p); });
+    return Tensor<Pack, S>::map([&](int c) { return always_zero<S>(row<S>(c)) ? Pack(0.0) : Pack::load(x + c * stride + p); });
   }
   template <class S>
   static void store(const Tensor<Pack, S>& t, double* x, std::size_t stride, int p) noexcept {
     PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) t[c].store(x + c * stride + p);
+  }
+
+  /// The step that begins at this state, with its length where the law asks for it.
+  template <class S>
+  auto after(const std::array<Pack, state_size<Law, S>()>& state, double time_step) const noexcept {
+    if constexpr (HasTimeStep<Law>)
+      return law_.template after<S>(state, time_step);
+    else
+      return law_.template after<S>(state);
   }
 
   /// The law of points p ...: of the step that begins at their history, for laws that have one.
@@ -104,7 +174,7 @@ class LawMaterial final : public Material {
       std::array<Pack, state_size<Law, S>()> state{};
       if (b.state_old)
         for (std::size_t i = 0; i < state.size(); ++i) state[i] = Pack::load(b.state_old + i * b.state_stride + p);
-      return law_.template after<S>(state);
+      return after<S>(state, b.time_step);
     } else {
       return (law_);
     }
@@ -130,7 +200,7 @@ class LawMaterial final : public Material {
     Pack ratio = 0.0;
     const auto contraction = [&] {
       if constexpr (HasHistory<Law>)
-        return contraction_ratio<S>(law_.template after<S>(std::array<Pack, state_size<Law, S>()>{}), k);
+        return contraction_ratio<S>(after<S>(std::array<Pack, state_size<Law, S>()>{}, b.time_step), k);
       else
         return contraction_ratio<S>(law_, k);
     };
@@ -185,8 +255,8 @@ class LawMaterial final : public Material {
   }
 
   template <class S, bool free_stretch, class StepLaw>
-  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
-                                                       const Constants& k) noexcept {
+  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p,
+                                                         const Tensor<Pack, S>& H, const Constants& k) noexcept {
     const auto action = [&] {
       if constexpr (free_stretch)
         return condensed_tangent(law, H, k);

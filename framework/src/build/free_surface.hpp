@@ -1,0 +1,43 @@
+#pragma once
+/// Which points of a body lie at its free surface.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "perikit/body/body.hpp"
+
+namespace perikit {
+
+/// Sum of the outward area vectors of the free faces of each point's cell on a lattice [m^2]: those with no point, and no image,
+/// behind them. By internal index; the number of free faces beside it.
+struct CellFaces {
+  std::vector<Point> area;
+  std::vector<std::uint8_t> count;
+  explicit CellFaces(const Body& body);
+};
+
+/// Owned points at the free surface. Lattices: with a free cell face. Clouds: outside of which, along the mean direction away
+/// from the points around, no other point lies within two spacings.
+std::vector<std::int32_t> free_surface(const Body& body);
+
+/// The nearest of some points to a place.
+class NearestPoint {
+ public:
+  /// `points` of `body`; they are looked up in cells of this size [m].
+  NearestPoint(const Body& body, const std::vector<std::int32_t>& points, double cell);
+  /// Not farther than `most` [m]; of equally near ones the one with the smallest index.
+  std::optional<std::int32_t> to(const Point& x, double most) const;
+
+ private:
+  std::int64_t key(const std::array<std::int64_t, 3>& cell) const noexcept;
+  std::array<std::int64_t, 3> cell_of(const Point& x) const noexcept;
+
+  const Body& body_;
+  double cell_;
+  Point lower_{};
+  std::array<std::int64_t, 3> cells_{1, 1, 1};
+  std::vector<std::pair<std::int64_t, std::int32_t>> entries_;  ///< (key of the cell, point), ascending
+};
+
+}  // namespace perikit

@@ -1,0 +1,117 @@
+#include "build/surface_areas.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "build/face_shares.hpp"
+#include "build/free_surface.hpp"
+#include "families/families.hpp"
+
+namespace perikit {
+
+namespace {
+
+double length(const Point& a) {
+  return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+}
+
+SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
+  const auto axis = static_cast<std::size_t>(load.face[1] - 'x');
+  SurfaceAreas areas;
+  for (const auto& [p, share] : face_shares(load, parts, images)) {
+    areas.points.push_back(p);
+    areas.area.emplace_back()[axis] = load.face[0] == '+' ? share : -share;
+  }
+  return areas;
+}
+
+/// Pair laws: the free faces of the cells lie half a spacing beyond their points, so that 3/2 there and -1/2 one point further in
+/// give the right total and the right moment.
+std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
+  const Lattice& lattice = *body.lattice();
+  std::vector<Point> areas(body.stride(), Point{});
+  for (const std::int32_t p : body.owned()) {
+    const auto i = static_cast<std::size_t>(p);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k) {
+      const auto c = static_cast<std::size_t>(lattice.axis[k]);
+      const double area = faces.area[i][c];
+      if (area == 0) continue;
+      std::array<int, 3> step{};
+      step[k] = area > 0 ? -1 : 1;
+      const auto inner =
+          static_cast<std::size_t>(p + lattice.shift(step));  // there, or the two faces across this axis would cancel
+      areas[i][c] += 1.5 * area;
+      areas[inner][c] -= 0.5 * area;
+    }
+  }
+  return areas;
+}
+
+/// By internal index, images among them.
+std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts) {
+  const Body& body = parts.families->body();
+  if (!parts.formulation.pairs) {
+    std::vector<Point> areas(body.stride(), Point{});
+    for (int axis = 0; axis < body.dimension(); ++axis) {
+      const Field of_axis = face_areas(parts, axis);
+      for (const std::int32_t p : body.internal())
+        areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = of_axis.data()[p];
+    }
+    return areas;
+  }
+  if (body.lattice()) return of_cells(body, CellFaces(body));
+  throw InputError(load.position, "load.pressure",
+                   "found on a cloud with a pair law, which has no area vectors there; allowed: lattices, kinematics with "
+                   "gradients, or a traction on a face");
+}
+
+/// What is missing of the free faces of the set's cells, in proportion to the areas that are there.
+void correct_total(const Body& body, const std::vector<bool>& in_set, SurfaceAreas& areas) {
+  const CellFaces faces(body);
+  Point missing{};
+  double size = 0;
+  for (const std::int32_t p : body.owned())
+    for (std::size_t c = 0; in_set[static_cast<std::size_t>(p)] && c < 3; ++c)
+      missing[c] += faces.area[static_cast<std::size_t>(p)][c];
+  for (const Point& area : areas.area) {
+    for (std::size_t c = 0; c < 3; ++c) missing[c] -= area[c];
+    size += length(area);
+  }
+  for (Point& area : areas.area) {
+    const double share = length(area) / size;
+    for (std::size_t c = 0; c < 3; ++c) area[c] += share * missing[c];
+  }
+}
+
+}  // namespace
+
+SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
+  if (!load.face.empty()) return of_face(load, parts, images);
+  const Body& body = parts.families->body();
+  std::vector<bool> in_set(body.stride(), false);
+  for (const std::int32_t p : body.set(load.set)) in_set[static_cast<std::size_t>(p)] = true;
+  const std::vector<Point> areas = all_areas(load, parts);
+  const std::vector<std::int32_t> surface = free_surface(body);
+  if (std::ranges::none_of(surface, [&](std::int32_t p) { return in_set[static_cast<std::size_t>(p)]; })) {
+    throw InputError(load.position, "load.pressure",
+                     fmt::format("found on the set \"{}\", none of whose points lies at the free surface of the body; allowed: "
+                                 "sets with a free surface",
+                                 load.set));
+  }
+  const NearestPoint nearest(body, surface, 2 * body.spacing());
+  SurfaceAreas found;
+  for (const std::int32_t p : body.owned()) {
+    const std::optional<std::int32_t> at =
+        nearest.to(body.position(static_cast<std::size_t>(p)), 3 * body.horizon());  // a surface is felt no deeper
+    if (at && in_set[static_cast<std::size_t>(*at)]) found.points.push_back(p);
+  }
+  const bool whole = body.owned().size() == body.points();
+  if (images) images->append_images(found.points);  // what the evaluation points of the set have of the surface beyond planes
+  for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
+  if (body.lattice() && whole) correct_total(body, in_set, found);
+  return found;
+}
+
+}  // namespace perikit

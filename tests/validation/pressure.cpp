@@ -1,0 +1,186 @@
+/// Pressure on free surfaces: a uniform stress in equilibrium point by point, exact totals, Lame's tube, and pressures that
+/// follow the surface.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "perikit/core/field_operations.hpp"
+#include "tests/contract/integrator_fixture.hpp"
+#include "tests/validation/scenes.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+
+namespace {
+
+struct BodyText {
+  const char* body;
+  int dimension;
+  double right;  ///< beyond it lies the set "right"
+};
+
+const BodyText block{"dimension = 3\n[body.lattice]\nspacing = 0.1\nlower = [0, 0, 0]\nupper = [0.8, 0.7, 0.6]\n", 3, 0.7};
+const BodyText plate{
+    "dimension = 2\nplane = \"strain\"\nthickness = 0.5\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1.2, 1.0]\n", 2,
+    1.1};
+const BodyText ring{
+    "dimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [-1, -1]\nupper = [1, 1]\ninside = \"x^2 + y^2 > "
+    "0.2 && x^2 + y^2 < 1\"\n",
+    2, 0.7};
+
+std::unique_ptr<Simulation> under_pressure(const BodyText& body, const std::string& kinematics, const std::string& more) {
+  const std::string text = fmt::format(
+      "format = 1\n[body]\n{}[sets]\nright = \"x > {}\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = "
+      "\"{}\"\n[material]\ntype = \"neo_hookean\"\ndensity = 1000.0\n"
+      "shear_modulus = 1.0e6\nbulk_modulus = 2.0e6\n{}",
+      body.body, body.right, kinematics, more);
+  return std::make_unique<Simulation>(parse_scene(text, "pressure.toml", registry()), registry());
+}
+
+/// The largest sum of internal and external forces on a point over the largest external one.
+double imbalance(Simulation& simulation, double stretch, double pressure) {
+  BodyProblem& problem = simulation.problem();
+  const int d = problem.dimension();
+  Field u = problem.make_field(), force = problem.make_field(), external = problem.make_field();
+  for (const std::int32_t p : problem.body().owned())
+    for (int c = 0; c < d; ++c)
+      u.component(c)[p] = (stretch - 1) * problem.body().position(static_cast<std::size_t>(p))[static_cast<std::size_t>(c)];
+  REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
+  REQUIRE(problem.external_forces(u, 1.0, external).ok());
+  double largest = 0, left = 0;
+  for (const std::int32_t p : problem.body().owned())
+    for (int c = 0; c < d; ++c) {
+      largest = std::max(largest, std::abs(pressure * external.component(c)[p]));
+      left = std::max(left, std::abs(force.component(c)[p] + pressure * external.component(c)[p]));
+    }
+  return left / largest;
+}
+
+/// First Piola-Kirchhoff stress over the plane of the body at F = stretch I (in the plane), from the law itself.
+double stress(const BodyText& body, double stretch) {
+  const auto simulation = under_pressure(body, "conventional", "[integrator]\ntype = \"evaluate\"\n");
+  BodyProblem& problem = simulation->problem();
+  const FieldView u = problem.state().displacement();
+  for (const std::int32_t p : problem.body().owned())
+    for (int c = 0; c < problem.dimension(); ++c)
+      u.component(c)[p] = (stretch - 1) * problem.body().position(static_cast<std::size_t>(p))[static_cast<std::size_t>(c)];
+  PointSamples samples;
+  REQUIRE(problem.sample(samples).ok());
+  return samples.P.component(0)[problem.body().owned().front()];
+}
+
+}  // namespace
+
+TEST_CASE("a pressure all around holds a uniform stress in equilibrium, point by point, dead and following") {
+  const std::string load = "[[load]]\nset = \"all\"\npressure = 1.0\nfollower = {}\n[integrator]\ntype = \"newton\"\nsteps = 1\n";
+  for (const BodyText& body : {block, plate, ring})
+    for (const char* kinematics :
+         {"conventional", "baqp", "projection", "bond_associated", "sub_horizon", "non_spherical", "bond_augmented"})
+      for (const bool follower : {false, true}) {
+        const double stretch = 1.1, P = stress(body, stretch);
+        // Dead: the stress on the surface is P itself. Following: -p cof F, with cof F = stretch^(d - 1) over the surface of d
+        // dimensions.
+        const double pressure = follower ? -P / std::pow(stretch, body.dimension - 1) : -P;
+        const auto simulation = under_pressure(body, kinematics, fmt::format(fmt::runtime(load), follower));
+        const double left = imbalance(*simulation, stretch, pressure);
+        CHECK_MESSAGE(left < 1e-11, kinematics, " in ", body.dimension, "D, follower ", follower, ": ", left);
+      }
+}
+
+TEST_CASE("pressure: exact totals, on one side and on a hole") {
+  for (const char* kinematics : {"baqp", "bond_based"}) {
+    const auto total = [&](const BodyText& body, const std::string& load, int component) {
+      const auto simulation =
+          under_pressure(body, kinematics, fmt::format("[[load]]\n{}\n[integrator]\ntype = \"newton\"\n", load));
+      Field force = simulation->problem().make_field();
+      simulation->problem().loads().evaluate(1.0, force);
+      double sum = 0;
+      for (const std::int32_t p : simulation->problem().body().owned()) sum += force.component(component)[p];
+      return sum;
+    };
+    CHECK(total(plate, "set = \"right\"\npressure = 2.0\nface = \"+x\"", 0) == doctest::Approx(-2.0 * 1.0 * 0.5).epsilon(1e-12));
+    CHECK(total(plate, "set = \"right\"\npressure = 2.0", 0) == doctest::Approx(-2.0 * 1.0 * 0.5).epsilon(1e-12));
+    CHECK(std::abs(total(plate, "set = \"right\"\npressure = 2.0", 1)) < 1e-13);
+    CHECK(std::abs(total(plate, "set = \"all\"\npressure = 2.0", 0)) < 1e-13);
+    CHECK(std::abs(total(ring, "set = \"all\"\npressure = 2.0", 1)) < 1e-13);
+    CHECK(total(block, "set = \"right\"\npressure = \"2 + 0*x\"", 0) == doctest::Approx(-2.0 * 0.7 * 0.6).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("the stiffness of a pressure that follows is its derivative") {
+  const auto simulation = under_pressure(
+      ring, "baqp", "[[load]]\nset = \"all\"\npressure = \"1e5*(1 + 0.2*x)\"\nfollower = true\n[integrator]\ntype = \"jfnk\"\n");
+  BodyProblem& problem = simulation->problem();
+  Field u = problem.make_field(), w = problem.make_field(), Kw = problem.make_field(), plus = problem.make_field(),
+        minus = problem.make_field();
+  for (const std::int32_t p : problem.body().owned()) {
+    const Point x = problem.body().position(static_cast<std::size_t>(p));
+    u.component(0)[p] = 0.1 * std::sin(x[1]);
+    u.component(1)[p] = 0.05 * x[0] * x[1];
+    w.component(0)[p] = std::cos(2 * x[0]);
+    w.component(1)[p] = x[1] * x[1];
+  }
+  REQUIRE(problem.add_load_stiffness(u, 1.0, w, Kw).ok());
+  const double h = 0.01;  // the force is quadratic in u: no error of the differences but rounding
+  Field moved = problem.make_field();
+  combine(1, u, h, w, moved);
+  REQUIRE(problem.external_forces(moved, 1.0, plus).ok());
+  combine(1, u, -h, w, moved);
+  REQUIRE(problem.external_forces(moved, 1.0, minus).ok());
+  combine(1 / (2 * h), minus, -1 / (2 * h), plus, plus);
+  combine(1, plus, -1, Kw, moved);
+  CHECK(norm(moved) < 1e-9 * norm(Kw));
+}
+
+TEST_CASE("Lame's tube: the displacement converges to the closed form") {
+  const auto error = [](int n, const std::string& kinematics) {
+    const auto simulation =
+        load("pressure/lame_cylinder.toml", {fmt::format("constants.n={}", n), "kinematics.type=" + kinematics});
+    contract::run(*simulation);
+    BodyProblem& problem = simulation->problem();
+    const HistoryDescription& record = simulation->scene().output.history[0];
+    double distance = 0, size = 0;
+    for (const std::int32_t p : problem.body().owned()) {
+      const double exact = (*record.exact)(problem.body().position(static_cast<std::size_t>(p)), 1.0);
+      distance += std::pow(problem.state().displacement().component(0)[p] - exact, 2);
+      size += exact * exact;
+    }
+    return std::sqrt(distance / size);
+  };
+  for (const char* kinematics : {"baqp", "bond_associated"}) {
+    const double coarse = error(20, kinematics), fine = error(60, kinematics);
+    MESSAGE(std::string(kinematics), ": ", coarse, " at 20 cells to the radius, ", fine, " at 60");
+    CHECK(fine < 0.012);
+    CHECK(fine < coarse / 3);  // the first power of the spacing
+  }
+}
+
+TEST_CASE("a pressure that follows a closed surface is conservative: an explicit run keeps its energy") {
+  const auto simulation = under_pressure(ring, "projection",
+                                         "[[load]]\nset = \"all\"\npressure = \"2e4*(1 - exp(-t/0.02))\"\nfollower = "
+                                         "true\n[integrator]\ntype = \"verlet\"\nsafety = 0.2\nend_time = 0.2\n"
+                                         "[output]\nhistory_every = 1\n");
+  const contract::Watch watch = contract::run(*simulation);
+  const double work = std::abs(simulation->problem().state().energies.external_work);
+  CHECK(work > 0);
+  CHECK_MESSAGE(watch.imbalance() < 1e-3 * work, watch.imbalance(), " of ", work, " J");
+}
+
+TEST_CASE("newton and jfnk find the same inflated ring") {
+  const auto inflate = [](const std::string& integrator) {
+    auto simulation = under_pressure(
+        ring, "baqp",
+        "[[boundary]]\nset = \"right\"\ndisplacement = [0, 0]\n[[load]]\nset = \"all\"\npressure = \"-2e4\"\nfollower = true\n"
+        "[integrator]\ntype = \"" +
+            integrator + "\"\nsteps = 2\ntolerance = 1e-9\nmax_iterations = 60\n");
+    contract::run(*simulation);
+    return simulation;
+  };
+  const auto a = inflate("newton"), b = inflate("jfnk");
+  Field difference = a->problem().make_field();
+  combine(1, a->problem().state().displacement(), -1, b->problem().state().displacement(), difference);
+  CHECK(norm(a->problem().state().displacement()) > 0);
+  CHECK(norm(difference) < 1e-6 * norm(a->problem().state().displacement()));
+}
