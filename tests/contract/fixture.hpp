@@ -37,8 +37,9 @@ std::vector<Example> kinematics_examples();
 /// What a test body looks like. Spacing is 1 unless scaled.
 struct BodyOptions {
   int dimension = 3;
-  bool cloud = false;  ///< jittered
-  bool crack = false;  ///< about a tenth of the bonds cut
+  bool cloud = false;       ///< jittered
+  bool consistent = false;  ///< [family]
+  bool crack = false;       ///< about a tenth of the bonds cut
   bool two_materials = false;
   std::string influence = "gaussian";
   std::string material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";

@@ -24,6 +24,7 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
     : rows_(rows),
       laws_(parts.laws),
       formulation_(parts.formulation),
+      factors_(parts.factors),
       far_share_(formulation_.far_share),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
       colouring_(cloud_reach(rows.lists(), rows.size())) {
@@ -61,7 +62,7 @@ void BondAssembly<D>::read_bonds() {
         bond.gradient[e] = s.gradient[k * D + e];
         own_gradient_[D * i + e] -= bond.gradient[e];
       }
-      bond.weight = rows_.volume(i) * s.share[k];
+      bond.weight = rows_.volume(i) * s.share[k] * (factors_.empty() ? 1.0 : factors_[rows_.first(i) + k]);
       const auto j = static_cast<std::size_t>(neighbours[k]);
       const auto back = rows_.neighbours(j);
       bond.reverse =

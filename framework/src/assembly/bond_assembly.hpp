@@ -54,6 +54,7 @@ class BondAssembly final : public Assembly {
   const BlockRows& rows_;
   const Laws& laws_;
   const Formulation& formulation_;
+  std::span<const double> factors_;  ///< of the weights; empty: 1
   double far_share_;
   bool symmetric_;
   std::vector<Bond> bond_;

@@ -9,7 +9,10 @@ namespace perikit {
 
 template <int D>
 ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& rows)
-    : rows_(rows), laws_(parts.laws), shape_{parts.formulation, parts.formulation.parts(D)}, colouring_(cloud_reach(rows.lists(), rows.size())) {
+    : rows_(rows),
+      laws_(parts.laws),
+      shape_{parts.formulation, parts.formulation.parts(D), parts.factors},
+      colouring_(cloud_reach(rows.lists(), rows.size())) {
   for (std::size_t r = 0; r < rows.size() && !whole_; ++r) {
     if (!rows.whole(r)) continue;
     ElementScratch<D> scratch;
@@ -39,7 +42,8 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   for (int c = 0; c < D && owners > 0; ++c)
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
   for (int q = 0; q < element.points; ++q) {
-    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().left(p));
+    const int lane =
+        m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().left(p));
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) {
         m.batch.H(lane, c * D + e) = gradient(owners + q, c, e);

@@ -12,6 +12,7 @@
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
+#include "spaces/consistency.hpp"
 
 namespace perikit {
 
@@ -88,6 +89,31 @@ std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& 
   }
 }
 
+/// What is asked of a cloud with consistent = true; null where it is not.
+std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const ProblemParts& parts,
+                                                    const Formulation& formulation) {
+  if (!scene.consistent.value_or(false)) return nullptr;
+  const auto refuse = [&](const std::string& found, const std::string& allowed) {
+    throw InputError(scene.consistent_position, "family.consistent", fmt::format("found true {}; allowed: {}", found, allowed));
+  };
+  if (parts.body->lattice())
+    refuse("on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0");
+  if (parts.partition) refuse("with several ranks", "one rank");
+  if (!formulation.bond && !(formulation.weighted && formulation.parts(parts.body->dimension()) != 1))
+    refuse(fmt::format("with kinematics \"{}\", which has no weights to choose", scene.kinematics->type),
+           "kinematics with evaluation points at bonds or parts of families");
+  if (formulation.force_state == ForceState::local)
+    refuse("with force_state = \"local\", whose forces are not -dE/du", "force_state = \"variational\"");
+  if (formulation.selective()) refuse("with kinematics \"selective\"", "false");
+  auto consistency = std::make_shared<CloudConsistency>();
+  if (const ImageMap* images = parts.images.get()) {
+    consistency->extend = [images](FieldView u) { images->extend(u); };
+    consistency->fold = [images](FieldView force) { images->fold(force); };
+    consistency->copy_from_sources = [images](FieldView field) { images->copy_from_sources(field); };
+  }
+  return consistency;
+}
+
 /// Refuses laws with history where the path has no steps, and where forces are not the derivative of their work.
 void refuse_history(const Scene& scene, const Laws& laws, const Formulation& formulation, bool quasi_static) {
   const auto sources = materials(scene);
@@ -124,6 +150,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), quasi_static, partition != nullptr));
   of_terms.damage = parts.fracture.damage();
+  of_terms.consistency = build_consistency(scene, parts, of_terms.formulation);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;

@@ -138,7 +138,32 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
   return -1;
 }
 
+/// s.psi: the factors of the owners' evaluation points.
+int BatchWork::balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept {
+  const Balance& b = *balance_;
+  const int d = dimension(laws_.space());
+  const double* const H = selective_ ? s.Ht : s.H;
+  for (int c = 0; c < d * d; ++c) std::fill_n(s.P + c * batch_points, padded(static_cast<std::size_t>(n)), 0.0);
+  for (int l = 0; l < n; ++l) {
+    double trace = b.constant, stress = 0;
+    for (int a = 0; a < d; ++a) trace += H[a * (d + 1) * batch_points + l];
+    const auto add = [&](std::size_t owner, double weight) {
+      if (!b.counted[owner] || weight == 0) return 0.0;
+      const double factor = trace + b.multiplier[owner];
+      stress += weight * factor;
+      if (!b.factors) b.sums[owner] += weight * factor;
+      return factor;
+    };
+    s.psi[l] = add(static_cast<std::size_t>(s.owner[l]), s.weight[l]);
+    if (both_ends) add(static_cast<std::size_t>(s.far[l]), s.far_weight[l]);
+    for (int a = 0; a < d; ++a) s.P[a * (d + 1) * batch_points + l] = stress;
+  }
+  std::fill_n(s.pressure, (both_ends ? 2 : 1) * padded(static_cast<std::size_t>(n)), 0.0);
+  return -1;
+}
+
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
+  if (balance_) return balance_pass(n, s, both_ends);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;

@@ -17,6 +17,18 @@ namespace perikit {
 
 enum class Work { force, tangent, sample };
 
+/// In place of the laws, for weights that balance a constant stress (spaces/consistency.hpp): the stress of an evaluation point
+/// is (constant + tr H + multiplier of its owner) times the unit tensor.
+struct Balance {
+  double constant = 0;
+  const double* multiplier = nullptr;     ///< by point
+  const std::uint8_t* counted = nullptr;  ///< by point: evaluation points of others have no weight
+  double* sums = nullptr;                 ///< by point: += W times that factor, over the evaluation points of the owner
+  /// Factors by number of the evaluation point (EvaluationSpace::factors) are written here, 0 where it has no weight; nothing is
+  /// scattered.
+  double* factors = nullptr;
+};
+
 /// Scratch of one thread. Arrays are [component][lane] with stride batch_points.
 struct BatchScratch {
   alignas(64) double H[9 * batch_points];
@@ -88,8 +100,9 @@ class BatchWork {
  public:
   /// history: null where no law has one.
   /// screen: null where bonds are not screened.
-  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, BondScreen* screen = nullptr)
-      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), screen_(screen) {}
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr,
+            BondScreen* screen = nullptr)
+      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance), screen_(screen) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
@@ -100,6 +113,8 @@ class BatchWork {
   void screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept;
   /// Whether the numbers of lanes are asked for.
   bool history() const noexcept { return history_ != nullptr; }
+  /// What is done in place of laws; null: laws are.
+  const Balance* balance() const noexcept { return balance_; }
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
@@ -112,6 +127,7 @@ class BatchWork {
  private:
   int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P,
            double* energy) const noexcept;
+  int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P,
                     double* dP) const noexcept;
@@ -127,6 +143,7 @@ class BatchWork {
   bool energy_;
   bool selective_;
   LawHistory* history_;
+  const Balance* balance_;
   BondScreen* screen_;
 };
 
@@ -152,7 +169,9 @@ struct Pass {
   /// points.
   void add_samples(int n, const BatchScratch& s);
   /// Evaluation points are taken one by one and nothing is scattered.
-  bool alone() const noexcept { return only || work.work() == Work::sample; }
+  bool alone() const noexcept { return only || work.work() == Work::sample || (work.balance() && work.balance()->factors); }
+  /// Every block has something to do, whether its points move or not.
+  bool everywhere() const noexcept { return alone() || work.tangent() || work.balance(); }
   bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
   bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
 

@@ -51,6 +51,7 @@ std::string Simulation::summary() {
     text += fmt::format("warning       {} points have {}\n", report.singular_families,
                         problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
+  for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
   if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
     text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";

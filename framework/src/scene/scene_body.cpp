@@ -123,6 +123,10 @@ void SceneReader::read_family(const toml::table& root) {
   writer_.lines(table, values);
   if (values.has("horizon")) scene_.horizon = values.number("horizon");
   if (values.has("horizon_ratio")) scene_.horizon_ratio = values.number("horizon_ratio");
+  for (const char* key : {"horizon", "horizon_ratio"})
+    if (values.has(key)) scene_.horizon_position = values.position(key);
+  if (values.has("consistent")) scene_.consistent = values.boolean("consistent");
+  scene_.consistent_position = values.position("consistent");
   if (values.has("influence")) scene_.influence = values.shared_part("influence");
   if (scene_.horizon > 0 && scene_.body.lattice && scene_.horizon < scene_.body.lattice->spacing) {
     reader_.errors.add(values.position("horizon"), "family.horizon",

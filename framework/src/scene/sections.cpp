@@ -85,6 +85,9 @@ ParameterTable family_parameters() {
   table.number("horizon_ratio", "-", "Horizon over the spacing of the points.").at_least(1);
   table.number("horizon", "m", "Horizon as a length.").positive();
   table.part("influence", Kind::influence, "Influence function.").by_default("\"constant\"");
+  table.boolean(
+      "consistent",
+      "Clouds: weights of evaluation points with which a constant stress is in equilibrium inside of the body, as on a lattice.");
   table.exactly(1, {"horizon_ratio", "horizon"});
   return table;
 }

@@ -47,6 +47,20 @@ void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
   }
 }
 
+template <int D>
+void CloudBonds<D>::set_factors(std::span<const double> factors) {
+  factor_ = factors.empty() ? nullptr : factors.data();
+  if (!pairs_) return;
+  far_factor_.resize(factors.size());
+  const FamilyLists& lists = families_.lists();
+  parallel_for(factor_ ? blocks() : 0, [&](std::size_t b) {
+    over_points(b, [&](std::size_t p) {
+      for (auto k = static_cast<std::size_t>(upper_[p]); k < static_cast<std::size_t>(lists.first[p + 1]); ++k)
+        far_factor_[k] = factors[static_cast<std::size_t>(families_.index(lists.neighbour[k], static_cast<std::int32_t>(p)))];
+    });
+  });
+}
+
 /// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
 template <int D>
 void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H,
@@ -86,6 +100,10 @@ void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lan
     const double factor = !real ? 0.0 : formulation_.weight == BondWeight::kernel ? influence[k] : families_.b(k);
     s.weight[l] = scale_[p] * position_[j][3] * factor;
     s.far_weight[l] = scale_[j] * x[3] * factor;
+    if (factor_) {
+      s.weight[l] *= factor_[k];
+      if (pairs_) s.far_weight[l] *= far_factor_[k];
+    }
     s.owner[l] = static_cast<std::int32_t>(p);
     s.far[l] = static_cast<std::int32_t>(j);
   }
@@ -140,6 +158,7 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     const auto owner = static_cast<std::int32_t>(p);
     pass.work.screen(&owner, 1, selective_ && both_ends ? 2 * lanes : n, s);
     if (pass.work.work() == Work::sample) pass.add_samples(n, s);
+    if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;
     bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
     scatter(p, n, s, both_ends, tangent);
@@ -254,7 +273,7 @@ void CloudBonds<D>::run(Pass& pass) {
     direction_.resize(D * points_);
   }
   if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
-  if (pass.alone() || pass.nearby || tangent)
+  if (pass.nearby || pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });

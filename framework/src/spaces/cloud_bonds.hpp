@@ -18,6 +18,8 @@ class CloudBonds final : public EvaluationSpace {
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
+  std::size_t factors() const noexcept override { return families_.lists().neighbour.size(); }
+  void set_factors(std::span<const double> factors) override;
   void report(ModelReport& report) const override;
 
  private:
@@ -55,7 +57,9 @@ class CloudBonds final : public EvaluationSpace {
   std::vector<std::int64_t> upper_;   ///< first neighbour with a larger index
   std::vector<std::int64_t> number_;  ///< of the first bond that a point evaluates, where laws have a history
   std::size_t one_end_ = 0;
-  AlignedVector<double> scale_;  ///< V_i / N_i
+  AlignedVector<double> scale_;       ///< V_i / N_i
+  const double* factor_ = nullptr;    ///< w_ij / W_ij; null: 1
+  AlignedVector<double> far_factor_;  ///< w_ji / W_ji by bond, where bonds are evaluated once
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                 ///< mirrors
   AlignedVector<Row> gradient_, direction_;  ///< Hbar of u and w, D rows a point

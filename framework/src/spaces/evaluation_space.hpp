@@ -28,6 +28,11 @@ class EvaluationSpace {
   virtual std::size_t numbers() const noexcept = 0;
   /// What follows from the bonds of these points is to be made anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
+  /// Weights of evaluation points may be multiplied by factors, of which there are so many; 0: they may not. Bonds of a cloud: by
+  /// place in the lists of the set-up; parts of families: point * parts + part.
+  virtual std::size_t factors() const noexcept { return 0; }
+  /// From now on W_q times factors[q]; empty: 1. They must outlive the space.
+  virtual void set_factors(std::span<const double>) {}
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
   /// The history of laws was replaced.
@@ -52,9 +57,10 @@ struct SpaceParts {
   const Families& families;
   const Formulation& formulation;
   const Laws& laws;
-  bool skip = true;    ///< leave out work whose result is known; changes no bit
-  bool share = true;   ///< savings by symmetry and uniformity; change rounding
-  bool fails = false;  ///< bonds may fail
+  bool skip = true;                      ///< leave out work whose result is known; changes no bit
+  bool share = true;                     ///< savings by symmetry and uniformity; change rounding
+  std::span<const double> factors = {};  ///< of the weights, as set_factors takes them; for assemblies
+  bool fails = false;                    ///< bonds may fail
 
   bool history() const noexcept { return laws.state_components() > 0; }
   QuietBlocks local_blocks(const BlockReach& reach) const { return fails ? QuietBlocks(reach) : QuietBlocks(); }

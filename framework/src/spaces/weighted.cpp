@@ -106,7 +106,7 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
   const Place& place = place_[static_cast<std::size_t>(p)];
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
-  if (pass.work.history())
+  if (pass.work.history() || factor_)
     find_numbers(p, groups_[place.group], m);
   else
     m.original.clear();
@@ -137,12 +137,15 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     if (selective_ && first == 0) keep_owner_gradients(1, families_.left(static_cast<std::size_t>(p)), m, s, tangent);
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
-      s.weight[l] = volume * stencil.share(first + l);
-      const int k = first + l - owners_;
-      s.number[l] = k < 0 ? -1 : number + 8 * (m.original.empty() ? k : m.original[static_cast<std::size_t>(k)]);
+      const int k = first + l - owners_, original = k < 0 || m.original.empty() ? k : m.original[static_cast<std::size_t>(k)];
+      s.weight[l] = volume * stencil.share(first + l) * factor(p, original);
+      s.number[l] = k < 0 ? -1 : number + 8 * original;
       if (sample) s.far[l] = k < 0 || parts_ > 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
+    if (pass.work.balance() && alone)
+      for (int l = std::max(0, owners_ - first); l < n; ++l)
+        pass.work.balance()->factors[factor_of(p, first + l - owners_)] = s.psi[l];
     pass.work.screen(&p, 1, n, s);
     if (sample) pass.add_samples(n, s);
     if (alone) continue;
@@ -273,7 +276,7 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       const int k = first + l / 8 - owners_;
       const bool in = here >> lane & 1;
       s.owner[l] = members[lane < members.size() ? lane : 0];
-      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) : 0.0;
+      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) * factor(s.owner[l], k) : 0.0;
       s.number[l] = k < 0 || !in ? -1 : number + 8 * k + static_cast<std::int64_t>(lane);
     }
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
@@ -283,6 +286,9 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       std::fill_n(s.far, 8 * n, -1);
       pass.add_samples(8 * n, s);
     }
+    for (int l = 0; l < 8 * n && alone && pass.work.balance(); ++l)
+      if (const int k = first + l / 8 - owners_; k >= 0 && l % 8 < g.count)
+        pass.work.balance()->factors[factor_of(s.owner[l], k)] = s.psi[l];
     if (alone) continue;
     if (selective_) add_pressures(8 * n, 8, s, tangent, m);
     scatter(first, n);
@@ -329,7 +335,7 @@ void Weighted<D>::run(Pass& pass) {
     look_around([&](std::size_t b) {
       return lattice_ ? lattice_->tiles.marked(b, pass.nearby) : cloud_marked(pass.nearby, b, body_.points(), cloud_block);
     });
-  if (pass.nearby || pass.work.tangent())
+  if (pass.nearby || pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(1, [&](std::size_t b) {

@@ -29,6 +29,10 @@ class Weighted final : public EvaluationSpace {
   std::size_t blocks() const noexcept override { return block_first_.size() - 1; }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
+  std::size_t factors() const noexcept override {
+    return cloud_ ? parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : families_.bonds() : 0;
+  }
+  void set_factors(std::span<const double> factors) override { factor_ = factors.empty() ? nullptr : factors.data(); }
   void report(ModelReport& report) const override;
 
  private:
@@ -87,6 +91,14 @@ class Weighted final : public EvaluationSpace {
   /// A point with the family in m; `number` is that of its first evaluation point.
   std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, double* energy);
   void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
+  /// Of evaluation point k of a point of a cloud.
+  std::size_t factor_of(std::int32_t p, int k) const noexcept {
+    const auto at = static_cast<std::size_t>(p);
+    return (parts_ > 0 ? at * static_cast<std::size_t>(parts_) : static_cast<std::size_t>(cloud_->lists().first[at])) +
+           static_cast<std::size_t>(k);
+  }
+  /// w / W of it; evaluation points of the map's owners, k < 0, have no weight.
+  double factor(std::int32_t p, int k) const noexcept { return factor_ && k >= 0 ? factor_[factor_of(p, k)] : 1.0; }
   /// Evaluation point k of lane l of a group has the number number_of(g) + 8 k + l.
   std::int64_t number_of(std::size_t g) const noexcept { return number_.empty() ? 0 : static_cast<std::int64_t>(number_[g]); }
   /// u of the far ends relative to the owner, [c * size + k].
@@ -124,6 +136,7 @@ class Weighted final : public EvaluationSpace {
   std::vector<std::size_t> block_first_;
   std::vector<std::size_t> number_;        ///< by group, where laws have a history
   std::size_t numbers_ = 0;
+  const double* factor_ = nullptr;  ///< w_q / W_q; null: 1
   Colouring cloud_colouring_;
   std::size_t fallbacks_ = 0, dropped_ = 0;
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows

@@ -13,8 +13,15 @@ Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
   if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
 }
 
+void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
+  if (!consistency->found) find_consistency(parts_, *space_, *consistency);
+  consistency_ = std::move(consistency);
+  parts_.factors = consistency_->factors;
+  space_->set_factors(parts_.factors);
+}
+
 BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
-  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), screen};
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen};
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
@@ -95,6 +102,7 @@ std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const 
 void Mechanics::report(ModelReport& report) const {
   space_->report(report);
   if (history_) report.bytes += history_->bytes();
+  if (consistency_) consistency_->report(report);
 }
 
 }  // namespace perikit

@@ -1,5 +1,6 @@
 #pragma once
 #include "perikit/operators/law_history.hpp"
+#include "spaces/consistency.hpp"
 #include "spaces/evaluation_space.hpp"
 #include "terms/term.hpp"
 
@@ -27,6 +28,8 @@ class Mechanics final : public Term {
 
   /// Of the laws; null where none has one.
   LawHistory* history() noexcept { return history_.get(); }
+  /// A constant stress is in equilibrium from now on, where the body is whole.
+  void balance(std::shared_ptr<CloudConsistency> consistency);
   void history_restored() { space_->history_restored(); }
 
  private:
@@ -36,6 +39,7 @@ class Mechanics final : public Term {
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
   BondScreen* screen_ = nullptr;
+  std::shared_ptr<const CloudConsistency> consistency_;
 };
 
 }  // namespace perikit

@@ -7,6 +7,8 @@
 #include "assembly/block_pattern.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "perikit/terms/terms.hpp"
+#include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
@@ -61,8 +63,9 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share}));
   } else {
     auto mechanics = std::make_unique<Mechanics>(
-        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, parts_.damage != nullptr});
+        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr});
     mechanics_ = mechanics.get();
+    if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
   }
   if (parts_.stabilization)
@@ -80,7 +83,8 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     finder = all.make_monitor(*parts_.damage, parts_.skip, known);
   else {
     auto criterion = std::make_unique<BondCriterion>(all, formulation, parts_.damage, terms_, parts_.skip);
-    criterion_ = parts_.skip && criterion->screen() ? criterion.get() : nullptr;
+    // Consistent weights are not those of the families, which the screen knows.
+    criterion_ = parts_.skip && !parts_.consistency && criterion->screen() ? criterion.get() : nullptr;
     if (criterion_) terms_.front()->screen(criterion_->screen());
     finder = std::move(criterion);
   }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace perikit {
@@ -21,7 +22,8 @@ struct ModelReport {
   std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family, or a lower order
   std::size_t dropped_parts = 0;              ///< parts of families without a gradient of their own
   std::vector<SkipNote> skips;
-  std::vector<std::string> warnings;          ///< one line each
+  std::vector<std::string> warnings;                       ///< one line each
+  std::vector<std::pair<std::string, std::string>> notes;  ///< further lines of run.log: label and text
 };
 
 /// Each of these directed bonds is evaluated once for both ends, since `why`.

@@ -32,6 +32,10 @@ struct BodyDescription {
   double section = 1.0;  ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
   std::optional<LatticeDescription> lattice;
   std::optional<std::filesystem::path> points_file;
+  std::optional<std::array<double, 3>> points_lower, points_upper;  ///< of the body that the points of a file are in [m]
+  std::optional<Expression> points_inside;                          ///< likewise where it is
+  bool voronoi = false;            ///< volumes are those of Voronoi cells, not those of lattice cells or of the file
+  SourcePosition volume_position;  ///< of the key that says so
   SourcePosition position;
 };
 
@@ -127,8 +131,11 @@ struct Scene {
   Constants constants;
   BodyDescription body;
   std::vector<SetDescription> sets;
-  double horizon = 0;        ///< [m]; 0: horizon_ratio given
-  double horizon_ratio = 0;  ///< to the lattice spacing (or mean spacing of a cloud)
+  double horizon = 0;              ///< [m]; 0: horizon_ratio given
+  double horizon_ratio = 0;        ///< to the lattice spacing (or mean spacing of a cloud)
+  std::optional<bool> consistent;  ///< nullopt where the scene does not say
+  bool partial_volume = false;
+  SourcePosition consistent_position, partial_volume_position, horizon_position;
   std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
   std::shared_ptr<const PartValues> stabilization, damage;  ///< null where the scene has none
   std::vector<RegionDescription> regions;

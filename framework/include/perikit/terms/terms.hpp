@@ -23,6 +23,7 @@ namespace perikit {
 class BondCriterion;
 class Families;
 class Mechanics;
+struct CloudConsistency;
 class Term;
 
 /// What the terms of a formulation are made of. families, laws and damage must outlive them.
@@ -34,6 +35,7 @@ struct TermParts {
   bool skip = true;                                    ///< leave out work whose result is known; changes no bit
   bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
   const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
+  std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
 };
 
 class Terms {

@@ -1,0 +1,137 @@
+#include "spaces/closed_points.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "body/voronoi.hpp"
+#include "families/cloud_families.hpp"
+
+namespace perikit {
+
+namespace {
+
+double spacing_of(const Body& body, std::size_t p) {
+  return std::pow(body.volume(p) / body.section(), 1.0 / body.dimension());
+}
+
+struct Box {
+  Point lower{}, upper{};
+  void add(const Point& x) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      lower[c] = std::min(lower[c], x[c]);
+      upper[c] = std::max(upper[c], x[c]);
+    }
+  }
+};
+
+Box box_of(const Body& body, std::span<const std::int32_t> points) {
+  const Point first = body.position(static_cast<std::size_t>(points.front()));
+  Box box{first, first};
+  for (const std::int32_t p : points) box.add(body.position(static_cast<std::size_t>(p)));
+  return box;
+}
+
+/// By point: 1 where its cell is open, 2 where its bonds are cut as well or its family is too poor; of images what their sources
+/// are.
+Field open_cells(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {
+  const Body& body = families.body();
+  Box box = box_of(body, body.internal());
+  for (std::size_t c = 0; c < 3; ++c) {
+    box.lower[c] -= 2 * body.horizon();
+    box.upper[c] += 2 * body.horizon();
+  }
+  std::vector<Point> positions;
+  for (std::size_t p = 0; p < body.points(); ++p) positions.push_back(body.position(p));
+  const VoronoiCells cells = voronoi_cells(positions, body.dimension(), box.lower, box.upper);
+  Field open = body.make_field(1);
+  for (const std::int32_t p : body.owned()) {
+    const auto at = static_cast<std::size_t>(p);
+    const bool torn = families.damage(at) > 0 || !std::isfinite(families.condition(at));
+    open.data()[p] = torn ? 2 : cells.reach[at] > 1.5 * spacing_of(body, at) ? 1 : 0;
+  }
+  if (copy_from_sources) copy_from_sources(open);
+  return open;
+}
+
+/// n n^T of the surface at open cells, summed over the sides that a cell belongs to: those of the box around the body that are
+/// near, else the one away from its family.
+class Normals {
+ public:
+  Normals(const CloudFamilies& families, const std::function<void(FieldView)>& copy_from_sources)
+      : families_(families), body_(families.body()), sides_(body_.make_field(3)) {
+    const Box own = box_of(body_, body_.owned()), all = box_of(body_, body_.internal());
+    for (const std::int32_t p : body_.owned()) {
+      const Point x = body_.position(static_cast<std::size_t>(p));
+      const double h = spacing_of(body_, static_cast<std::size_t>(p));
+      for (std::size_t c = 0; c < static_cast<std::size_t>(body_.dimension()); ++c) {
+        // Sides with images beyond are none.
+        const bool below = x[c] < own.lower[c] + 0.75 * h && all.lower[c] == own.lower[c];
+        const bool above = x[c] > own.upper[c] - 0.75 * h && all.upper[c] == own.upper[c];
+        sides_.component(static_cast<int>(c))[p] = below || above;
+      }
+    }
+    if (copy_from_sources) copy_from_sources(sides_);
+  }
+
+  Eigen::Matrix3d of(std::size_t p) const {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (int c = 0; c < body_.dimension(); ++c) sum(c, c) = sides_.component(c)[p];
+    if (!sum.isZero()) return sum;
+    const Point x = body_.position(p);
+    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+    for (const std::int32_t j : families_.neighbours(p)) {
+      const Point far = body_.position(static_cast<std::size_t>(j));
+      for (std::size_t c = 0; c < 3; ++c)
+        moment[static_cast<Eigen::Index>(c)] += body_.volume(static_cast<std::size_t>(j)) * (far[c] - x[c]);
+    }
+    moment.normalize();
+    return moment * moment.transpose();
+  }
+
+ private:
+  const CloudFamilies& families_;
+  const Body& body_;
+  Field sides_;  ///< by component: whether the point is near a side of the box across that axis
+};
+
+}  // namespace
+
+ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {
+  const Body& body = families.body();
+  const CloudFamilies& cloud = *families.cloud();
+  const Field open = open_cells(families, copy_from_sources);
+  const Normals normals(cloud, copy_from_sources);
+  ClosedPoints closed;
+  for (const std::int32_t p : body.owned()) {
+    const auto at = static_cast<std::size_t>(p);
+    Eigen::Matrix3d sides = Eigen::Matrix3d::Zero();
+    double worst = open.data()[p];
+    if (worst == 1) sides += normals.of(at);
+    for (const std::int32_t j : cloud.neighbours(at)) {
+      if (open.data()[j] == 0) continue;
+      worst = std::max(worst, open.data()[j]);
+      sides += normals.of(static_cast<std::size_t>(j));
+    }
+    if (worst == 0) closed.whole.push_back(p);
+    if (worst != 1 || body.dimension() == 1) continue;
+    // Directions that hardly any of the normals has; a surface with a radius of three horizons has less than this across its mean
+    // normal.
+    constexpr double least = 0.02;
+    const int d = body.dimension();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(sides.topLeftCorner(d, d));
+    ClosedPoints::AtSurface along{p, {}};
+    bool any = false;
+    for (int k = 0; k < d; ++k) {
+      if (axes.eigenvalues()[k] > least * sides.trace()) continue;
+      any = true;
+      for (int a = 0; a < d; ++a)
+        for (int b = 0; b < d; ++b)
+          along.along[static_cast<std::size_t>(3 * a + b)] += axes.eigenvectors()(a, k) * axes.eigenvectors()(b, k);
+    }
+    if (any) closed.at_surfaces.push_back(along);
+  }
+  return closed;
+}
+
+}  // namespace perikit

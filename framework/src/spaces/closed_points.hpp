@@ -1,0 +1,32 @@
+#pragma once
+/// Points of a cloud at which a constant stress is to be in equilibrium: all inside of the body, and, near its surface, in the
+/// directions along that.
+///
+/// A cell is open where its Voronoi cell has a corner more than 1.5 spacings away. Points without a bond to an open one, nor to
+/// one with bonds that a pre-crack cuts, are whole: nothing is missing around them. Near a surface with the normal n a constant
+/// stress must leave forces, P A_k with A_k along n, which tractions balance or which vanish where P n = 0, as at a free surface;
+/// the other components of A_k are zero on lattices.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "families/families.hpp"
+
+namespace perikit {
+
+struct ClosedPoints {
+  /// Not whole, but balanced in directions that `along`, a projection, row-major 3 x 3, keeps.
+  struct AtSurface {
+    std::int32_t point;
+    std::array<double, 9> along;
+  };
+  std::vector<std::int32_t> whole;
+  std::vector<AtSurface> at_surfaces;
+};
+
+/// Of the points that the body owns. copy_from_sources: values of points -> their images; may be empty.
+ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources);
+
+}  // namespace perikit
