@@ -172,7 +172,7 @@ const Case cases[]{
     {0, INTERFACE "[\"left\", \"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
      "allowed: two different regions"},
     {0, INTERFACE "[\"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
-     "allowed: a list of 2"},
+     "allowed: a list of strings (exactly 2)"},
     {0, "[[interface]]\nbetween = [\"left\", \"rest\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 29,
      "interface.0.damage", "found in a scene without [damage]"},
     // initial, boundaries, loads
