@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "perikit/core/errors.hpp"
+#include "perikit/core/messages.hpp"
 
 namespace perikit::app {
 
@@ -17,7 +18,7 @@ void add_commands(CLI::App& app, Options& options) {
   const auto add = [&](const char* name, const char* text, void (*command)(const Options&)) {
     CLI::App* sub = app.add_subcommand(name, text);
     sub->callback([&options, command] { options.command = command; });
-    sub->add_option("--plugin-path", options.plugin_path, "Further folders of plugins, searched first");
+    sub->add_option("--plugin-path", options.plugin_path, "Further folders of plugins, searched first")->allow_extra_args(false);
     return sub;
   };
   const auto with_scene = [&](CLI::App* sub) {
@@ -31,6 +32,7 @@ void add_commands(CLI::App& app, Options& options) {
   with_scene(run_command);
   run_command->add_option("-o,--output", options.output, "Folder for the results; default: out/<scene>");
   run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
+  run_command->add_flag("--force", options.force, "Replace files in the folder that perikit did not write");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
   CLI::App* study_command =
@@ -43,6 +45,7 @@ void add_commands(CLI::App& app, Options& options) {
       ->default_val(1)
       ->check(CLI::Range(1, 1024));
   study_command->add_flag("--resume", options.resume, "Keep the runs of the folder that are done already");
+  study_command->add_flag("--force", options.force, "Replace files in the folder that perikit did not write");
   study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");
   study_command->add_flag("--quiet", options.quiet, "No progress, no summary");
   CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", plot);
@@ -92,9 +95,10 @@ int refuse(const CLI::App& app, const CLI::ParseError& error, const std::string&
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
   if (std::ranges::find(commands, word) == commands.end() && !word.starts_with('-')) {
-    fmt::print(stderr, "found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "), did_you_mean(word, commands));
+    tell(fmt::format("found the unknown command '{}'; allowed: {}{}\n", word, fmt::join(commands, ", "),
+                     did_you_mean(word, commands)));
   } else {
-    fmt::print(stderr, "{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " ");
+    tell(fmt::format("{}\nHelp: perikit {}--help\n", error.what(), word.starts_with('-') ? "" : word + " "));
   }
   return input_refused;
 }
@@ -107,7 +111,7 @@ std::optional<int> read_command_line(int argc, char** argv, Options& options) {
   app.require_subcommand(1);
   add_commands(app, options);
   if (argc < 2) {
-    fmt::print(stderr, "{}", app.help());
+    tell(app.help());
     return input_refused;
   }
   try {

@@ -58,7 +58,7 @@ void run(const Options& options) {
   if (options.explain) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
-                       library_fingerprints(*registry));
+                       library_fingerprints(*registry), options.force);
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
   if (options.resume) {
     const std::string from = recorder.resumed_step() >= 0 ? fmt::format("resumed after step {}, time {:.6g} s",
@@ -95,10 +95,10 @@ void check(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   Simulation simulation(scene, *registry);
+  std::string summary = simulation.summary();   // which may still refuse
+  if (options.explain) summary += simulation.explanation(*registry);
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.
-  std::string summary = simulation.summary();
-  if (options.explain) summary += simulation.explanation(*registry);
   std::istringstream lines(summary);
   for (std::string line; std::getline(lines, line);) fmt::print("# {}\n", line);
 }
@@ -111,13 +111,16 @@ void study(const Options& options) {
     set_thread_count(threads);
   const Study study = read_study(options.scene, *registry);
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / study.file.stem() : options.output;
-  const auto runner = [&](const Scene& scene, const std::filesystem::path& own) { return run_in_child(scene, *registry, own); };
+  const auto runner = [&](const Scene& scene, const std::filesystem::path& own) {
+    return run_in_child(scene, *registry, own, options.force);
+  };
   const auto progress = [&](const std::string& line) {
-    if (!options.quiet) fmt::print("{}\n", line);
+    if (options.quiet) return;
+    std::puts(line.c_str());  // a line that cannot be written ends no study
     std::fflush(stdout);
   };
-  const StudyTable table =
-      run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress, {options.jobs, options.resume});
+  const StudyTable table = run_study(study, *registry, {options.overrides, options.trust}, folder, runner, progress,
+                                     {options.jobs, options.resume, options.force});
   const auto done = std::ranges::count(table.rows, "done", &StudyRow::status);
   if (!options.quiet)
     fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(),

@@ -13,12 +13,12 @@ enum Exit { done = 0, run_failed = 1, input_refused = 2 };
 
 /// What the words of the command line say.
 struct Options {
-  void (*command)(const Options&) = nullptr;   ///< one of those below
+  void (*command)(const Options&) = nullptr;  ///< one of those below
   std::filesystem::path scene, output, library;
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0, jobs = 1;
-  bool explain = false, quiet = false, trust = false, resume = false, markdown = false;
+  bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false;
   std::string kind, part;
   PlotOptions plot;
   std::int64_t frame = -1;
@@ -35,7 +35,7 @@ void check(const Options& options);
 void study(const Options& options);
 void plot(const Options& options);
 void bench(const Options& options);
-void start_project(const Options& options);   ///< perikit new
+void start_project(const Options& options);  ///< perikit new
 void contract(const Options& options);
 void list(const Options& options);
 void describe(const Options& options);

@@ -91,7 +91,16 @@ std::string list_parts(Registry& registry, const std::string& kind) {
       if (names.empty()) continue;
       out += fmt::format("{}\n", name(k));
     }
-    for (const std::string& part : names) out += fmt::format("{}{:<24} {}\n", kind.empty() ? "  " : "", part, registry.describe(k, part).summary);
+    for (const std::string& part : names) {
+      // A library may not be what its manifest says: the others are listed all the same.
+      std::string summary;
+      try {
+        summary = registry.describe(k, part).summary;
+      } catch (const InputError& error) {
+        summary = fmt::format("cannot be opened: {}", error.what());
+      }
+      out += fmt::format("{}{:<24} {}\n", kind.empty() ? "  " : "", part, summary);
+    }
   }
   return out;
 }

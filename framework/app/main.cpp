@@ -1,14 +1,22 @@
 /// The command line: perikit run | check | study | plot | bench | new | contract | list | describe.
 
+#include <dlfcn.h>
+#include <execinfo.h>
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <exception>
+#include <iostream>
 #include <new>
 
 #include "command_line.hpp"
 #include "perikit/core/errors.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace {
@@ -19,35 +27,102 @@ void stop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Where a standard stream is closed, the next file that is opened would take its place, and messages would go into results.
+void open_standard_streams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(descriptor, F_GETFD) < 0)
+      ::open("/dev/null", descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY);  // takes the lowest number that is free
+}
+
+/// A library may end the program where it gets no memory or no thread (the runtime of OpenMP does), and the end of another may then wait for
+/// ever for threads of its own (OpenBLAS). So the program ends here, before the ends of libraries: whatever it wrote is complete.
+void end_at_once(int status, void*) {
+  std::fflush(nullptr);
+  ::_exit(status);
+}
+
+/// Every way in which a command can end.
+int status_of(int argc, char** argv) {
+  using namespace perikit;
+  try {
+    app::Options options;
+    if (const std::optional<int> status = app::read_command_line(argc, argv, options)) return *status;
+    options.command(options);
+    return app::done;
+  } catch (const InputError& e) {
+    tell(fmt::format("{}\n", e.what()));
+    return app::input_refused;
+  } catch (const RunError& e) {
+    tell(fmt::format("the run failed: {}\n", e.what()));
+    return app::run_failed;
+  } catch (const std::bad_alloc&) {
+    tell("the run failed: not enough memory\n");
+    return app::run_failed;
+  } catch (const std::exception& e) {
+    if (std::ferror(stdout)) return app::run_failed;  // said by the caller
+    tell(fmt::format("internal error: {}\n", e.what()));
+    return app::run_failed;
+  } catch (...) {
+    tell("internal error: something that is no std::exception was thrown; a library of parts may have done so\n");
+    return app::run_failed;
+  }
+}
+
+/// The first library of parts on the stack.
+std::string library_on_stack() {
+  std::array<void*, 64> frames;
+  const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
+  for (int k = 0; k < count; ++k) {
+    Dl_info info{};
+    if (::dladdr(frames[static_cast<std::size_t>(k)], &info) == 0 || !info.dli_fname) continue;
+    void* const library = ::dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD);  // null for the program itself
+    if (library && ::dlsym(library, "perikit_register")) return info.dli_fname;
+  }
+  return {};
+}
+
+/// What a part throws where it may not (a law in the middle of a loop over points, say) ends the program; it is named here.
+[[noreturn]] void end_of_exception() noexcept {
+  const std::string library = library_on_stack();
+  std::string what = "something that is no std::exception";
+  if (const std::exception_ptr thrown = std::current_exception()) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const std::exception& error) {
+      what = error.what();
+    } catch (...) {
+    }
+  }
+  perikit::tell(fmt::format("the run failed: {} threw where nothing may be thrown: {}\n", library.empty() ? "a part or perikit itself" : library, what));
+  ::_exit(perikit::app::run_failed);
+}
+
+/// What was printed has to arrive: a full disk behind standard output is a failure.
+int flushed(int status) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
+  perikit::tell("standard output cannot be written\n");
+  return status == perikit::app::done ? perikit::app::run_failed : status;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   // Waiting threads must sleep: spinning ones make a busy machine several times slower. The runtime reads this when it starts,
   // which is before main; so the program starts itself again once.
   if (!std::getenv("OMP_WAIT_POLICY")) {
     setenv("OMP_WAIT_POLICY", "passive", 1);
     execv("/proc/self/exe", argv);
   }
-  using namespace perikit;
-  app::Options options;
-  if (const std::optional<int> status = app::read_command_line(argc, argv, options)) return *status;
+  // Factorizations have threads of ours or none; those of OpenBLAS would only take memory, 128 MiB each.
+  setenv("OPENBLAS_NUM_THREADS", "1", 0);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)   // these look for leaks at the end
+  ::on_exit(end_at_once, nullptr);
+#endif
+  std::set_terminate(end_of_exception);
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
-  std::signal(SIGXFSZ, SIG_IGN);   // a file at its size limit is then an error of the write, with a message
-  try {
-    options.command(options);
-    return app::done;
-  } catch (const InputError& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return app::input_refused;
-  } catch (const RunError& e) {
-    fmt::print(stderr, "the run failed: {}\n", e.what());
-    return app::run_failed;
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "the run failed: not enough memory\n");
-    return app::run_failed;
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "internal error: {}\n", e.what());
-    return app::run_failed;
-  }
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is then an error of the write, with a message
+  return flushed(status_of(argc, argv));
 }

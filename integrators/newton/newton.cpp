@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/memory.hpp"
 
@@ -26,13 +28,18 @@ bool FactorisedEquations::apply(Equilibrium& equilibrium, ConstFieldView w, Fiel
   return false;
 }
 
-bool FactorisedEquations::solve(Equilibrium&, ConstFieldView rhs, double, FieldView du, std::string& note, std::string&) {
+bool FactorisedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double, FieldView du, std::string& note, std::string&) {
   tangent_.solve(rhs, du);
   // Past a bifurcation or a limit point equilibria are unstable: worth knowing, and no reason to stop.
   if (tangent_.convex())
     note += "  tangent made convex";
   else if (tangent_.matrix().symmetric && !tangent_.factors().positive_definite())
     note += "  tangent not positive definite";
+  if (const double condition = tangent_.factors().reciprocal_condition(); condition < 1e-14) {
+    note += fmt::format("  tangent nearly singular ({:.1g})", condition);
+    if (!std::exchange(warned_, true))
+      equilibrium.note("warning: newton: the tangent is nearly singular: some part of the body is hardly held, and where it goes is rounding");
+  }
   return true;
 }
 

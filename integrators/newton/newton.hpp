@@ -21,6 +21,7 @@ class FactorisedEquations final : public LinearisedProblem {
  private:
   AssembledTangent tangent_;
   ConstFieldView u_;  ///< where the equations are linearised
+  bool warned_ = false;
 };
 
 /// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.

@@ -2,12 +2,18 @@
 
 #include <cholmod.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <umfpack.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "free_matrix.hpp"
+#include "perikit/core/errors.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
@@ -19,6 +25,18 @@ namespace {
 
 SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) {
   return reinterpret_cast<SuiteSparse_long*>(v.data());
+}
+
+/// Memory that OpenBLAS takes with its first product. Where it gets none it asks again, and for ever.
+constexpr double dense_memory = 128.1 * (1 << 20);
+
+/// What a limit of the address space leaves [bytes]; infinite without one.
+double address_space_left() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return std::numeric_limits<double>::infinity();
+  double pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return static_cast<double>(limit.rlim_cur) - pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 /// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
@@ -61,10 +79,15 @@ struct SparseSolver::Implementation {
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   void *symbolic = nullptr, *numeric = nullptr;
   bool analysed = false, definite = false, ready = false;
-  double entries = 0, limit;
+  double entries = 0, limit, reciprocal_condition = 1;
 
   explicit Implementation(double memory) : limit(memory) {
-    if (openblas_set_num_threads) openblas_set_num_threads(1);
+    if (openblas_set_num_threads) {
+      openblas_set_num_threads(1);
+      static bool held = false;   // once it has the memory it keeps it
+      if (const double left = address_space_left(); !std::exchange(held, true) && left < dense_memory)
+        throw RunError(fmt::format("not enough memory: dense products take {:.3g} MB, and the limit of this process leaves {:.3g} MB", dense_memory / 1e6, left / 1e6));
+    }
     cholmod_l_start(&common);
     common.print = 0;
     common.supernodal = CHOLMOD_SUPERNODAL;
@@ -133,6 +156,7 @@ struct SparseSolver::Implementation {
       failure =
           fmt::format("not enough memory for the Cholesky factor of {} unknowns ({:.3g} numbers)", free.unknowns(), common.lnz);
     entries = common.lnz;
+    if (definite) reciprocal_condition = cholmod_l_rcond(cholesky, &common);
     return definite;
   }
 
@@ -148,6 +172,7 @@ struct SparseSolver::Implementation {
       status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
     if (status == UMFPACK_OK) {
       entries = info[UMFPACK_LNZ] + info[UMFPACK_UNZ];
+      reciprocal_condition = info[UMFPACK_RCOND];
       return true;
     }
     failure = status == UMFPACK_WARNING_singular_matrix ? "the tangent is singular: part of the body is free to move"
@@ -210,6 +235,9 @@ bool SparseSolver::positive_definite() const noexcept {
 }
 std::size_t SparseSolver::unknowns() const noexcept {
   return implementation_->free.unknowns();
+}
+double SparseSolver::reciprocal_condition() const noexcept {
+  return implementation_->reciprocal_condition;
 }
 double SparseSolver::factor_entries() const noexcept {
   return implementation_->entries;

@@ -36,6 +36,8 @@ class SparseSolver {
   /// Unknowns, and numbers in the factors of the last factorisation.
   std::size_t unknowns() const noexcept;
   double factor_entries() const noexcept;
+  /// Of the last factorisation, estimated from its pivots: near 1e-16 nothing is left of the answer.
+  double reciprocal_condition() const noexcept;
 
  private:
   struct Implementation;

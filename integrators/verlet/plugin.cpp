@@ -1,3 +1,4 @@
+#include "perikit/sdk/stable_step.hpp"
 #include "verlet.hpp"
 
 PERIKIT_PLUGIN(registrar) {
@@ -15,6 +16,7 @@ PERIKIT_PLUGIN(registrar) {
   table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.")
       .by_default("500")
       .at_least(1);
+  allow_unstable_parameter(table);
   table.at_most_of(1, {"time_step", "safety"});
   registrar.integrator(
       {.name = "verlet",

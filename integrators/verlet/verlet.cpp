@@ -151,6 +151,7 @@ double Verlet::steps_to_end(double time, double step) const {
 }
 
 std::string Verlet::plan(Problem& problem) {
+  check_time_step(problem, options_.values);
   const double dt = options_.time_step > 0 ? options_.time_step : stable_step(problem);
   const double steps = steps_to_end(0, dt);
   return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
@@ -188,7 +189,15 @@ void Verlet::run(Problem& problem, Observer& observer) {
     return r;
   };
   const bool fresh = dt == 0;
+  double& planned_end = state.declare_numbers("planned_end", 1)[0];
+  if (!fresh && planned_end != options_.end_time) {
+    make_plan(dt);  // not the step: only its end is another
+    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time,
+                             planned_end, counter, dt));
+  }
+  planned_end = options_.end_time;
   if (fresh) {
+    check_time_step(problem, options_.values, &observer);
     make_plan(estimated ? stable_step(problem) : options_.time_step);
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
     stepper.prescribed_speed(state.time, speeds);

@@ -238,9 +238,10 @@ TEST_CASE("cli: a run says whose results it replaces, and never replaces its own
   const std::string own = desk.text("scene.toml");
   const Result refused = desk.perikit("run scene.toml -o .");
   CHECK(refused.status == 2);
-  CHECK(contains(refused.err,
-                 "output: found ., the folder of the scene itself, whose scene.toml the resolved scene would replace; allowed: "
-                 "another folder (-o)"));
+  CHECK_MESSAGE(contains(refused.err,
+                         "output: found scene.toml, which is read, where ./scene.toml would be written or removed; allowed: "
+                         "another folder (-o)"),
+                refused.err);
   CHECK(desk.text("scene.toml") == own);
   CHECK(desk.perikit("run out/scene.toml -o out").status == 0);  // this is what it would write
 }

@@ -25,8 +25,10 @@ inline void check_same_results(const Desk& desk, const std::string& folder, cons
                linked = read_frame(desk.path(folder + "/results.h5"), fmt::format("/frames/{:08}", k)) == expected[k];
     CHECK_MESSAGE(same, "frame ", k, " differs");
     CHECK_MESSAGE(linked, "results.h5 does not show frame ", k);
+    const std::string file = fmt::format("/frames/{:08}.h5", k);
+    CHECK_MESSAGE(desk.text(folder + file) == desk.text(whole + file), "frame ", k, " differs in its bytes");
   }
-  for (const std::string file : {"/history.csv", "/results.xdmf"}) {
+  for (const std::string file : {"/history.csv", "/results.xdmf", "/results.h5", "/reference.h5", "/scene.toml"}) {
     const bool same = desk.text(folder + file) == desk.text(whole + file);
     CHECK_MESSAGE(same, file, " differs");
   }

@@ -164,8 +164,7 @@ TEST_CASE("a continued run keeps the frames before it and drops later ones and s
     FrameWriter writer(folder.path, reference(), run);
     for (int k = 0; k < 5; ++k) writer.write(k, k, fields(k));
   }
-  std::ofstream(folder.path / "frames/.00000005.h5.part") << "torn";
-  std::ofstream(folder.path / ".results.h5.part") << "torn";
+  std::ofstream(folder.path / "frames/.00000005.h5.4711.part") << "torn";
   {
     FrameWriter writer(folder.path, reference(), run, 3);
     CHECK(writer.frames() == 3);

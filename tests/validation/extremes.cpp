@@ -227,12 +227,13 @@ TEST_CASE("extremes: bodies of one, two and three points in every space run or s
                 "{}\n[sets]\nfirst = {{ points = [0] }}\nlast = {{ points = [{}] }}\n"
                 "[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\ndensity = "
                 "1.0\nshear_modulus = 1.0\nbulk_modulus = 2.0\n"
-                "[[boundary]]\nset = \"first\"\ndisplacement = {}\n[[load]]\nset = \"last\"\nforce = {}\n[integrator]\n{}\n",
+                "[[boundary]]\nset = \"first\"\ndisplacement = {}\n[[load]]\nset = \"last\"\nforce = {}\n[integrator]\n{}\n{}",
                 d,
                 d == 2   ? "plane = \"strain\"\n"
                 : d == 1 ? "line = \"strain\"\n"
                          : "",
-                zero, upper, jitter, n - 1, kinematics, zero, pull, integrator);
+                zero, upper, jitter, n - 1, kinematics, zero, pull, integrator,
+                integrator.starts_with("type = \"verlet") ? "" : "[run]\nweak_springs = 1e-6\n");   // a held point does not hold against turns
             INFO(text);
             try {
               const auto simulation = build(text);
@@ -281,17 +282,14 @@ TEST_CASE("extremes: a point that is alone is a free mass in dynamics, and named
           scene(fmt::format("type = \"{}\"\nsteps = 1", integrator), "[[boundary]]\nset = \"alone\"\ndisplacement = [0, 0]\n"),
           file);
       CHECK_NOTHROW(run(*still));
-      // Nothing holds it: with a load there is no equilibrium.
-      const auto loose = build(scene(fmt::format("type = \"{}\"\nsteps = 1\ncut_backs = 1\nmax_iterations = 50", integrator),
-                                     "[[load]]\nset = \"alone\"\nforce = [1, 0]\n"),
-                               file);
+      // Nothing holds it: there is no equilibrium, or any.
       std::string message;
       try {
-        run(*loose);
-      } catch (const RunError& error) {
+        build(scene(fmt::format("type = \"{}\"\nsteps = 1", integrator), ""), file);
+      } catch (const InputError& error) {
         message = error.what();
       }
-      CHECK_MESSAGE(message.find("no equilibrium found") != std::string::npos, message);
+      CHECK_MESSAGE(message.find("boundary: found nothing that holds a piece of 1 point about (100, 100, 0)") != std::string::npos, message);
     }
   }
 }

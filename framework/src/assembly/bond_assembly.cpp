@@ -4,6 +4,7 @@
 
 #include "families/cloud_rows.hpp"
 #include "spaces/bond_shape.hpp"
+#include "spaces/shift.hpp"
 
 namespace perikit {
 
@@ -25,6 +26,7 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
       laws_(parts.laws),
       formulation_(parts.formulation),
       factors_(parts.factors),
+      shift_(parts.shift),
       far_share_(formulation_.far_share),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
       colouring_(cloud_reach(rows.lists(), rows.size())) {
@@ -51,6 +53,7 @@ void BondAssembly<D>::read_bonds() {
     s.correction.assign(D * s.family.size, 0.0);
     formulation_.bond->correction(s.family.view(rows_.body().horizon()), s.correction.data(), s.family.size);
     point_gradient(s.family, rows_.body().horizon(), formulation_.order, s.gradient);
+    if (shift_.data) shift_gradient(s.family, rows_.point(i), shift_, s.gradient);
     const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
     volume_share_[i] = regular ? rows_.families().left(rows_.point(i)) : 0.0;
     const auto neighbours = rows_.neighbours(i);

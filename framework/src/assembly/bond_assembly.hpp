@@ -55,6 +55,7 @@ class BondAssembly final : public Assembly {
   const Laws& laws_;
   const Formulation& formulation_;
   std::span<const double> factors_;  ///< of the weights; empty: 1
+  ConstFieldView shift_;             ///< of point gradients; without data: none
   double far_share_;
   bool symmetric_;
   std::vector<Bond> bond_;

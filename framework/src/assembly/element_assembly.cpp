@@ -11,7 +11,7 @@ template <int D>
 ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& rows)
     : rows_(rows),
       laws_(parts.laws),
-      shape_{parts.formulation, parts.formulation.parts(D), parts.factors},
+      shape_{parts.formulation, parts.formulation.parts(D), parts.factors, parts.shift},
       colouring_(cloud_reach(rows.lists(), rows.size())) {
   for (std::size_t r = 0; r < rows.size() && !whole_; ++r) {
     if (!rows.whole(r)) continue;

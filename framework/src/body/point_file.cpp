@@ -13,6 +13,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "body/positions_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "perikit/core/errors.hpp"
 
@@ -47,14 +48,17 @@ void add(PointCloud& cloud, const Row& row) {
   cloud.volume.push_back(row[volume_column]);
 }
 
-bool required(int column, int dimension) {
-  return column == volume_column || column < dimension;
-}
+/// Which columns a file must have.
+struct Wanted {
+  int dimension;
+  bool volumes;
+  bool required(int column) const { return column == volume_column ? volumes : column < dimension; }
+};
 
-std::string wanted_columns(int dimension) {
+std::string wanted_columns(const Wanted& wanted) {
   std::vector<std::string> names;
   for (int c = 0; c < 4; ++c) {
-    if (required(c, dimension)) names.push_back(column_names[static_cast<std::size_t>(c)]);
+    if (wanted.required(c)) names.push_back(column_names[static_cast<std::size_t>(c)]);
   }
   return fmt::format("{}", fmt::join(names, ","));
 }
@@ -67,7 +71,7 @@ std::string_view trimmed(std::string_view text) {
 
 class CsvReader {
  public:
-  CsvReader(const std::filesystem::path& file, int dimension) : file_(file), dimension_(dimension) {
+  CsvReader(const std::filesystem::path& file, const Wanted& wanted) : file_(file), wanted_(wanted) {
     std::ifstream stream(file, std::ios::binary);
     if (!stream || std::filesystem::is_directory(file)) {
       const int code = stream ? EISDIR : errno;
@@ -79,7 +83,7 @@ class CsvReader {
   }
 
   PointCloud read() {
-    if (!next_line()) refuse(line_start(), "", fmt::format("found no header line; allowed: {}", wanted_columns(dimension_)), 0);
+    if (!next_line()) refuse(line_start(), "", fmt::format("found no header line; allowed: {}", wanted_columns(wanted_)), 0);
     read_header();
     PointCloud cloud;
     while (next_line()) add(cloud, read_row());
@@ -135,17 +139,17 @@ class CsvReader {
       order_.push_back(column);
     }
     for (int c = 0; c < 4; ++c) {
-      if (required(c, dimension_) && std::find(order_.begin(), order_.end(), c) == order_.end()) {
+      if (wanted_.required(c) && std::find(order_.begin(), order_.end(), c) == order_.end()) {
         refuse(line_start(), "",
                fmt::format("found no column '{}' in '{}'; allowed: {}", column_names[static_cast<std::size_t>(c)],
-                           trimmed(content_), wanted_columns(dimension_)),
+                           trimmed(content_), wanted_columns(wanted_)),
                line_);
       }
     }
   }
 
   Row read_row() const {
-    Row row{};
+    Row row{0, 0, 0, 1};
     std::array<const char*, 4> where{};
     std::string_view rest = content_;
     std::size_t cells = 0;
@@ -154,13 +158,13 @@ class CsvReader {
       if (cells >= order_.size()) continue;
       const auto column = static_cast<std::size_t>(order_[cells]);
       where[column] = cell.data();
-      row[column] = number(cell, column_names[column]);
+      if (column != volume_column || wanted_.volumes) row[column] = number(cell, column_names[column]);
     }
     if (cells != order_.size()) {
       refuse(line_start(), "",
              fmt::format("found {} cells; allowed: {}, as many as the header has columns", cells, order_.size()), line_);
     }
-    if (const std::optional<Fault> fault = fault_of(row, dimension_)) {
+    if (const std::optional<Fault> fault = fault_of(row, wanted_.dimension)) {
       const auto column = static_cast<std::size_t>(fault->column);
       refuse(where[column], column_names[column], fault->message, line_);
     }
@@ -181,7 +185,7 @@ class CsvReader {
   }
 
   std::filesystem::path file_;
-  int dimension_;
+  Wanted wanted_;
   std::string text_;
   std::size_t start_ = 0, next_ = 0;
   int line_ = 0;
@@ -189,43 +193,56 @@ class CsvReader {
   std::vector<int> order_;  ///< column of each cell
 };
 
-PointCloud read_hdf5(const std::filesystem::path& file, int dimension) {
+PointCloud read_hdf5(const std::filesystem::path& file, const Wanted& wanted) {
   const hdf5::Source source(file);
   const auto refuse = [&](int column, const std::string& message) {
     throw InputError({file.string(), 0, 0}, column_names[static_cast<std::size_t>(column)], message);
   };
   std::array<std::vector<double>, 4> columns;
-  const std::vector<double>& volume = columns[volume_column];
-  for (const int c : {volume_column, 0, 1, 2}) {
+  const int counted = wanted.volumes ? volume_column : 0;  // of whose numbers all columns must have as many
+  const std::vector<double>& first = columns[static_cast<std::size_t>(counted)];
+  for (const int c : {counted, 0, 1, 2, volume_column}) {
     const std::string& name = column_names[static_cast<std::size_t>(c)];
     std::vector<double>& column = columns[static_cast<std::size_t>(c)];
-    if (source.contains(name)) {
+    if (c == volume_column && !wanted.volumes) {
+      column.assign(first.size(), 1.0);
+    } else if (source.contains(name)) {
       column = source.read(name).data;
-    } else if (required(c, dimension)) {
-      refuse(c, fmt::format("found no such dataset; allowed: {}", wanted_columns(dimension)));
+    } else if (wanted.required(c)) {
+      refuse(c, fmt::format("found no such dataset; allowed: {}", wanted_columns(wanted)));
     } else {
-      column.assign(volume.size(), 0.0);
+      column.assign(first.size(), 0.0);
     }
-    if (column.size() != volume.size())
-      refuse(c, fmt::format("found {} values; allowed: {}, as many as volume has", column.size(), volume.size()));
+    if (column.size() != first.size())
+      refuse(c, fmt::format("found {} values; allowed: {}, as many as {} has", column.size(), first.size(),
+                            column_names[static_cast<std::size_t>(counted)]));
   }
-  if (volume.empty()) refuse(volume_column, "found no points; allowed: one or more");
+  const std::vector<double>& volume = columns[volume_column];
+  if (volume.empty()) refuse(counted, "found no points; allowed: one or more");
   PointCloud cloud;
   for (std::size_t i = 0; i < volume.size(); ++i) {
     const Row row{columns[0][i], columns[1][i], columns[2][i], volume[i]};
-    if (const std::optional<Fault> fault = fault_of(row, dimension))
+    if (const std::optional<Fault> fault = fault_of(row, wanted.dimension))
       refuse(fault->column, fmt::format("point {}: {}", i, fault->message));
     add(cloud, row);
   }
   return cloud;
 }
 
+PointCloud read(const std::filesystem::path& file, const Wanted& wanted) {
+  const std::filesystem::path extension = file.extension();
+  if (extension == ".h5" || extension == ".hdf5") return read_hdf5(file, wanted);
+  return CsvReader(file, wanted).read();
+}
+
 }  // namespace
 
 PointCloud read_points(const std::filesystem::path& file, int dimension) {
-  const std::filesystem::path extension = file.extension();
-  if (extension == ".h5" || extension == ".hdf5") return read_hdf5(file, dimension);
-  return CsvReader(file, dimension).read();
+  return read(file, {dimension, true});
+}
+
+PointCloud read_positions(const std::filesystem::path& file, int dimension) {
+  return read(file, {dimension, false});
 }
 
 }  // namespace perikit

@@ -12,17 +12,25 @@ namespace perikit {
 
 namespace {
 
+VoronoiCells make_cells(std::size_t n, bool neighbours) {
+  VoronoiCells cells{std::vector<double>(n), std::vector<double>(n), {}};
+  if (neighbours) cells.neighbours.resize(n);
+  return cells;
+}
+
 /// On a line cells end half-way between points.
-VoronoiCells intervals(std::span<const Point> points, double lower, double upper) {
+VoronoiCells intervals(std::span<const Point> points, double lower, double upper, bool neighbours) {
   std::vector<std::size_t> order(points.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, {}, [&](std::size_t n) { return points[n][0]; });
-  VoronoiCells cells{std::vector<double>(points.size()), std::vector<double>(points.size())};
+  VoronoiCells cells = make_cells(points.size(), neighbours);
   double begin = lower;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const double x = points[order[k]][0], end = k + 1 < order.size() ? 0.5 * (x + points[order[k + 1]][0]) : upper;
     cells.size[order[k]] = end - begin;
     cells.reach[order[k]] = std::max(x - begin, end - x);
+    if (neighbours && k > 0) cells.neighbours[order[k]].push_back(static_cast<std::int32_t>(order[k - 1]));
+    if (neighbours && k + 1 < order.size()) cells.neighbours[order[k]].push_back(static_cast<std::int32_t>(order[k + 1]));
     begin = end;
   }
   return cells;
@@ -30,8 +38,9 @@ VoronoiCells intervals(std::span<const Point> points, double lower, double upper
 
 }  // namespace
 
-VoronoiCells voronoi_cells(std::span<const Point> points, int dimension, const Point& lower, const Point& upper) {
-  if (dimension == 1) return intervals(points, lower[0], upper[0]);
+VoronoiCells voronoi_cells(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,
+                           bool neighbours) {
+  if (dimension == 1) return intervals(points, lower[0], upper[0], neighbours);
   const auto d = static_cast<std::size_t>(dimension);
   double box = 1;
   for (std::size_t c = 0; c < d; ++c) box *= upper[c] - lower[c];
@@ -51,7 +60,7 @@ VoronoiCells voronoi_cells(std::span<const Point> points, int dimension, const P
     for (std::size_t c = 0; c < d; ++c) x[c] = (points[n][c] - lower[c]) / unit;
     container.put(static_cast<int>(n), x[0], x[1], x[2]);
   }
-  VoronoiCells cells{std::vector<double>(points.size()), std::vector<double>(points.size())};
+  VoronoiCells cells = make_cells(points.size(), neighbours);
   // One searcher a thread; cells do not depend on which.
   using Searcher = voro::voro_compute<voro::container>;
   std::vector<std::unique_ptr<Searcher>> searchers(static_cast<std::size_t>(thread_count()));
@@ -59,8 +68,9 @@ VoronoiCells voronoi_cells(std::span<const Point> points, int dimension, const P
   const auto layer = static_cast<std::size_t>(boxes[0]);
   parallel_for(static_cast<std::size_t>(boxes[1]) * static_cast<std::size_t>(boxes[2]), [&](std::size_t row) {
     Searcher& searcher = *searchers[static_cast<std::size_t>(thread_index())];
-    voro::voronoicell cell;
+    voro::voronoicell_neighbor cell;
     std::vector<double> corners;
+    std::vector<int> across;
     for (std::size_t i = 0; i < layer; ++i) {
       const int ijk = static_cast<int>(row * layer + i), j = static_cast<int>(row) % boxes[1],
                 k = static_cast<int>(row) / boxes[1];
@@ -76,6 +86,10 @@ VoronoiCells voronoi_cells(std::span<const Point> points, int dimension, const P
           farthest = std::max(farthest, square);
         }
         cells.reach[n] = std::sqrt(farthest) * unit;
+        if (!neighbours) continue;
+        cell.neighbors(across);
+        for (const int other : across)
+          if (other >= 0) cells.neighbours[n].push_back(other);  // sides of the box have negative numbers
       }
     }
   });

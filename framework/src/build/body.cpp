@@ -6,8 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "body/positions_file.hpp"
 #include "build/sets.hpp"
 #include "build/size_check.hpp"
+#include "build/volumes.hpp"
 #include "perikit/body/point_file.hpp"
 
 namespace perikit {
@@ -60,6 +62,9 @@ std::vector<std::int32_t> kept_cells(const LatticeDescription& description, cons
   return kept;
 }
 
+/// Cells of a lattice with less of their volume inside have no point.
+constexpr double least_share = 0.5;
+
 /// The cells as a cloud, moved at random by at most `jitter` spacings along each axis.
 Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std::int32_t>& cells) {
   const LatticeDescription& description = *scene.body.lattice;
@@ -72,8 +77,48 @@ Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std:
       x[static_cast<std::size_t>(a)] += description.jitter * description.spacing * centred(random);
     positions.push_back(x);
   }
-  const double volume = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
-  return Body(frame(scene, description.spacing), positions, std::vector<double>(positions.size(), volume));
+  std::vector<double> volumes(positions.size(), std::pow(description.spacing, scene.body.dimension));
+  if (scene.body.voronoi) {
+    // The box of the cells that there are: jittered points may leave it by no more than half a spacing.
+    Point lower = description.lower, upper = lattice.lower;
+    const std::array<std::int64_t, 3> counts = input_cells(lattice);
+    for (std::size_t c = 0; c < 3; ++c) upper[c] = description.lower[c] + static_cast<double>(counts[c]) * description.spacing;
+    for (const Point& x : positions)
+      for (std::size_t c = 0; c < 3; ++c) {
+        lower[c] = std::min(lower[c], x[c]);
+        upper[c] = std::max(upper[c], x[c]);
+      }
+    volumes = voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr);
+  }
+  for (double& volume : volumes) volume *= scene.body.section;
+  return Body(frame(scene, description.spacing), positions, volumes);
+}
+
+/// The cells of a lattice that lie inside at least in part, as a cloud on its places, with what lies inside as their volumes.
+Body partial_cells(const Scene& scene, const Lattice& lattice) {
+  const LatticeDescription& description = *scene.body.lattice;
+  const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
+  const std::array<std::int64_t, 3> cells = input_cells(lattice);
+  std::vector<Point> positions;
+  std::vector<double> volumes;
+  std::array<std::int64_t, 3> k{};
+  for (k[2] = 0; k[2] < cells[2]; ++k[2])
+    for (k[1] = 0; k[1] < cells[1]; ++k[1])
+      for (k[0] = 0; k[0] < cells[0]; ++k[0]) {
+        std::array<std::int64_t, 3> inner{};
+        for (std::size_t a = 0; a < 3; ++a) inner[a] = k[static_cast<std::size_t>(lattice.axis[a])];
+        const Point x = lattice.position(lattice.index(inner[0], inner[1], inner[2]));
+        const double share = share_inside(*description.inside, x, description.spacing, scene.body.dimension);
+        if (share < least_share) continue;
+        positions.push_back(x);
+        volumes.push_back(share * whole);
+      }
+  if (positions.empty()) {
+    throw InputError(
+        description.position, "body.lattice.inside",
+        "found an expression that keeps no cell of the lattice; allowed: one that is true in a part of one cell or more");
+  }
+  return Body(frame(scene, description.spacing), positions, volumes);
 }
 
 Body lattice_body(const Scene& scene) {
@@ -94,6 +139,10 @@ Body lattice_body(const Scene& scene) {
         description.position, "body.lattice",
         fmt::format("found no room for a point along {}; allowed: upper - lower of half a spacing or more", "xyz"[a]));
   }
+  if (scene.partial_volume) {
+    check_cloud(scene, static_cast<std::size_t>(estimate), ratio);
+    return partial_cells(scene, lattice);
+  }
   std::vector<std::int32_t> kept = kept_cells(description, lattice);
   if (kept.empty()) {
     throw InputError(description.position, "body.lattice.inside",
@@ -109,8 +158,51 @@ Body lattice_body(const Scene& scene) {
   return Body(frame(scene, spacing), lattice, std::move(kept));
 }
 
+/// Points of a file with the volumes of their Voronoi cells.
+PointCloud cells_of_points(const Scene& scene) {
+  const BodyDescription& body = scene.body;
+  PointCloud cloud = read_positions(*body.points_file, body.dimension);
+  Point lower = cloud.position.front(), upper = lower;
+  for (const Point& x : cloud.position)
+    for (std::size_t c = 0; c < 3; ++c) {
+      lower[c] = std::min(lower[c], x[c]);
+      upper[c] = std::max(upper[c], x[c]);
+    }
+  const Point first = lower, last = upper;
+  // The spacing that the points have in the box that is larger than they by half of it.
+  double spacing = 0;
+  for (int step = 0; step < 50; ++step) {
+    double size = 1;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) size *= last[c] - first[c] + spacing;
+    spacing = std::pow(size / static_cast<double>(cloud.position.size()), 1.0 / body.dimension);
+  }
+  for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) {
+    lower[c] = body.points_lower ? (*body.points_lower)[c] : lower[c] - 0.5 * spacing;
+    upper[c] = body.points_upper ? (*body.points_upper)[c] : upper[c] + 0.5 * spacing;
+    if (lower[c] > first[c] || upper[c] < last[c]) {
+      throw InputError(body.volume_position, lower[c] > first[c] ? "body.points.lower" : "body.points.upper",
+                       fmt::format("found {} along {}, with points from {} to {}; allowed: a box that holds all points",
+                                   lower[c] > first[c] ? lower[c] : upper[c], "xyz"[c], first[c], last[c]));
+    }
+  }
+  cloud.volume =
+      voronoi_volumes(cloud.position, body.dimension, lower, upper, body.points_inside ? &*body.points_inside : nullptr);
+  for (std::size_t n = 0; n < cloud.volume.size(); ++n) {
+    if (cloud.volume[n] > 0) continue;
+    const Point& x = cloud.position[n];
+    throw InputError(
+        body.volume_position, "body.points.inside",
+        fmt::format(
+            "found nothing inside around the point at ({:.6g}, {:.6g}, {:.6g}); allowed: points inside, at different places",
+            x[0], x[1], x[2]));
+  }
+  for (double& volume : cloud.volume) volume *= body.section;
+  return cloud;
+}
+
 Body file_body(const Scene& scene) {
-  const PointCloud cloud = read_points(*scene.body.points_file, scene.body.dimension);
+  const PointCloud cloud =
+      scene.body.voronoi ? cells_of_points(scene) : read_points(*scene.body.points_file, scene.body.dimension);
   double total = 0;
   for (const double v : cloud.volume) total += v;
   const double spacing =
@@ -126,7 +218,24 @@ Body file_body(const Scene& scene) {
 
 }  // namespace
 
+/// Refuses keys about volumes that would change nothing.
+void check_volumes(const Scene& scene) {
+  const bool lattice = scene.body.lattice.has_value();
+  if (scene.body.voronoi && lattice && scene.body.lattice->jitter == 0)
+    throw InputError(scene.body.volume_position, "body.lattice.volume",
+                     "found \"voronoi\" on a lattice; allowed: with jitter > 0, or family.partial_volume = true");
+  if (!scene.partial_volume) return;
+  const auto refuse = [&](const char* found, const char* allowed) {
+    throw InputError(scene.partial_volume_position, "family.partial_volume",
+                     fmt::format("found true {}; allowed: {}", found, allowed));
+  };
+  if (!lattice || scene.body.lattice->jitter > 0)
+    refuse("on a cloud", "a lattice without jitter; clouds have volume = \"voronoi\"");
+  if (!scene.body.lattice->inside) refuse("on a lattice that nothing cuts", "with body.lattice.inside");
+}
+
 Body build_body(const Scene& scene) {
+  check_volumes(scene);
   Body body = scene.body.lattice ? lattice_body(scene) : file_body(scene);
   add_sets(scene.sets, body);
   if (scene.regions.empty()) return body;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "perikit/output/recorder.hpp"
@@ -41,6 +43,54 @@ void refuse_twice(const Scene& scene, const Body& body, const Images& images, co
     }
 }
 
+/// The time at which a run ends, where its integrator says so; the load parameter's end in quasi-static runs.
+double end_of(const Scene& scene, bool quasi_static) {
+  const ParameterValues& integrator = scene.integrator->values;
+  return quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
+}
+
+/// Whether two prescriptions say the same of a component at x: at the start, half-way and at the end.
+bool agree(const Prescription& a, const Prescription& b, const Point& x, double end) {
+  if (a.velocity != b.velocity) {
+    const Prescription &moves = a.velocity ? a : b, &stays = a.velocity ? b : a;
+    return !stays.value.varies() && !moves.value.varies() && moves.value(x, 0) == 0;
+  }
+  for (const double t : {0.0, 0.5 * end, end}) {
+    const double u = a.value(x, t), v = b.value(x, t);
+    if (std::abs(u - v) > 1e-12 * std::max(std::abs(u), std::abs(v))) return false;
+  }
+  return true;
+}
+
+/// Boundaries whose sets overlap must agree there.
+void refuse_contradictions(const Scene& scene, const Body& body, const std::vector<Prescription>& prescriptions,
+                           const std::vector<std::size_t>& boundary_of, bool quasi_static) {
+  const double end = end_of(scene, quasi_static);
+  std::vector<std::int32_t> first(body.stride() * static_cast<std::size_t>(body.dimension()), -1);
+  for (std::size_t k = 0; k < prescriptions.size(); ++k)
+    for (const std::int32_t p : prescriptions[k].points) {
+      std::int32_t& other =
+          first[static_cast<std::size_t>(prescriptions[k].component) * body.stride() + static_cast<std::size_t>(p)];
+      if (other < 0) {
+        other = static_cast<std::int32_t>(k);
+        continue;
+      }
+      const Prescription& before = prescriptions[static_cast<std::size_t>(other)];
+      const Point x = body.position(static_cast<std::size_t>(p));
+      if (agree(before, prescriptions[k], x, end)) continue;
+      const std::size_t j = boundary_of[static_cast<std::size_t>(other)], own = boundary_of[k];
+      const auto what = [&](const Prescription& prescription) {
+        return fmt::format("a {} of {:.6g}", prescription.velocity ? "velocity" : "displacement", prescription.value(x, end));
+      };
+      throw InputError(scene.boundaries[own].position, fmt::format("boundary.{}", own),
+                       fmt::format("found {} in {} at the end for the point at ({:.6g}, {:.6g}, {:.6g}), which boundary.{} (line "
+                                   "{}) gives {}; allowed: the same motion, or sets that "
+                                   "do not overlap",
+                                   what(prescriptions[k]), "xyz"[prescriptions[k].component], x[0], x[1], x[2], j,
+                                   scene.boundaries[j].position.line, what(before)));
+    }
+}
+
 }  // namespace
 
 Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions,
@@ -62,6 +112,7 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
     }
   }
   refuse_twice(scene, body, images, prescriptions, boundary_of);
+  refuse_contradictions(scene, body, prescriptions, boundary_of, quasi_static);
   try {
     return Constraints(body, std::move(prescriptions), images, std::move(motions));
   } catch (const std::domain_error& error) {

@@ -57,6 +57,12 @@ void constants_at(const Point& x, const PartValues& part, const Values& values, 
     for (const auto& [key, value] : values)
       if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
     throw InputError(part.values.position(""), part.values.path(), text);
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: {}", part.type, error.what()));
+  } catch (...) {
+    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: it threw something that is no std::exception", part.type));
   }
 }
 

@@ -9,6 +9,7 @@
 #include "build/damage.hpp"
 #include "build/image_planes.hpp"
 #include "build/materials.hpp"
+#include "build/questionable.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
@@ -82,8 +83,10 @@ std::shared_ptr<const Stabilization> build_stabilization(const Scene& scene, con
 
 std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& factory, const Body& body, const Formulation& formulation) {
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
+  const std::shared_ptr<const InfluenceFunction> influence = factory.influence(*scene.influence);
+  if (needs.influence) refuse_no_influence(scene, *influence);
   try {
-    return Families::make(body, factory.influence(*scene.influence), needs);
+    return Families::make(body, influence, needs);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
   }
@@ -99,12 +102,17 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
   if (parts.body->lattice())
     refuse("on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0");
   if (parts.partition) refuse("with several ranks", "one rank");
-  if (!formulation.bond && !(formulation.weighted && formulation.parts(parts.body->dimension()) != 1))
-    refuse(fmt::format("with kinematics \"{}\", which has no weights to choose", scene.kinematics->type),
-           "kinematics with evaluation points at bonds or parts of families");
+  const auto of = [&](const char* what) { return fmt::format("with kinematics \"{}\"{}", scene.kinematics->type, what); };
+  if (formulation.pairs)
+    refuse(of(", a pair law, which has neither weights nor gradients to choose"), "kinematics with gradients");
   if (formulation.force_state == ForceState::local)
     refuse("with force_state = \"local\", whose forces are not -dE/du", "force_state = \"variational\"");
-  if (formulation.selective()) refuse("with kinematics \"selective\"", "false");
+  const bool moves_gradients = formulation.point || formulation.selective();
+  if (moves_gradients && formulation.order > 1) refuse(of(" of order 2 or more"), "order = 1");
+  if (formulation.selective() && formulation.weighted)
+    refuse(of(" over this base"), "a base with a point gradient in its bonds: baqp, projection, bond_augmented");
+  if (formulation.weighted && formulation.parts(parts.body->dimension()) == 1)
+    refuse(of(" and one part"), "several parts, or kinematics \"conventional\"");
   auto consistency = std::make_shared<CloudConsistency>();
   if (const ImageMap* images = parts.images.get()) {
     consistency->extend = [images](FieldView u) { images->extend(u); };
@@ -160,6 +168,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, partition, constraints, quasi_static, state);
+  parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};

@@ -12,6 +12,10 @@ namespace perikit {
 
 class Fingerprint {
  public:
+  Fingerprint() noexcept = default;
+  /// Goes on from the value of another.
+  explicit Fingerprint(std::uint64_t value) noexcept : hash_(value) {}
+  std::uint64_t value() const noexcept { return hash_; }
   void add(std::span<const std::byte> bytes) noexcept {
     for (const std::byte b : bytes) hash_ = (hash_ ^ static_cast<std::uint64_t>(b)) * 0x100000001b3u;
   }

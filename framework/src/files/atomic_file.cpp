@@ -44,7 +44,17 @@ void throw_system_error(const std::filesystem::path& file, const std::string& ac
 }
 
 std::filesystem::path temporary_name(const std::filesystem::path& file) {
-  return file.parent_path() / fmt::format(".{}.part", file.filename().string());
+  return file.parent_path() / fmt::format(".{}.{}.part", file.filename().string(), ::getpid());
+}
+
+std::string file_of_temporary(const std::string& name) {
+  const std::string end = ".part";
+  if (!name.starts_with('.') || !name.ends_with(end)) return {};
+  const std::string middle = name.substr(1, name.size() - 1 - end.size());
+  const std::size_t dot = middle.rfind('.');
+  const bool numbered =
+      dot != std::string::npos && dot + 1 < middle.size() && middle.find_first_not_of("0123456789", dot + 1) == std::string::npos;
+  return numbered ? middle.substr(0, dot) : std::string();
 }
 
 int write_all(int descriptor, std::span<const std::byte> bytes) noexcept {
@@ -64,7 +74,10 @@ void store_atomically(const std::filesystem::path& file, std::span<const std::by
     ::unlink(temporary.c_str());
     throw_system_error(file, "cannot write", code);
   };
-  Descriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  // Never through a link, nor into a file that is there: one of this name is left from a process of the same number.
+  const auto open_new = [&] { return ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666); };
+  Descriptor descriptor(open_new());
+  if (!descriptor && errno == EEXIST && ::unlink(temporary.c_str()) == 0) descriptor = Descriptor(open_new());
   if (!descriptor) throw_system_error(file, "cannot write", errno);
   for (const auto part : {bytes, more})
     if (const int code = write_all(descriptor.get(), part)) give_up(code);

@@ -8,7 +8,8 @@
 
 namespace perikit {
 
-/// Replaces `file` by `bytes`, then `more`. Throws RunError with the file's name and the system's reason; an earlier `file` is then untouched.
+/// Replaces `file` by `bytes`, then `more`. Throws RunError with the file's name and the system's reason; an earlier `file` is
+/// then untouched.
 void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more = {});
 
 /// Creates a folder with those above it; removes a file if it is there. Throw RunError.
@@ -18,8 +19,10 @@ void remove_file(const std::filesystem::path& file);
 /// The whole file; empty where it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 
-/// The name under which `file` is written before it is renamed.
+/// The name under which this process writes `file` before it renames it.
 std::filesystem::path temporary_name(const std::filesystem::path& file);
+/// The name of the file that a file of this name is the temporary of, of whatever process; empty where it is none.
+std::string file_of_temporary(const std::string& name);
 
 /// RunError "FILE: ACTION: reason of the system's error code".
 [[noreturn]] void throw_system_error(const std::filesystem::path& file, const std::string& action, int code);

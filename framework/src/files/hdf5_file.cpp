@@ -36,11 +36,19 @@ Handle utf8_type(const std::string& what) {
   return type;
 }
 
+/// Properties of a new object that holds no times: equal contents are equal bytes.
+Handle timeless(hid_t kind, const std::string& what) {
+  Handle properties = checked(H5Pcreate(kind), H5Pclose, what);
+  check(H5Pset_obj_track_times(properties.get(), false), what);
+  return properties;
+}
+
 void write_dataset(hid_t file, const std::string& path, hid_t file_type, hid_t memory_type, const void* data,
                    const std::vector<hsize_t>& shape) {
   const Handle space = checked(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, path);
+  const Handle properties = timeless(H5P_DATASET_CREATE, path);
   const Handle dataset =
-      checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose, path);
+      checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose, path);
   check(H5Dwrite(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), path);
 }
 
@@ -75,7 +83,8 @@ Image::Image() {
   // HDF5 takes two open files in memory of equal name for the same one.
   static std::atomic<unsigned long> count = 0;
   const std::string name = fmt::format("perikit image {}", count++);
-  file_ = checked(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access_.get()), H5Fclose, "a file in memory");
+  const Handle properties = timeless(H5P_FILE_CREATE, "a file in memory");
+  file_ = checked(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, properties.get(), access_.get()), H5Fclose, "a file in memory");
 }
 
 void Image::dataset(const std::string& path, std::span<const double> values, int width) {
@@ -93,7 +102,8 @@ void Image::dataset(const std::string& path, std::span<const std::byte> values) 
 }
 
 void Image::group(const std::string& path) {
-  checked(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose, path);
+  const Handle properties = timeless(H5P_GROUP_CREATE, path);
+  checked(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose, path);
 }
 
 void Image::attribute(const std::string& name, double value) {

@@ -12,8 +12,14 @@ namespace {
   throw std::domain_error(fmt::format("found {} = {}; allowed: {}", name, value, allowed));
 }
 
+/// Below and beyond, squares and products of moduli are no numbers any more.
+constexpr double least = 1e-100, most = 1e100;
+/// Of 1 - 2 nu, and of what else is a small difference of given numbers: with less, rounding decides the bulk modulus.
+constexpr double smallest_difference = 1e-12;
+
 double positive(std::string_view name, double value) {
   if (!(value > 0)) refuse(name, value, "a value > 0");
+  if (value < least || value > most) refuse(name, value, fmt::format("a value between {} and {}", least, most));
   return value;
 }
 
@@ -57,8 +63,13 @@ Moduli elastic_constants(const MaterialInput& input) {
   const auto [E, nu, mu, bulk, lambda] = value;
   if (has[0]) positive(names[0], E);
   if (has[1] && !(nu > -1 && nu < 0.5)) refuse(names[1], nu, "a value > -1 and < 0.5");
+  if (has[1] && 1 - 2 * nu < smallest_difference)
+    refuse(names[1], nu, fmt::format("a value below 0.5 by more than {}: closer to it, rounding decides the bulk modulus; give the bulk modulus itself", smallest_difference / 2));
+  if (has[0] && has[2] && E != 3 * mu && std::abs(3 * mu - E) < smallest_difference * mu)
+    refuse(names[0], E, fmt::format("a value that differs from three times the shear modulus by more than {} of it: closer, rounding decides the bulk modulus", smallest_difference));
   if (has[2]) positive(names[2], mu);
   if (has[3]) positive(names[3], bulk);
+  if (has[4] && std::abs(lambda) > most) refuse(names[4], lambda, fmt::format("a magnitude of at most {}", most));
 
   Moduli m;
   if (has[0] && has[1])

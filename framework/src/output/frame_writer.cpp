@@ -26,7 +26,7 @@ void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
   for (const fs::directory_entry& entry : entries) {
     const std::string name = entry.path().filename().string();
     const bool frame = entry.path().extension() == ".h5" && frame_index(entry.path().stem().string()) >= first_frame;
-    if (frame || (name.starts_with('.') && name.ends_with(".h5.part"))) stale.push_back(entry.path());
+    if (frame || file_of_temporary(name).ends_with(".h5")) stale.push_back(entry.path());
   }
   for (const fs::path& file : stale) remove_file(file);
 }
@@ -104,7 +104,6 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
   self.points = reference.volume.size();
   make_folder(self.folder);
   make_folder(self.folder / "frames");
-  for (const char* name : {"results.h5", "reference.h5", "results.xdmf"}) remove_file(temporary_name(self.folder / name));
 
   write_run_attributes(self.results, self.run);
   self.results.external_link("/reference", "reference.h5");

@@ -11,9 +11,12 @@
 #include <array>
 #include <cerrno>
 #include <boost/dll/shared_library.hpp>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <fstream>
+#include <optional>
+#include <thread>
 #include <vector>
 
 #include "perikit/plugin/abi.hpp"
@@ -56,6 +59,26 @@ dll::shared_library load(const fs::path& file) try {
 /// Exit status of a child that came to its own end; a library that calls exit() leaves another one.
 constexpr int probe_ended = 90;
 
+constexpr std::chrono::seconds registration_limit{10};   // it only declares what is there
+
+/// Waits for a child, no longer than the limit. A child that has stopped itself is not waited for. Returns its status; nothing where it
+/// had to be killed.
+std::optional<int> wait_for(pid_t child) {
+  const auto end = std::chrono::steady_clock::now() + registration_limit;
+  for (auto pause = std::chrono::milliseconds(1);; pause = std::min(2 * pause, std::chrono::milliseconds(50))) {
+    int status = 0;
+    const pid_t changed = ::waitpid(child, &status, WNOHANG | WUNTRACED);
+    if (changed < 0 && errno != EINTR) throw Refusal(fmt::format("the process that tries it cannot be watched: {}", std::strerror(errno)));
+    if (changed == child && !WIFSTOPPED(status)) return status;
+    if (changed == child || std::chrono::steady_clock::now() > end) {
+      ::kill(child, SIGKILL);
+      while (::waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
+      return std::nullopt;
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
 /// noexcept: nothing may unwind into the parent's stack frames.
 [[noreturn]] void probe_in_child(const fs::path& file) noexcept {
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) std::signal(signal, SIG_DFL);
@@ -64,7 +87,6 @@ constexpr int probe_ended = 90;
   const int silence = ::open("/dev/null", O_WRONLY);
   dup2(silence, STDOUT_FILENO);
   dup2(silence, STDERR_FILENO);
-  alarm(30);  // [s]: a library that never returns from its registration
   try {
     PartCollector collector([](Kind, std::string_view) { return fs::path(); });
     load_library(file, collector);
@@ -125,11 +147,9 @@ void probe_library(const fs::path& file) {
   const pid_t child = fork();
   if (child == 0) probe_in_child(file);
   if (child < 0) throw Refusal(fmt::format("no process to try it in: {}", std::strerror(errno)));
-  int status = 0;
-  pid_t ended = -1;
-  while ((ended = waitpid(child, &status, 0)) < 0 && errno == EINTR) {
-  }
-  if (ended != child) throw Refusal(fmt::format("the process that tries it cannot be watched: {}", std::strerror(errno)));
+  const std::optional<int> ended = wait_for(child);
+  if (!ended) throw Refusal(fmt::format("its registration does not come to an end (within {} s), or stops the process", registration_limit.count()));
+  const int status = *ended;
   if (WIFSIGNALED(status)) throw Refusal(fmt::format("it kills the process that loads it ({})", strsignal(WTERMSIG(status))));
   if (WEXITSTATUS(status) != probe_ended) {
     throw Refusal(fmt::format("it ends the process that loads it (exit status {})", WEXITSTATUS(status)));

@@ -12,6 +12,8 @@
 #include <toml++/toml.h>
 
 #include "core/fingerprint.hpp"
+#include "files/atomic_file.hpp"
+#include "files/toml_limits.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "plugin/registrar.hpp"
 
@@ -62,7 +64,7 @@ NamedPart read_part(const toml::table& table, const fs::path& file) {
 }
 
 /// A name beside a file that no other process or thread uses.
-fs::path temporary_name(const fs::path& file) {
+fs::path unused_name(const fs::path& file) {
   static std::atomic<unsigned> count{0};
   return fmt::format("{}.{}.{}.{:08x}.new", file.string(), getpid(), count++, std::random_device{}());
 }
@@ -81,8 +83,11 @@ fs::path manifest_path(const fs::path& library) { return fs::path(library).repla
 Manifest read_manifest(const fs::path& file) try {
   std::error_code unreadable;
   if (!fs::is_regular_file(file, unreadable)) throw InputError({file.string()}, "", "not a regular file");
-  if (fs::file_size(file, unreadable) > largest_manifest || unreadable) throw InputError({file.string()}, "", "too large for a manifest");
-  const toml::table table = toml::parse_file(file.string());
+  if (fs::file_size(file, unreadable) > largest_manifest || unreadable)
+    throw InputError({file.string()}, "", "too large for a manifest");
+  const std::string text = read_text(file);
+  check_toml_limits(text, file.string(), largest_manifest);
+  const toml::table table = toml::parse(std::string_view(text), std::string_view(file.string()));
   if (const auto format = required<std::int64_t>(table, "format", file); format != manifest_format) {
     throw InputError({file.string()}, "format", fmt::format("{}; this program reads {}", format, manifest_format));
   }
@@ -121,7 +126,7 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
                           {"checksum", checksum(library)},
                           {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
-  const fs::path temporary = temporary_name(file);
+  const fs::path temporary = unused_name(file);
   std::ofstream out(temporary);
   out << table << '\n';
   out.close();

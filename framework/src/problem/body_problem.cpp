@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
@@ -10,6 +11,7 @@
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
+#include "problem/weak_springs.hpp"
 
 namespace perikit {
 
@@ -77,6 +79,12 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
                                      terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
                                      status.description, parts_.kinematics, parts_.materials[id]);
   }
+  if (weak_springs_ && status.ok()) {
+    if (weak_springs_->hold())
+      weak_springs_->add_forces(u, force, energy);
+    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok())
+      return refused;
+  }
   finish(force, status);
   return status;
 }
@@ -111,6 +119,7 @@ EvaluationStatus BodyProblem::add_load_stiffness(ConstFieldView u, double t, Con
 
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
   EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
+  if (weak_springs_ && weak_springs_->hold() && status.ok()) weak_springs_->add_tangent(w, Kw);
   finish(Kw, status);
   return status;
 }
@@ -120,6 +129,7 @@ EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K)
   EvaluationStatus status;
   over_own(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(seen(u, seen_), of_terms); });
   if (status.ok()) hold_loose_points(terms().changed_bonds(), K);
+  if (status.ok() && weak_springs_ && weak_springs_->hold()) weak_springs_->add_to(K);
   return status;
 }
 
@@ -154,6 +164,7 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
   const bool changed =
       parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
   if (changed && explicit_step) react(reaction, velocity);
+  if (changed && weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
   return changed;
 }
 
@@ -182,6 +193,17 @@ void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 
+std::string BodyProblem::watch_pieces(double weak_springs) {
+  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
+  weak_springs_->find(seen(state().displacement(), seen_), true);
+  const std::vector<LoosePiece>& pieces = weak_springs_->pieces();
+  if (pieces.empty()) return {};
+  const std::string first = pieces.front().name(body());
+  return pieces.size() == 1
+             ? first
+             : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+}
+
 std::vector<std::byte> BodyProblem::bonds() const {
   ByteWriter out;
   if (parts_.fracture.damage()) parts_.fracture.write(terms(), out);
@@ -191,6 +213,7 @@ std::vector<std::byte> BodyProblem::bonds() const {
 void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   ByteReader in(bonds);
   parts_.fracture.read(terms(), in);
+  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
 }
 
 std::vector<std::byte> BodyProblem::snapshot() const {
@@ -214,6 +237,46 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   terms().history_restored();
   state().read(in);
   if (!in.done()) throw InputError("the saved state is damaged");
+  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
+}
+
+namespace {
+
+/// The beginning of a snapshot, up to the state.
+struct BeforeState {
+  std::uint64_t stride = 0;
+  std::vector<BondChange> bonds;
+  std::vector<double> history;
+
+  explicit BeforeState(std::span<const std::byte> snapshot) {
+    ByteReader in(snapshot);
+    stride = in.value<std::uint64_t>();
+    in.value<double>();  // of the constraints
+    FractureRecord::read_bonds(in, bonds);
+    history.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
+    in.bytes(history.data(), history.size() * sizeof(double));
+  }
+};
+
+}  // namespace
+
+BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot) {
+  const BeforeState before(snapshot);
+  return {before.bonds.size(), before.history.size()};
+}
+
+void BodyProblem::carry(std::span<const std::byte> snapshot) {
+  const BeforeState before(snapshot);
+  const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
+  if (before.stride != body().stride()) throw InputError("the earlier run had another body");
+  if (before.history.size() != history.size()) throw InputError("the earlier run had other laws");
+  std::vector<BondChange> lost;  // of the bonds that cracks of this scene leave
+  std::ranges::copy_if(before.bonds, std::back_inserter(lost),
+                       [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
+  if (!lost.empty()) terms().restore_bonds(lost);
+  if (history.empty()) return;
+  std::ranges::copy(before.history, history.begin());
+  terms().history_restored();
 }
 
 std::size_t BodyProblem::bytes() const noexcept {

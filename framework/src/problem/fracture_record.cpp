@@ -48,6 +48,18 @@ void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   }
 }
 
+void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
+  in.value<std::int64_t>();  // updates that gained energy, and what they gained
+  in.value<double>();
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    BondChange b;
+    b.bond.point = in.value<std::int32_t>();
+    b.bond.far = in.value<std::int32_t>();
+    b.integrity = in.value<double>();
+    bonds.push_back(b);
+  }
+}
+
 void FractureRecord::read(Terms& terms, ByteReader& in) {
   gains_ = in.value<std::int64_t>();
   gained_ = in.value<double>();

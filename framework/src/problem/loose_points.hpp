@@ -10,4 +10,7 @@ namespace perikit {
 /// holds stay where they are. K: [N/m], with all points at the ends of `changed` among its rows.
 void hold_loose_points(std::span<const BondChange> changed, BlockMatrix& K);
 
+/// The block of a row on the diagonal.
+double* diagonal_block(BlockMatrix& K, std::size_t row);
+
 }  // namespace perikit

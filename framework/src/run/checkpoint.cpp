@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstring>
 #include <iterator>
 #include <set>
 #include <sstream>
@@ -82,7 +83,12 @@ void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   image.attribute("next_time", checkpoint.output.next_time);
   image.attribute("steps_expected", checkpoint.output.steps_expected);
   image.attribute("end_time", checkpoint.output.end_time);
-  image.attribute("initial_energy", checkpoint.output.initial_energy);
+  image.attribute("initial_energy", checkpoint.output.energies.initial);
+  image.attribute("largest_energy", checkpoint.output.energies.largest);
+  image.attribute("energy_imbalance", checkpoint.output.energies.off);
+  image.attribute("frame_spacing", checkpoint.output.frame_spacing);
+  image.attribute("history_fingerprint", checkpoint.output.history_fingerprint);
+  image.dataset("frame_fingerprints", std::as_bytes(std::span(checkpoint.output.frame_fingerprints)));
   image.dataset("state", checkpoint.state);
   store_sealed(checkpoint_file(folder), image.bytes());
 }
@@ -106,25 +112,34 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.output.next_time = source.integer("/", "next_time");
   checkpoint.output.steps_expected = source.integer("/", "steps_expected");
   checkpoint.output.end_time = source.real("/", "end_time");
-  checkpoint.output.initial_energy = source.real("/", "initial_energy");
+  checkpoint.output.energies = {source.real("/", "initial_energy"), source.real("/", "largest_energy"),
+                                source.real("/", "energy_imbalance")};
+  checkpoint.output.frame_spacing = source.real("/", "frame_spacing");
+  checkpoint.output.history_fingerprint = source.integer("/", "history_fingerprint");
+  const std::vector<std::byte> frames = source.read_bytes("frame_fingerprints");
+  checkpoint.output.frame_fingerprints.resize(frames.size() / sizeof(std::int64_t));
+  std::memcpy(checkpoint.output.frame_fingerprints.data(), frames.data(), checkpoint.output.frame_fingerprints.size() * sizeof(std::int64_t));
   checkpoint.state = source.read_bytes("state");
   return checkpoint;
 }
 
-void check_same_scene(const std::string& before, const Scene& scene, const fs::path& folder) {
-  if (before == scene.resolved) return;
+bool check_same_scene(const std::string& before, const Scene& scene, const fs::path& folder, bool may_lengthen) {
+  if (before == scene.resolved) return false;
+  const std::vector<std::string> differences = scene_differences(before, scene.resolved);
+  const auto of_length = [](const std::string& difference) { return difference.starts_with("integrator.end_time: ") || difference.starts_with("integrator.steps: "); };
+  if (may_lengthen && std::ranges::all_of(differences, of_length)) return true;
   throw InputError({scene.file.string()}, "",
-                   fmt::format("found another scene than the run in {} had, which cannot be continued with it; they differ in\n  {}",
-                               folder.string(), fmt::join(scene_differences(before, scene.resolved), "\n  ")));
+                   fmt::format("found another scene than the run in {} had, which cannot be continued with it{}; they differ in\n  {}", folder.string(),
+                               may_lengthen ? "; allowed: another integrator.end_time or integrator.steps, and nothing else" : "", fmt::join(differences, "\n  ")));
 }
 
-void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
+bool check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
                       const fs::path& folder) {
   const auto refuse = [&](const std::string& message) { throw InputError({checkpoint_file(folder).string()}, "", message); };
   if (checkpoint.perikit_version != PERIKIT_VERSION) {
     refuse(fmt::format("found a checkpoint of perikit {}; this is {}, which need not give the same bits", checkpoint.perikit_version, PERIKIT_VERSION));
   }
-  check_same_scene(checkpoint.scene, scene, folder);
+  const bool lengthened = check_same_scene(checkpoint.scene, scene, folder, true);
   if (checkpoint.body != body) refuse("found the checkpoint of another body: the files that the scene reads have changed");
   // Runs of a study keep no list.
   const auto others = other_libraries(checkpoint.libraries, libraries);
@@ -133,6 +148,7 @@ void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const st
         "found libraries that are not those that the run began with: {}; allowed: the same files, or a run without --resume",
         fmt::join(others, ", ")));
   }
+  return lengthened;
 }
 
 }  // namespace perikit

@@ -29,11 +29,13 @@ void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& che
 /// Throws InputError where it cannot be read, or is not byte for byte what was written.
 Checkpoint read_checkpoint(const std::filesystem::path& folder);
 
-/// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body, version and libraries.
-void check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
+/// Throws InputError saying what differs where `checkpoint` does not belong to this scene, body, version and libraries. True where the scene
+/// has another end of the run, and no other difference.
+bool check_checkpoint(const Checkpoint& checkpoint, const Scene& scene, const std::string& body, const std::string& libraries,
                       const std::filesystem::path& folder);
 
-/// Throws InputError naming the keys where the scene of an earlier run in `folder` was another.
-void check_same_scene(const std::string& before, const Scene& scene, const std::filesystem::path& folder);
+/// Throws InputError naming the keys where the scene of an earlier run in `folder` was another. may_lengthen: end and steps of the
+/// integrator may differ; true where they do.
+bool check_same_scene(const std::string& before, const Scene& scene, const std::filesystem::path& folder, bool may_lengthen = false);
 
 }  // namespace perikit

@@ -3,21 +3,12 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "perikit/run/simulation.hpp"
 
 namespace perikit {
 
 namespace {
-
-/// What strain and kinetic energy and dissipation lack of the initial energy and the work of boundaries and loads, over the
-/// largest of them.
-double imbalance(const Energies& e, double initial) {
-  const double scale =
-      std::max({std::abs(e.strain), std::abs(e.kinetic), std::abs(e.external_work), std::abs(e.dissipated), std::abs(initial)});
-  return scale > 0 ? std::abs(e.strain + e.kinetic + e.dissipated - e.external_work - initial) / scale : 0.0;
-}
 
 double peak_bytes() {
   rusage usage{};
@@ -54,16 +45,12 @@ std::string RunRecorder::closing(double set_up) const {
   const Energies& e = problem.state().energies;
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, e.external_work);
-  if (problem.state().step > 0) text += fmt::format("; balance off by {:.2g} of the largest", imbalance(e, done_.initial_energy));
+  if (EnergyBalance last{.initial = done_.energies.initial}; problem.state().step > 0) {
+    last.add(e);
+    text += fmt::format("; balance off by {:.2g} of the largest", last.share());
+  }
   std::vector<std::string> warnings = warnings_;
-  // What failing bonds do to the balance is the scheme's doing, not the scene's.
-  constexpr double most = 0.02;
-  const double off = imbalance(e, done_.initial_energy);
-  if (problem.state().step > 0 && problem.terms().bond_checks().failed > 0 && !(off <= most))
-    warnings.push_back(fmt::format(
-        "bonds failed, and the energy balance is off by {:.2g} of the largest energy: compare with smaller steps, and see "
-        "which kinematics create energy in fracture.md",
-        off));
+  if (const std::string warning = energy_warning(); !warning.empty()) warnings.push_back(warning);
   text += fmt::format("\nwarnings      {}\n",
                       warnings.empty() ? "none" : fmt::format("{}\n  {}", warnings.size(), fmt::join(warnings, "\n  ")));
   text += fmt::format("results       {} frames in {}", frames(), folder_.string());

@@ -9,11 +9,15 @@
 #include <iterator>
 #include <sstream>
 
+#include "core/fingerprint.hpp"
 #include "files/atomic_file.hpp"
-#include "perikit/problem/motion.hpp"
+#include "output/history_file.hpp"
+#include "output/result_file.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/checkpoint.hpp"
 #include "run/reduction.hpp"
+#include "run/run_folder.hpp"
 
 namespace perikit {
 
@@ -27,26 +31,17 @@ bool reached(double time, double wanted) {
   return time >= wanted - 1e-9 * std::abs(wanted);
 }
 
-bool ended(const OutputProgress& run, std::int64_t step, double time) {
-  return (run.steps_expected > 0 && step >= run.steps_expected) || (run.end_time > 0 && time >= run.end_time * (1 - 1e-12));
+std::int64_t file_fingerprint(const std::filesystem::path& file) {
+  const std::string bytes = read_text(file);
+  Fingerprint fingerprint;
+  fingerprint.add(std::as_bytes(std::span(bytes)));
+  return static_cast<std::int64_t>(fingerprint.value());
 }
 
-/// What a run that does not go on does to the one whose results the folder holds; empty where it holds none.
-std::string earlier_run(const std::filesystem::path& folder) {
-  if (!std::filesystem::exists(folder / "scene.toml")) return {};
-  if (std::filesystem::exists(checkpoint_file(folder))) {
-    try {
-      const Checkpoint checkpoint = read_checkpoint(folder);
-      if (!ended(checkpoint.output, checkpoint.step, checkpoint.time)) {
-        return fmt::format(
-            "warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have "
-            "gone on with it",
-            folder.string(), checkpoint.step, checkpoint.time);
-      }
-    } catch (const InputError&) {  // nothing that could be gone on with
-    }
-  }
-  return fmt::format("replaces the results of an earlier run in {}", folder.string());
+std::int64_t with_row(std::int64_t before, std::span<const double> row) {
+  Fingerprint fingerprint = before == 0 ? Fingerprint() : Fingerprint(static_cast<std::uint64_t>(before));
+  fingerprint.add(row);
+  return static_cast<std::int64_t>(fingerprint.value());
 }
 
 ReferenceData reference_of(const BodyProblem& problem) {
@@ -87,7 +82,7 @@ std::vector<std::string> history_columns(const Scene& scene) {
 }
 
 RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start,
-                         std::string libraries)
+                         std::string libraries, bool force)
     : simulation_(simulation),
       folder_(std::move(folder)),
       show_progress_(show_progress),
@@ -108,8 +103,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   columns_ = perikit::history_columns(scene);
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
-  make_folder(folder_);
-  remove_file(temporary_name(checkpoint_file(folder_)));  // of a run that was killed
+  output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
   if (earlier)
     start_from_checkpoint();
@@ -123,37 +117,80 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
 void RunRecorder::start_fresh(RunStart start) {
   const Scene& scene = simulation_.scene();
   // Without a checkpoint the earlier run came to none; of the same scene it begins again, any other keeps its results.
-  if (start == RunStart::resume && std::filesystem::exists(folder_ / "scene.toml"))
-    check_same_scene(read_text(folder_ / "scene.toml"), scene, folder_);
-  std::error_code missing;
-  if (std::filesystem::equivalent(scene.file, folder_ / "scene.toml", missing) && read_text(scene.file) != scene.resolved) {
-    throw InputError({scene.file.string()}, "output",
-                     fmt::format("found {}, the folder of the scene itself, whose scene.toml the resolved scene would replace; "
-                                 "allowed: another folder (-o)",
-                                 folder_.string()));
-  }
+  if (const auto before = read_marked(folder_ / "scene.toml"); start == RunStart::resume && before)
+    check_same_scene(before->text, scene, folder_);
   const std::string replaced = start == RunStart::fresh ? earlier_run(folder_) : std::string();
   // Before any other file: no checkpoint may stand beside the frames of another run.
   remove_file(checkpoint_file(folder_));
   if (!replaced.empty()) {
     log(replaced);
-    if (show_progress_) fmt::print(stderr, "{}\n", replaced);
+    if (show_progress_) tell(replaced + '\n');
   }
-  write_file_atomically(folder_ / "scene.toml", scene.resolved);
+  output_->mark(scene.resolved);
 }
 
 void RunRecorder::start_from_checkpoint() {
   const Checkpoint checkpoint = read_checkpoint(folder_);
-  check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+  const bool lengthened = check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
   try {
     simulation_.problem().restore(checkpoint.state);
   } catch (const InputError& error) {
     throw InputError({checkpoint_file(folder_).string()}, "state", error.what());
   }
   done_ = checkpoint.output;
+  if (lengthened) check_longer();
+  check_kept_files();
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
   log_text_ = read_text(folder_ / "run.log");
+  if (const auto marked = read_marked(folder_ / "scene.toml"); !marked || marked->text != simulation_.scene().resolved)
+    output_->mark(simulation_.scene().resolved);
+}
+
+void RunRecorder::check_longer() const {
+  State& state = simulation_.problem().state();
+  const ParameterValues& values = simulation_.scene().integrator->values;
+  const std::string& type = simulation_.scene().integrator->type;
+  // What an integrator plans for is in its state where it can plan anew.
+  if (state.declare_numbers("planned_end", 1)[0] == 0)
+    throw InputError(values.position("type"), "integrator",
+                     fmt::format("found another end than the run in {} had, and {} cannot plan anew; allowed: the same end",
+                                 folder_.string(), type));
+  if (simulation_.dynamic() && values.has("end_time") && values.number("end_time") < state.time)
+    throw values.error("end_time", fmt::format("found {} s, but the run in {} has come to {:.6g} s; allowed: a later end",
+                                               values.number("end_time"), folder_.string(), state.time));
+  if (!simulation_.dynamic() && state.time >= 1)
+    throw values.error(
+        "steps",
+        fmt::format("found a run in {} that has come to its end, load parameter 1; allowed: other steps where it has not",
+                    folder_.string()));
+}
+
+void RunRecorder::check_kept_files() const {
+  const auto refuse = [](const std::filesystem::path& file) {
+    throw InputError({file.string()}, "",
+                     "found other contents than the run wrote before its checkpoint; allowed: the files as they were, or a run "
+                     "without --resume");
+  };
+  for (std::size_t k = 0; k < done_.frame_fingerprints.size(); ++k)
+    if (const auto file = frame_file(static_cast<std::int64_t>(k)); file_fingerprint(file) != done_.frame_fingerprints[k])
+      refuse(file);
+  if (done_.history_rows == 0) return;
+  const std::filesystem::path file = folder_ / "history.csv";
+  const History history = read_history(file);
+  std::int64_t fingerprint = 0;
+  std::vector<double> row(history.columns.size());
+  const auto rows = static_cast<std::size_t>(done_.history_rows);
+  if (history.values.empty() || history.values.front().size() < rows) refuse(file);
+  for (std::size_t k = 0; k < rows; ++k) {
+    for (std::size_t c = 0; c < row.size(); ++c) row[c] = history.values[c][k];
+    fingerprint = with_row(fingerprint, row);
+  }
+  if (fingerprint != done_.history_fingerprint) refuse(file);
+}
+
+std::filesystem::path RunRecorder::frame_file(std::int64_t index) const {
+  return folder_ / "frames" / (frame_name(index) + ".h5");
 }
 
 RunRecorder::~RunRecorder() {
@@ -184,8 +221,7 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
   if (output.every) return step % *output.every == 0 || last(step, time);
   if (step == 0) return true;
   if (done_.end_time <= 0) return true;
-  const auto frames = static_cast<double>(output.frames.value_or(default_frames));
-  return time >= static_cast<double>(done_.frames) * done_.end_time / frames * (1 - 1e-9) || last(step, time);
+  return time >= static_cast<double>(done_.frames) * done_.frame_spacing * (1 - 1e-9) || last(step, time);
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
@@ -209,6 +245,8 @@ void RunRecorder::step_done(const StepReport& report) {
   if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
+  if (done_.frame_spacing == 0)
+    done_.frame_spacing = report.end_time / static_cast<double>(simulation_.scene().output.frames.value_or(default_frames));
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
     done_.history_every = asked > 0               ? asked
@@ -219,8 +257,10 @@ void RunRecorder::step_done(const StepReport& report) {
   const auto before = std::chrono::steady_clock::now();
   // What only the stop asks for is written but not counted: the run that goes on writes what the run without a stop had written.
   const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
-  if (row || stopping_) write_history(report);
+  if (row || frame || stopping_) watch_energies(report, row || frame);
+  if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
+  if (frame) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
   done_.history_rows += row;
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) &&
@@ -230,8 +270,6 @@ void RunRecorder::step_done(const StepReport& report) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
   }
-  if (report.step == 0)
-    done_.initial_energy = simulation_.problem().state().energies.strain + simulation_.problem().state().energies.kinetic;
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   if (simulation_.quasi_static()) last_step_ = {report, simulation_.problem().snapshot(), row || stopping_, frame || stopping_};
   output_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
@@ -246,7 +284,7 @@ void RunRecorder::stopped_within_step() {
   stopping_ = true;
   simulation_.problem().restore(last_step_.state);
   fields_.renew();
-  if (!last_step_.row) write_history(last_step_.report);
+  if (!last_step_.row) write_history(last_step_.report, false);
   if (!last_step_.frame) write_frame(last_step_.report);
   keep_checkpoint(last_step_.report);
   log(fmt::format("stopped within step {}, which was given up", last_step_.report.step + 1));
@@ -268,15 +306,22 @@ void RunRecorder::keep_checkpoint(const StepReport& report) {
 
 void RunRecorder::write_frame(const StepReport& report) {
   std::vector<OutputField> fields;
-  for (const std::string& name : frame_fields_) fields.push_back(fields_.get(name));
+  for (const std::string& name : frame_fields_) {
+    fields.push_back(fields_.get(name));
+    const std::vector<double>& values = fields.back().data;
+    const auto strange = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
+    if (strange == values.end() || !strange_fields_.insert(name).second) continue;
+    log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name,
+                    (strange - values.begin()) / fields.back().width,
+                    name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
+  }
   writer_->write(report.time, report.step, fields);
   ++frames_written_;
 }
 
-void RunRecorder::write_history(const StepReport& report) {
+void RunRecorder::write_history(const StepReport& report, bool counts) {
   BodyProblem& problem = simulation_.problem();
-  Energies& energies = problem.state().energies;
-  if (simulation_.dynamic()) energies.kinetic = kinetic_energy(problem, problem.state().velocity());
+  const Energies& energies = problem.state().energies;
   std::vector<double> row{static_cast<double>(report.step),
                           report.time,
                           report.time_step,
@@ -289,6 +334,7 @@ void RunRecorder::write_history(const StepReport& report) {
   for (const HistoryDescription& record : simulation_.scene().output.history)
     row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
   history_->row(row);
+  if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;
 }
 
@@ -303,13 +349,12 @@ bool RunRecorder::line_due() {
 
 void RunRecorder::show(const std::string& line, bool end) {
   if (isatty(fileno(stderr))) {
-    fmt::print(stderr, "\r\033[K{}", line);
+    tell("\r\033[K" + line);
     line_open_ = !end;
     if (end) std::fputc('\n', stderr);
   } else {
-    fmt::print(stderr, "{}\n", line);
+    tell(line + '\n');
   }
-  std::fflush(stderr);
 }
 
 void RunRecorder::progress(const StepReport& report) {

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include "perikit/build/problem.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
+#include "run/doubts.hpp"
+#include "run/earlier_results.hpp"
 
 namespace perikit {
 
@@ -20,6 +23,42 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
                     scene_.integrator->type));
   }
   if (!problem_->terms().has_gradients()) refuse_gradients();
+  carried_ = carry_from_earlier_run(scene_, *problem_);
+  evaluate_conditions();
+  watch_pieces();
+}
+
+void Simulation::watch_pieces() {
+  if (!traits_.quasi_static) {
+    if (scene_.weak_springs == 0) return;
+    throw InputError(scene_.weak_springs_position, "run.weak_springs",
+                     fmt::format("found with integrator \"{}\", which looks for no equilibrium; allowed: in quasi-static runs", scene_.integrator->type));
+  }
+  if (communicator().size() > 1) return;   // no rank knows the bonds of the others
+  loose_ = problem_->watch_pieces(scene_.weak_springs);
+  if (loose_.empty() || scene_.weak_springs > 0) return;
+  throw InputError({scene_.file.string()}, "boundary",
+                   fmt::format("found nothing that holds {}: it can move as a whole, and a quasi-static run has no answer; allowed: boundaries that hold every piece "
+                               "of the body against translation and rotation, or [run] weak_springs",
+                               loose_));
+}
+
+void Simulation::evaluate_conditions() {
+  const ParameterValues& integrator = scene_.integrator->values;
+  const double end = traits_.quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
+  Field scratch = problem_->make_field();
+  for (const double t : {0.0, end}) problem_->loads().evaluate(t, scratch);
+  // What is prescribed of displacements in time is asked for from the first step on.
+  if (traits_.dynamic)
+    problem_->constraints().prescribe_velocity(0, scratch);
+  else
+    problem_->constraints().prescribe_displacement(0, scratch);
+  problem_->constraints().prescribe_displacement(end, scratch);
+  const Body& body = problem_->body();
+  for (const HistoryDescription& record : scene_.output.history) {
+    if (!record.exact) continue;
+    for (const std::int32_t p : body.set(record.set)) (*record.exact)(body.position(static_cast<std::size_t>(p)), 0);
+  }
 }
 
 void Simulation::refuse_gradients() const {
@@ -37,7 +76,22 @@ void Simulation::refuse_gradients() const {
   }
 }
 
-void Simulation::run(Observer& observer) { integrator_->run(*problem_, observer); }
+void Simulation::run(Observer& observer) {
+  const auto failed = [&](std::string_view what) { return RunError(fmt::format("integrator {}: {}", scene_.integrator->type, what)); };
+  try {
+    integrator_->run(*problem_, observer);
+  } catch (const RunError&) {
+    throw;
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw failed(error.what());
+  } catch (...) {
+    throw failed("it threw something that is no std::exception");
+  }
+}
 
 std::string Simulation::summary() {
   const Body& body = problem_->body();
@@ -51,9 +105,12 @@ std::string Simulation::summary() {
     text += fmt::format("warning       {} points have {}\n", report.singular_families,
                         problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
   }
+  for (const std::string& warning : problem_->warnings()) text += fmt::format("warning       {}\n", warning);
   for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
+  for (const std::string& warning : doubts(scene_, *problem_)) text += fmt::format("warning       {}\n", warning);
   for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
-  if (problem_->terms().history() && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
+  if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
+  if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
     text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
   }
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
@@ -61,6 +118,7 @@ std::string Simulation::summary() {
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
   text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.owned().size()));
+  if (!loose_.empty()) text += fmt::format("warning       nothing but weak springs ({:g} of a point's stiffness) holds {}\n", scene_.weak_springs, loose_);
   const std::string plan = integrator_->plan(*problem_);
   if (!plan.empty()) text += fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
   return text;

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -11,6 +12,8 @@
 #include "output/history_file.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/run/simulation.hpp"
+#include "perikit/run/study.hpp"
+#include "run/output_folder.hpp"
 #include "run/processes.hpp"
 #include "run/study_plot.hpp"
 #include "scene/diagnostics.hpp"
@@ -85,9 +88,19 @@ Planned plan(const Study& study, const std::vector<std::size_t>& combination, Pa
   return planned;
 }
 
-std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const SceneOptions& options) {
+/// Reads the scene of every combination; of many, says so from the start.
+std::vector<Planned> plan_all(const Study& study, PartCatalogue& parts, const SceneOptions& options, const std::function<void(const std::string&)>& progress) {
   std::vector<Planned> runs;
-  for (const auto& combination : combinations(study)) runs.push_back(plan(study, combination, parts, options));
+  const auto all = combinations(study);
+  auto told = std::chrono::steady_clock::now();
+  if (all.size() > 200) progress(fmt::format("{} combinations; reading their scenes", all.size()));
+  for (const auto& combination : all) {
+    runs.push_back(plan(study, combination, parts, options));
+    if (stop_requested()) throw RunError("stopped by a signal before the first run");
+    if (std::chrono::steady_clock::now() - told < std::chrono::seconds(5)) continue;
+    told = std::chrono::steady_clock::now();
+    progress(fmt::format("{} of {} scenes read", runs.size(), all.size()));
+  }
   if (std::ranges::none_of(runs, [](const Planned& run) { return run.scene.has_value(); })) {
     throw InputError(
         {study.file.string()}, "values",
@@ -134,6 +147,12 @@ StudyTable in_order_of_axis(StudyTable table) {
   return table;
 }
 
+/// Of an earlier run in this folder; empty where there was none.
+std::string resolved_scene(const fs::path& folder) {
+  const auto marked = read_marked(folder / "scene.toml");
+  return marked ? marked->text : std::string();
+}
+
 std::string described(const Study& study, const StudyRow& row) {
   std::vector<std::string> texts;
   for (std::size_t k = 0; k < study.keys.size(); ++k)
@@ -165,8 +184,13 @@ std::vector<std::vector<std::size_t>> combinations(const Study& study) {
 
 StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOptions& options, const fs::path& folder,
                      const StudyRunner& run, const std::function<void(const std::string&)>& progress, const StudyExecution& how) {
-  std::vector<Planned> runs = plan_all(study, parts, options);
-  make_folder(folder);
+  std::vector<Planned> runs = plan_all(study, parts, options, progress);
+  const OutputFolder output(folder, {.marker = "study.toml",
+                                     .names = {"study.toml", "table.csv", "table.md", "plot.png", "plot.svg", "runs"},
+                                     .inputs = {study.file, study.scene},
+                                     .own = false,
+                                     .force = how.force});
+  output.mark(read_text(study.file));
   for (std::size_t i = 0; i < runs.size(); ++i) runs[i].row.run = i;
   const auto own = [&](std::size_t i) { return folder / "runs" / fmt::format("{}", i); };
   std::vector<bool> ended(runs.size(), false);
@@ -198,7 +222,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
       end(i, "");
       continue;
     }
-    const bool same = how.resume && read_text(own(i) / "scene.toml") == runs[i].scene->resolved;
+    const bool same = how.resume && resolved_scene(own(i)) == runs[i].scene->resolved;
     if (const auto kept = same ? kept_outcome(own(i)) : std::nullopt; kept && kept->status == "done") {
       take(i, *kept);
       end(i, " before");

@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "files/toml_limits.hpp"
 #include "perikit/run/study.hpp"
 #include "scene/toml_reader.hpp"
 #include "scene/toml_text.hpp"
@@ -278,6 +279,8 @@ Study read_study(const fs::path& file, PartCatalogue& parts) {
   std::ifstream stream(file, std::ios::binary);
   if (!fs::is_regular_file(file, failed) || !stream)
     throw InputError({file.string()}, "", "cannot be read; allowed: a readable study file");
+  if (const auto size = fs::file_size(file, failed); !failed && size > largest_toml)
+    throw InputError({file.string()}, "", fmt::format("has {} bytes; allowed: at most {}", size, largest_toml));
   return parse_study({std::istreambuf_iterator<char>(stream), {}}, file, parts);
 }
 

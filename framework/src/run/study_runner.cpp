@@ -74,7 +74,7 @@ const std::vector<std::string>& run_measures() {
   return names;
 }
 
-RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path& folder) {
+RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path& folder, bool force) {
   using clock = std::chrono::steady_clock;
   const auto seconds = [](clock::duration duration) { return std::chrono::duration<double>(duration).count(); };
   RunOutcome outcome{"done", "", {}};
@@ -86,7 +86,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     outcome.measures["points"] = static_cast<double>(problem.body().points_of_all_ranks());
     outcome.measures["bonds"] = static_cast<double>(problem.terms().report().bonds);
     outcome.measures["memory"] = static_cast<double>(problem.bytes());
-    RunRecorder recorder(simulation, folder, false);
+    RunRecorder recorder(simulation, folder, false, RunStart::fresh, {}, force);
     recorder.log(simulation.summary());
     const auto running = clock::now();
     const std::clock_t processor = std::clock();
@@ -106,6 +106,8 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     return failed("not enough memory");
   } catch (const std::exception& error) {
     return failed(error.what());
+  } catch (...) {
+    return failed("a library of parts threw something that is no std::exception");
   }
   return outcome;
 }
@@ -121,14 +123,14 @@ std::optional<RunOutcome> kept_outcome(const fs::path& folder) {
   return unpacked(text);
 }
 
-RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const fs::path& folder) {
+RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const fs::path& folder, bool force) {
   int ends[2];
   if (::pipe(ends) != 0) return failed(fmt::format("no pipe to a process of its own: {}", std::strerror(errno)));
   Descriptor reading(ends[0]), writing(ends[1]);
   const pid_t child = ::fork();
   if (child < 0) return failed(fmt::format("no process of its own: {}", std::strerror(errno)));
   if (child == 0) {
-    const std::string text = packed(run_here(scene, parts, folder));
+    const std::string text = packed(run_here(scene, parts, folder, force));
     ::_exit(write_all(writing.get(), std::as_bytes(std::span(text))) == 0 ? 0 : 1);
   }
   writing = Descriptor();

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "files/toml_limits.hpp"
 #include "scene/toml_text.hpp"
 
 namespace perikit {
@@ -15,6 +16,7 @@ namespace {
 /// { value = ... } parsed, so that the node carries the command line as its source.
 std::optional<toml::table> parsed(const std::string& toml) {
   try {
+    check_toml_limits(toml, std::string(command_line));
     toml::table table = toml::parse(std::string_view("value = " + toml), std::string_view(command_line));
     if (table.size() == 1 && table.contains("value")) return table;
   } catch (const toml::parse_error&) {
@@ -67,6 +69,11 @@ void apply_override(toml::table& root, const std::string& assignment, Diagnostic
     return;
   }
   const std::string text = assignment.substr(equals + 1);
+  const std::vector<std::string> keys = split(path);
+  if (keys.size() > deepest_toml) {
+    errors.add(here, "--set", fmt::format("found a key of {} names; allowed: at most {}", keys.size(), deepest_toml));
+    return;
+  }
   std::optional<toml::table> value = parsed(text);
   if (!value) value = parsed(toml_string(trimmed(text)));
   if (!value) {
@@ -74,7 +81,6 @@ void apply_override(toml::table& root, const std::string& assignment, Diagnostic
     return;
   }
 
-  const std::vector<std::string> keys = split(path);
   toml::node* parent = &root;
   std::string walked;
   for (std::size_t i = 0; i < keys.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "files/toml_limits.hpp"
 #include "scene/overrides.hpp"
 #include "scene/scene_reader.hpp"
 
@@ -24,6 +25,8 @@ std::string read_text(const std::filesystem::path& file) {
     throw refuse(failure && failure != std::errc::no_such_file_or_directory ? failure.message() : "does not exist");
   if (std::filesystem::is_directory(status)) throw refuse("is a folder");
   if (!std::filesystem::is_regular_file(status)) throw refuse("is not a regular file");
+  if (const auto size = std::filesystem::file_size(file, failure); !failure && size > largest_toml)
+    throw refuse(fmt::format("has {} bytes, more than {}", size, largest_toml));
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw refuse(fmt::format("cannot be opened ({})", std::strerror(errno)));
   std::ostringstream text;

@@ -76,6 +76,8 @@ void SceneReader::read_lattice(const toml::table& body) {
   if (values.has("jitter")) lattice.jitter = values.number("jitter");
   lattice_seed_ = values.has("seed");
   if (lattice_seed_) lattice.seed = values.integer("seed");
+  scene_.body.voronoi = values.has("volume") && values.text("volume") == "voronoi";
+  scene_.body.volume_position = values.position("volume");
   if (values.has("inside")) {
     lattice.inside =
         Expression(values.expression("inside"), scene_.constants, false, values.position("inside"), "body.lattice.inside");
@@ -112,6 +114,24 @@ void SceneReader::read_points(const toml::table& body) {
   }
   writer_.header("body.points");
   writer_.lines(table, values);
+  read_points_box(values);
+}
+
+/// What clips Voronoi cells of the points of a file.
+void SceneReader::read_points_box(const ParameterValues& values) {
+  BodyDescription& body = scene_.body;
+  body.voronoi = values.has("volume") && values.text("volume") == "voronoi";
+  body.volume_position = values.position("volume");
+  for (const char* key : {"lower", "upper", "inside"}) {
+    if (!values.has(key) || body.voronoi) continue;
+    reader_.errors.add(values.position(key), fmt::format("body.points.{}", key),
+                       "found with volumes from the file; allowed: with volume = \"voronoi\"");
+  }
+  if (values.has("lower")) body.points_lower = coordinates(values.numbers("lower"));
+  if (values.has("upper")) body.points_upper = coordinates(values.numbers("upper"));
+  if (values.has("inside"))
+    body.points_inside =
+        Expression(values.expression("inside"), scene_.constants, false, values.position("inside"), "body.points.inside");
 }
 
 void SceneReader::read_family(const toml::table& root) {
@@ -125,6 +145,8 @@ void SceneReader::read_family(const toml::table& root) {
   if (values.has("horizon_ratio")) scene_.horizon_ratio = values.number("horizon_ratio");
   for (const char* key : {"horizon", "horizon_ratio"})
     if (values.has(key)) scene_.horizon_position = values.position(key);
+  if (values.has("partial_volume")) scene_.partial_volume = values.boolean("partial_volume");
+  scene_.partial_volume_position = values.position("partial_volume");
   if (values.has("consistent")) scene_.consistent = values.boolean("consistent");
   scene_.consistent_position = values.position("consistent");
   if (values.has("influence")) scene_.influence = values.shared_part("influence");

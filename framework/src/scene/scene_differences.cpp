@@ -6,6 +6,8 @@
 #include <sstream>
 #include <toml++/toml.h>
 
+#include "scene/scene_differences.hpp"
+#include "scene/toml_reader.hpp"
 #include "scene/toml_text.hpp"
 
 namespace perikit {
@@ -40,7 +42,7 @@ void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
 
 Leaves leaves_of(const std::string& scene) {
   Leaves leaves;
-  collect(toml::parse(scene), "", leaves);
+  collect(parse_toml(scene, "scene.toml"), "", leaves);
   return leaves;
 }
 

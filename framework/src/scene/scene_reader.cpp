@@ -87,6 +87,10 @@ void SceneReader::read_head(const toml::table& root) {
     }
     std::vector<std::string> files;
     for (const std::string& name : values.texts("plugins")) {
+      if (name.empty() || name.find('\0') != std::string::npos) {
+        reader_.errors.add(values.position("plugins"), "plugins", "found an empty name; allowed: files of libraries (.so)");
+        continue;
+      }
       const std::filesystem::path file = from_scene_folder(name);
       files.push_back(file.string());
       try {

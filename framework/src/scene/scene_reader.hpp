@@ -25,6 +25,7 @@ class SceneReader {
   void read_body(const toml::table& root);
   void read_lattice(const toml::table& body);
   void read_points(const toml::table& body);
+  void read_points_box(const ParameterValues& values);
   void read_sets(const toml::table& root);
   void read_family(const toml::table& root);
   void read_parts(const toml::table& root);

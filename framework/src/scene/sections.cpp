@@ -62,6 +62,10 @@ ParameterTable lattice_parameters() {
       .at_most(0.5)
       .by_default("0.0");
   table.integer("seed", "Seed of the random shift; default: run.seed.").at_least(0);
+  table
+      .choice("volume", {"cell", "voronoi"},
+              "Volumes of points: of their lattice cells, or of their Voronoi cells, clipped by the box and `inside`.")
+      .by_default("\"cell\"");
   return table;
 }
 
@@ -69,6 +73,16 @@ ParameterTable points_parameters() {
   ParameterTable table;
   table.string("file", "A .csv with the header x,y,z,volume, or an .h5 with datasets of these names; relative to the scene file.")
       .require();
+  table
+      .choice("volume", {"file", "voronoi"},
+              "Volumes of points: those of the file, or of their Voronoi cells; the file need not have any then.")
+      .by_default("\"file\"");
+  table
+      .add(ParameterType::numbers, "lower", "m",
+           "With volume = \"voronoi\": lower corner of the box that clips the cells; without it half a spacing below the points.")
+      .one_per_axis();
+  table.add(ParameterType::numbers, "upper", "m", "Upper corner, likewise.").one_per_axis();
+  table.expression("inside", "-", "With volume = \"voronoi\": cells are clipped to where this is true.");
   return table;
 }
 
@@ -85,6 +99,8 @@ ParameterTable family_parameters() {
   table.number("horizon_ratio", "-", "Horizon over the spacing of the points.").at_least(1);
   table.number("horizon", "m", "Horizon as a length.").positive();
   table.part("influence", Kind::influence, "Influence function.").by_default("\"constant\"");
+  table.boolean("partial_volume", "Lattices: cells that `inside` cuts count with the share of their volume that lies inside.")
+      .by_default("false");
   table.boolean(
       "consistent",
       "Clouds: weights of evaluation points with which a constant stress is in equilibrium inside of the body, as on a lattice.");
@@ -237,6 +253,13 @@ ParameterTable run_parameters() {
           "result is the same to rounding.")
       .by_default("true");
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
+  table
+      .number("weak_springs", "-",
+              "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, "
+              "where they are. "
+              "Without it such a piece is refused.")
+      .positive()
+      .at_most(1.0);
   table
       .integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.")
       .at_least(0)

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "files/toml_limits.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml_text.hpp"
 
@@ -23,6 +24,7 @@ std::string found(const toml::node& node) {
 }
 
 toml::table parse_toml(const std::string& text, const std::string& file) {
+  check_toml_limits(text, file);
   try {
     return toml::parse(std::string_view(text), std::string_view(file));
   } catch (const toml::parse_error& error) {

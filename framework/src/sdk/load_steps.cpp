@@ -65,7 +65,14 @@ class LoadSteps {
         numbers_(state_.declare_numbers("load_steps", 5)) {}
 
   void run() {
-    if (started() == 0) begin();
+    double& planned_end = state_.declare_numbers("planned_end", 1)[0];
+    if (started() == 0) {
+      planned_end = planned();
+      begin();
+    } else if (planned_end != planned()) {
+      plan_anew(planned() / planned_end);
+      planned_end = planned();
+    }
     find_driving_force(old_driving_);
     equilibrium_.watch(observer_);
     while (position() < planned() && !observer_.cancelled()) {
@@ -112,6 +119,15 @@ class LoadSteps {
                       equilibrium_.residual_norm()));
   }
 
+  /// The same load, of another number of planned steps: `ratio` times as many.
+  void plan_anew(double ratio) {
+    position() *= ratio;
+    last_span() *= ratio;
+    increment() = std::min(1.0, std::exp2(std::floor(std::log2(increment() * ratio))));
+    observer_.log(
+        fmt::format("{}: goes on at load parameter {:.9g} with {} load steps", integrator_, state_.time, options_.steps));
+  }
+
   /// False where the run is to end within the step.
   bool step() {
     // A step never passes a planned point.
@@ -131,8 +147,8 @@ class LoadSteps {
       if (equilibrium_.stopped()) return false;
       const double t = (position() + span) / planned();
       equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
+      observer_.log(equilibrium_.take_notes());  // a step that fails may take long to do so
       if (span / 2 < smallest) {
-        observer_.log(equilibrium_.take_notes());
         throw RunError(
             fmt::format("{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, "
                         "failed because {}. More steps or cut_backs may "

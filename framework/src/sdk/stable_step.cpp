@@ -1,5 +1,7 @@
 #include "perikit/sdk/stable_step.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -21,6 +23,32 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u) {
   }
   const FieldView eigenvector = problem.state().declare("eigenvector");
   return largest_eigenvalue(problem, u, scale, eigenvector, norm(eigenvector) > 0);
+}
+
+void allow_unstable_parameter(ParameterTable& table) {
+  table.boolean("allow_unstable", "Take a time_step that is longer than the longest stable one; it is refused otherwise.")
+      .by_default("false");
+}
+
+void check_time_step(Problem& problem, const ParameterValues& values, Observer* observer) {
+  const bool allowed = values.boolean("allow_unstable");
+  if (!values.has("time_step")) {
+    if (allowed)
+      throw values.error("allow_unstable",
+                         "found without time_step, whose length is then stable anyway; allowed: with time_step");
+    return;
+  }
+  const double step = values.number("time_step");
+  const double eigenvalue = largest_eigenvalue(problem, problem.state().displacement());
+  if (!(eigenvalue > 0) || step <= 2 / std::sqrt(eigenvalue)) return;
+  const std::string found =
+      fmt::format("{} s, but the longest stable step at the start is {:.4g} s", step, 2 / std::sqrt(eigenvalue));
+  if (!allowed) {
+    throw values.error(
+        "time_step",
+        fmt::format("found {}; allowed: at most that, no time_step, which takes 0.9 of it, or allow_unstable = true", found));
+  }
+  if (observer) observer->log(fmt::format("warning: {}.time_step is {}: allowed by allow_unstable", values.path(), found));
 }
 
 double bond_based_time_step(const Body& body, const Laws& laws) {

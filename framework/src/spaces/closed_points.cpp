@@ -11,10 +11,6 @@ namespace perikit {
 
 namespace {
 
-double spacing_of(const Body& body, std::size_t p) {
-  return std::pow(body.volume(p) / body.section(), 1.0 / body.dimension());
-}
-
 struct Box {
   Point lower{}, upper{};
   void add(const Point& x) {
@@ -96,6 +92,44 @@ class Normals {
 };
 
 }  // namespace
+
+double spacing_of(const Body& body, std::size_t p) {
+  return std::pow(body.volume(p) / body.section(), 1.0 / body.dimension());
+}
+
+ClosedComponents::ClosedComponents(ClosedPoints closed, const Body& body)
+    : closed_(std::move(closed)), body_(body), whole_(body.stride(), 0) {
+  for (const std::int32_t p : closed_.whole) whole_[static_cast<std::size_t>(p)] = 1;
+}
+
+void ClosedComponents::project(FieldView y) const {
+  const auto d = static_cast<std::size_t>(body_.dimension());
+  std::vector<std::array<double, 3>> kept;
+  for (const auto& [p, along] : closed_.at_surfaces) {
+    std::array<double, 3>& value = kept.emplace_back();
+    for (std::size_t a = 0; a < d; ++a)
+      for (std::size_t c = 0; c < d; ++c) value[a] += along[3 * a + c] * y.component(static_cast<int>(c))[p];
+  }
+  for (std::size_t c = 0; c < d; ++c)
+    for (std::size_t p = 0; p < body_.stride(); ++p)
+      if (!whole_[p]) y.component(static_cast<int>(c))[p] = 0;
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    for (std::size_t c = 0; c < d; ++c) y.component(static_cast<int>(c))[closed_.at_surfaces[k].point] = kept[k][c];
+}
+
+double ClosedComponents::largest(ConstFieldView y, Point* where) const {
+  double most = 0;
+  for (const std::int32_t p : body_.owned()) {
+    const auto at = static_cast<std::size_t>(p);
+    double square = 0;
+    for (int c = 0; c < body_.dimension(); ++c) square += y.component(c)[p] * y.component(c)[p];
+    const double value = std::sqrt(square) * spacing_of(body_, at) / body_.volume(at);
+    if (value <= most) continue;
+    most = value;
+    if (where) *where = body_.position(at);
+  }
+  return most;
+}
 
 ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {
   const Body& body = families.body();

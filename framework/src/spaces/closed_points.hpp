@@ -26,6 +26,26 @@ struct ClosedPoints {
   std::vector<AtSurface> at_surfaces;
 };
 
+/// The components of A_k that are to vanish.
+class ClosedComponents {
+ public:
+  ClosedComponents(ClosedPoints closed, const Body& body);
+
+  const Body& body() const noexcept { return body_; }
+  /// y of the other components <- 0; component d and later ones of y stay.
+  void project(FieldView y) const;
+  /// Largest |y| of a point over volume and spacing, and where it is.
+  double largest(ConstFieldView y, Point* where = nullptr) const;
+
+ private:
+  ClosedPoints closed_;
+  const Body& body_;
+  std::vector<std::uint8_t> whole_;  ///< by point
+};
+
+/// Of the volume that belongs to a point [m].
+double spacing_of(const Body& body, std::size_t p);
+
 /// Of the points that the body owns. copy_from_sources: values of points -> their images; may be empty.
 ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources);
 

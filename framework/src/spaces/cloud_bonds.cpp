@@ -61,6 +61,12 @@ void CloudBonds<D>::set_factors(std::span<const double> factors) {
   });
 }
 
+template <int D>
+void CloudBonds<D>::shift_gradients(ConstFieldView lambda) {
+  gradient_of_.shift(lambda);
+  stress_.assign(D * points_, Row{});
+}
+
 /// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
 template <int D>
 void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H,
@@ -246,6 +252,7 @@ void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
     if (pass.work.tangent()) gradient_of_.at(p, w_, &direction_[D * p]);
     force_[p] = Row{};
     for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
+    if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
     if (selective_) pressure_[p] = Row{};
   });
   if (selective_) volumes(b, pass.work.tangent());
@@ -293,10 +300,9 @@ void CloudBonds<D>::run(Pass& pass) {
   auto stress_on_points = [&](std::size_t b) {
     if (!works(b, 1)) return;
     over_points(b, [&](std::size_t p) {
-      if (gradient_of_.stored())
-        gradient_of_.scatter(p, &flux_[D * p], force_);
-      else
-        gradient_of_.times_inverse(p, &flux_[D * p], &flux_[D * p]);
+      if (gradient_of_.stored()) return gradient_of_.scatter(p, &flux_[D * p], force_);
+      if (gradient_of_.shifted()) std::copy_n(&flux_[D * p], D, &stress_[D * p]);
+      gradient_of_.times_transposed(p, &flux_[D * p], &flux_[D * p]);
     });
   };
   if (gradient_of_.stored())
@@ -308,7 +314,8 @@ void CloudBonds<D>::run(Pass& pass) {
     if (pass.nearby && !near(b, 2)) return;
     const bool gather = !gradient_of_.stored() && (pass.nearby || quiet_.awake(b, last));
     over_points(b, [&](std::size_t p) {
-      const Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
+      Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
+      if (gather && gradient_of_.shifted()) f = gradient_of_.shifted_divergence(p, stress_, f);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     });
   });
@@ -345,8 +352,8 @@ void CloudBonds<D>::report(ModelReport& report) const {
   report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
   report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size()) * sizeof(std::int64_t) +
                   scale_.size() * sizeof(double) + scratch_.bytes() +
-                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + force_.size() + volume_.size() +
-                   pressure_.size()) *
+                  (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + stress_.size() + force_.size() +
+                   volume_.size() + pressure_.size()) *
                       sizeof(Row);
   if (pairs_) report.skips.push_back(second_evaluation(families_.bonds()));
 }

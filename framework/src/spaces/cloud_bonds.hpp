@@ -20,6 +20,7 @@ class CloudBonds final : public EvaluationSpace {
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override { return families_.lists().neighbour.size(); }
   void set_factors(std::span<const double> factors) override;
+  void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
 
  private:
@@ -63,6 +64,7 @@ class CloudBonds final : public EvaluationSpace {
   Colouring colouring_;
   AlignedVector<Row> u_, w_;                 ///< mirrors
   AlignedVector<Row> gradient_, direction_;  ///< Hbar of u and w, D rows a point
+  AlignedVector<Row> stress_;                ///< on shifted gradients
   AlignedVector<Row> flux_;                  ///< the stress on Hbar, then Q; likewise
   AlignedVector<Row> force_;                 ///< scattered bond forces
   AlignedVector<Row> volume_, pressure_;     ///< selective: volume changes of points; pressures on them and their rates

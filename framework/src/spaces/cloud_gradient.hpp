@@ -4,6 +4,12 @@
 ///
 ///   order 1:   S = sum_j omega V_j u_ij (x) xi_ij,  H = S K^-1;   f_i = sum_j omega xi_ij (V_j Q_i + V_i Q_j),  Q = P K^-1
 ///   order 2+:  H = sum_j u_ij (x) g_ij with stored g;             f_i += P_i g_ij,  f_j -= P_i g_ij
+///
+/// Order 1 may be shifted by a field lambda: g_ij = omega V_j (M_i xi_ij + lambda_ij), M_i = K_i^-1 - (sum_k lambda_ik (x) omega
+/// V_k K_i^-1 xi_ik), as exact for affine motion as without (spaces/shift.hpp). Then H_ce = sum_b S_cb M_eb + T_ce, T = sum_j
+/// omega V_j u_ij (x) lambda_ij, Q_cb = P_ce M_eb, and f_i += sum_j omega lambda_ij (V_j P_i + V_i P_j).
+
+#include <cmath>
 
 #include "families/cloud_families.hpp"
 #include "families/cloud_rows.hpp"
@@ -25,7 +31,9 @@ class CloudGradient {
     if (!stored()) {
       Row S[D];
       moments(p, u, S);
-      return times_inverse(p, S, H);
+      times_inverse(p, S, H);
+      if (shifted()) add_shift(p, u, H);
+      return;
     }
     Row h[D] = {};
     for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
@@ -36,14 +44,24 @@ class CloudGradient {
   }
   /// Q = S K^-1; Q may be S.
   void times_inverse(std::size_t p, const Row* S, Row* Q) const noexcept {
+    if (shifted())
+      return times(
+          S, Q, [&](int k, int e) { return matrix_[(p * D + static_cast<std::size_t>(e)) * D + static_cast<std::size_t>(k)]; });
     const double* inverse = families_.inverse_shape(p);
-    Row out[D];
-    for (int e = 0; e < D; ++e) {
-      out[e] = Row{};
-      for (int k = 0; k < D; ++k) out[e] += inverse[symmetric_index(D, k, e)] * S[k];
-    }
-    for (int e = 0; e < D; ++e) Q[e] = out[e];
+    times(S, Q, [&](int k, int e) { return inverse[symmetric_index(D, k, e)]; });
   }
+  /// Q = S M, for stresses; Q may be S.
+  void times_transposed(std::size_t p, const Row* S, Row* Q) const noexcept {
+    if (!shifted()) return times_inverse(p, S, Q);
+    times(S, Q, [&](int k, int e) { return matrix_[(p * D + static_cast<std::size_t>(k)) * D + static_cast<std::size_t>(e)]; });
+  }
+  /// Order 1: from now on with this field, which must outlive the gradients.
+  void shift(ConstFieldView lambda) {
+    mirror_rows(lambda, families_.body().points(), lambda_);
+    matrix_.assign(D * D * families_.body().points(), 0.0);
+    for (std::size_t p = 0; p < families_.body().points(); ++p) shift_point(p);
+  }
+  bool shifted() const noexcept { return !lambda_.empty(); }
   /// Order 1: f, and what Q of all points adds to the force on p.
   Row divergence(std::size_t p, const AlignedVector<Row>& Q, Row f = Row{}) const noexcept {
     const Row x = position_[p];
@@ -54,6 +72,18 @@ class CloudGradient {
       const Row far = position_[j], xi = far - x;
       const double w = omega[k], to_own = w * far[3], to_far = w * x[3];
       for (int e = 0; e < D; ++e) f += xi[e] * (to_own * own[e] + to_far * Q[D * j + static_cast<std::size_t>(e)]);
+    }
+    return f;
+  }
+  /// Shifted gradients: what the stresses P of all points add to it beside that.
+  Row shifted_divergence(std::size_t p, const AlignedVector<Row>& P, Row f) const noexcept {
+    const Row* own = &P[D * p];
+    const double volume = position_[p][3], *omega = families_.omegas();
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
+      const Row lambda = lambda_[j] - lambda_[p];
+      const double w = omega[k], to_own = live(p) ? w * position_[j][3] : 0.0, to_far = live(j) ? w * volume : 0.0;
+      for (int e = 0; e < D; ++e) f += lambda[e] * (to_own * own[e] + to_far * P[D * j + static_cast<std::size_t>(e)]);
     }
     return f;
   }
@@ -71,12 +101,46 @@ class CloudGradient {
   /// The bonds of p have changed.
   void renew(std::size_t p) {
     if (stored()) store_stencil(p);
+    if (shifted()) shift_point(p);
   }
   /// Points of a lower order than asked for, at the set-up.
   std::size_t fallbacks() const noexcept { return fallbacks_; }
-  std::size_t bytes() const noexcept { return stencil_.size() * sizeof(double); }
+  std::size_t bytes() const noexcept {
+    return (stencil_.size() + matrix_.size()) * sizeof(double) + lambda_.size() * sizeof(Row);
+  }
 
  private:
+  template <class Entry>
+  static void times(const Row* S, Row* Q, Entry&& entry) noexcept {
+    Row out[D];
+    for (int e = 0; e < D; ++e) {
+      out[e] = Row{};
+      for (int k = 0; k < D; ++k) out[e] += entry(k, e) * S[k];
+    }
+    for (int e = 0; e < D; ++e) Q[e] = out[e];
+  }
+  bool live(std::size_t p) const noexcept { return std::isfinite(families_.condition(p)); }
+  /// H += T.
+  void add_shift(std::size_t p, const AlignedVector<Row>& u, Row* H) const noexcept {
+    if (!live(p)) return;
+    const double* omega = families_.omegas();
+    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
+      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
+      const Row lambda = lambda_[j] - lambda_[p], du = (omega[k] * position_[j][3]) * (u[j] - u[p]);
+      for (int e = 0; e < D; ++e) H[e] += lambda[e] * du;
+    }
+  }
+  /// M_eb = K^-1_eb - (gradient of lambda)_eb.
+  void shift_point(std::size_t p) noexcept {
+    Row L[D], H[D];
+    moments(p, lambda_, L);
+    const double* inverse = families_.inverse_shape(p);
+    times(L, H, [&](int k, int e) { return inverse[symmetric_index(D, k, e)]; });
+    for (int e = 0; e < D; ++e)
+      for (int b = 0; b < D; ++b)
+        matrix_[(p * D + static_cast<std::size_t>(e)) * D + static_cast<std::size_t>(b)] =
+            live(p) ? inverse[symmetric_index(D, e, b)] - H[b][e] : 0.0;
+  }
   const FamilyLists& lists() const noexcept { return families_.lists(); }
   void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept {
     const Row x = position_[p], own = u[p];
@@ -96,7 +160,9 @@ class CloudGradient {
   const CloudFamilies& families_;
   const Row* position_;                  ///< {x, y, z, V}
   int order_;
-  AlignedVector<double> stencil_;        ///< g[D * bond + e]
+  AlignedVector<double> stencil_;  ///< g[D * bond + e]
+  AlignedVector<Row> lambda_;      ///< by point; empty: not shifted
+  AlignedVector<double> matrix_;   ///< M by point, row-major
   std::size_t fallbacks_ = 0;
 };
 

@@ -65,7 +65,9 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
         S[e] = Row{};
         for (int c = 0; c < D; ++c) S[e][c] = s.P[(c * D + e) * batch_points + l];
       }
-      gradient_.times_inverse(first + static_cast<std::size_t>(l), S, &flux_[D * (first + static_cast<std::size_t>(l))]);
+      const std::size_t p = first + static_cast<std::size_t>(l);
+      gradient_.times_transposed(p, S, &flux_[D * p]);
+      if (gradient_.shifted()) std::copy_n(S, D, &stress_[D * p]);
     }
   }
   if (pass.energies) pass.energies[b] = energy;
@@ -88,16 +90,23 @@ void CloudPoints<D>::run(Pass& pass) {
   parallel_for(blocks(), [&](std::size_t b) {
     if (pass.nearby ? !near(b, 1) : !quiet_.awake(b, 2)) return;
     for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
-      const Row f = gradient_.divergence(p, flux_);
+      Row f = gradient_.divergence(p, flux_);
+      if (gradient_.shifted()) f = gradient_.shifted_divergence(p, stress_, f);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     }
   });
 }
 
 template <int D>
+void CloudPoints<D>::shift_gradients(ConstFieldView lambda) {
+  gradient_.shift(lambda);
+  stress_.assign(D * points_, Row{});
+}
+
+template <int D>
 void CloudPoints<D>::report(ModelReport& report) const {
   report.evaluation_points += points_;
-  report.bytes += gradient_.bytes() + (u_.size() + w_.size() + flux_.size()) * sizeof(Row) + scratch_.bytes();
+  report.bytes += gradient_.bytes() + (u_.size() + w_.size() + flux_.size() + stress_.size()) * sizeof(Row) + scratch_.bytes();
 }
 
 template class CloudPoints<1>;

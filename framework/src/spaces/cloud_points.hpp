@@ -15,6 +15,7 @@ class CloudPoints final : public EvaluationSpace {
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
   std::size_t numbers() const noexcept override { return padded(points_); }
   void bonds_changed(std::span<const std::int32_t>) override {}
+  void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
 
  private:
@@ -25,8 +26,8 @@ class CloudPoints final : public EvaluationSpace {
   std::size_t points_;
   const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_;
-  AlignedVector<Row> u_, w_;                   ///< mirrors
-  AlignedVector<Row> flux_;                    ///< Q, D rows a point
+  AlignedVector<Row> u_, w_;          ///< mirrors
+  AlignedVector<Row> flux_, stress_;  ///< Q, D rows a point
   ScratchPool scratch_;
 };
 

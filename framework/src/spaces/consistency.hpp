@@ -22,20 +22,27 @@
 
 namespace perikit {
 
+/// What became of a system.
+struct Balanced {
+  int iterations = 0;
+  double before = 0, after = 0;  ///< largest |A_k| of closed components, over volume divided by spacing
+  Point worst{};                 ///< where `after` is
+};
+
 struct CloudConsistency {
   /// Of images, where the body has some: u of real points -> u of images; forces on images -> forces on their sources; values of
   /// sources -> images.
   std::function<void(FieldView)> extend, fold, copy_from_sources;
 
   bool found = false;
-  AlignedVector<double> factors;  ///< f_q by number of the evaluation point
+  AlignedVector<double> factors;  ///< f_q by number of the evaluation point; empty where there are none to choose
+  Field shift;                    ///< of point gradients (spaces/shift.hpp); no components where they stay
   std::size_t whole = 0;          ///< points k with all components of A_k
   std::size_t at_surfaces = 0;    ///< with the components along surfaces (closed_points.hpp)
-  int iterations = 0, rounds = 0;
-  double before = 0, after = 0;      ///< largest |A_k|, of these components, over volume divided by spacing
+  Balanced weights, gradients;
+  int rounds = 0;
   double smallest = 1, largest = 1;  ///< f_q
   std::size_t bounded = 0;           ///< evaluation points at the lowest factor
-  Point worst{};                     ///< where `after` is
   double seconds = 0;
 
   void report(ModelReport& report) const;
@@ -44,7 +51,7 @@ struct CloudConsistency {
 /// Factors below this are bounded.
 inline constexpr double lowest_factor = 0.05;
 
-/// Fills what is to be found. The space must have factors.
+/// Fills what is to be found, and gives it to the space. Clouds only.
 void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudConsistency& out);
 
 }  // namespace perikit

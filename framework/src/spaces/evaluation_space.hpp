@@ -33,6 +33,9 @@ class EvaluationSpace {
   virtual std::size_t factors() const noexcept { return 0; }
   /// From now on W_q times factors[q]; empty: 1. They must outlive the space.
   virtual void set_factors(std::span<const double>) {}
+  /// Point gradients of order 1 on clouds: shifted by this field from now on (spaces/cloud_gradient.hpp). It must outlive the
+  /// space.
+  virtual void shift_gradients(ConstFieldView) {}
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
   /// The history of laws was replaced.
@@ -62,6 +65,7 @@ struct SpaceParts {
   std::span<const double> factors = {};  ///< of the weights, as set_factors takes them; for assemblies
   bool fails = false;                    ///< bonds may fail
 
+  ConstFieldView shift = {};  ///< of point gradients, as shift_gradients takes it; for assemblies
   bool history() const noexcept { return laws.state_components() > 0; }
   QuietBlocks local_blocks(const BlockReach& reach) const { return fails ? QuietBlocks(reach) : QuietBlocks(); }
   QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }

@@ -18,6 +18,9 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
   consistency_ = std::move(consistency);
   parts_.factors = consistency_->factors;
   space_->set_factors(parts_.factors);
+  if (consistency_->shift.components() == 0) return;
+  parts_.shift = consistency_->shift;
+  space_->shift_gradients(parts_.shift);
 }
 
 BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {

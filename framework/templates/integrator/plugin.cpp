@@ -67,11 +67,17 @@ class Work {
 ///   v(t + dt/2) = v(t - dt/2) + dt a(t),  u(t + dt) = u(t) + dt v(t + dt/2),  a = (internal + external force)/mass.
 class PartName final : public Integrator {
  public:
-  PartName(double end_time, double time_step) : end_time_(end_time), time_step_(time_step) {}
+  explicit PartName(const ParameterValues& values)
+      : values_(values),
+        end_time_(values.number("end_time")),
+        time_step_(values.has("time_step") ? values.number("time_step") : 0.0) {}
 
   IntegratorTraits traits() const noexcept override { return {.dynamic = true, .quasi_static = false}; }
 
-  std::string plan(Problem& problem) override { return fmt::format("{:.0f} steps to {:.4g} s", steps(problem), end_time_); }
+  std::string plan(Problem& problem) override {
+    check_time_step(problem, values_);
+    return fmt::format("{:.0f} steps to {:.4g} s", steps(problem), end_time_);
+  }
 
   void run(Problem& problem, Observer& observer) override {
     State& state = problem.state();
@@ -87,6 +93,7 @@ class PartName final : public Integrator {
                         .steps_expected = static_cast<std::int64_t>(count)};
     };
     if (count == 0) {
+      check_time_step(problem, values_, &observer);
       count = steps(problem);
       constraints.prescribe_velocity(state.time, v);
       evaluate(problem, observer.wants_sample(0, state.time), end_time_ / count);
@@ -139,6 +146,7 @@ class PartName final : public Integrator {
     }
   }
 
+  ParameterValues values_;
   double end_time_, time_step_;
 };
 
@@ -146,6 +154,7 @@ ParameterTable parameters() {
   ParameterTable table;
   table.number("end_time", "s", "End of the run; hit exactly by equal steps.").require().positive();
   table.number("time_step", "s", "Largest step; found from the stiffness at the start where it is not given.").positive();
+  allow_unstable_parameter(table);
   return table;
 }
 
@@ -160,7 +169,5 @@ PERIKIT_PLUGIN(registrar) {
                         .equations = "v(t+dt/2) = v(t-dt/2) + dt a(t), u(t+dt) = u(t) + dt v(t+dt/2)",
                         .source = "the paper, with the number of the equation",
                         .limits = "the step is estimated once: not for bodies that become stiffer"},
-                       [](const ParameterValues& values, const PartFactory&) {
-                         return std::make_unique<PartName>(values.number("end_time"), values.has("time_step") ? values.number("time_step") : 0.0);
-                       });
+                       [](const ParameterValues& values, const PartFactory&) { return std::make_unique<PartName>(values); });
 }

@@ -15,6 +15,7 @@ namespace perikit {
 
 class Companion;
 class Families;
+class WeakSprings;
 struct PointSamples;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
@@ -31,6 +32,7 @@ struct ProblemParts {
   std::unique_ptr<Terms> terms;
   std::string kinematics;              ///< names, for messages
   std::vector<std::string> materials;  ///< by material of the body
+  std::vector<std::string> warnings;   ///< of what is allowed and can hardly be meant
 };
 
 class BodyProblem final : public Problem {
@@ -54,6 +56,20 @@ class BodyProblem final : public Problem {
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
+  /// What a snapshot of another run of this body holds of its bonds and of the history of its laws: bonds that are not as they
+  /// were at its set-up, and numbers of history.
+  struct Carried {
+    std::size_t bonds = 0, history = 0;
+  };
+  static Carried carried_by(std::span<const std::byte> snapshot);
+  /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
+  void carry(std::span<const std::byte> snapshot);
+
+  /// Quasi-static runs, on one rank: from now on pieces of the body that nothing holds are known. Where loads move one, forces
+  /// are refused and the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness.
+  /// Returns what is loose now, in words; empty: nothing.
+  std::string watch_pieces(double weak_springs);
+
   /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another
   /// problem.
   std::vector<std::byte> snapshot() const;
@@ -66,6 +82,7 @@ class BodyProblem final : public Problem {
   std::string fracture_summary() const {
     return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated);
   }
+  const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
 
@@ -87,6 +104,7 @@ class BodyProblem final : public Problem {
   Field seen_, seen_direction_;
   BlockMatrix tangent_of_terms_, companion_of_terms_;  ///< with images
   std::unique_ptr<Companion> companion_;               ///< made when asked for
+  std::unique_ptr<WeakSprings> weak_springs_;          ///< null unless pieces are watched
 };
 
 }  // namespace perikit

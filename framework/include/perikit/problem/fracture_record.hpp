@@ -25,6 +25,8 @@ class FractureRecord {
 
   void write(const Terms& terms, ByteWriter& out) const;
   void read(Terms& terms, ByteReader& in);
+  /// What `write` wrote, the bonds alone.
+  static void read_bonds(ByteReader& in, std::vector<BondChange>& bonds);
 
  private:
   std::unique_ptr<const BodyDamage> damage_;

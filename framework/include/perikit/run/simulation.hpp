@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,11 +37,16 @@ class Simulation {
  private:
   /// InputError where output asks a pair law for fields that it does not have.
   void refuse_gradients() const;
+  /// InputError where a load, a boundary or the exact values of a history column have no finite value at the start or the end.
+  void evaluate_conditions();
+  /// InputError where nothing holds a piece of a body whose equilibrium is looked for.
+  void watch_pieces();
 
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
   std::unique_ptr<BodyProblem> problem_;
+  std::string carried_, loose_;  ///< from an earlier run, by weak springs; in words
 };
 
 /// The columns of history.csv: the standard ones, then those that the scene asks for.
@@ -54,6 +60,18 @@ enum class RunStart {
   resume,  ///< from checkpoint.h5 in the folder; from the initial state where there is none
 };
 
+/// What the energies of a run lack of adding up: strain + kinetic + dissipated = initial + work of boundaries and loads.
+struct EnergyBalance {
+  double initial = 0;  ///< strain + kinetic [J] at step 0
+  double largest = 0;  ///< the largest of all the energies that were seen [J]
+  double off = 0;      ///< the largest imbalance that was seen [J]
+
+  /// The imbalance of `energies` [J], which becomes part of the record.
+  double add(const Energies& energies) noexcept;
+  /// off over largest; 0 where there was no energy.
+  double share() const noexcept { return largest > 0 ? off / largest : 0.0; }
+};
+
 /// Where the output of a run stands: what a checkpoint holds besides the state.
 struct OutputProgress {
   std::int64_t frames = 0, history_rows = 0;  ///< those that the scene asks for; not the ones of a stop
@@ -61,17 +79,23 @@ struct OutputProgress {
   std::int64_t history_every = 0;             ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
-  double initial_energy = 0;  ///< strain + kinetic [J] at step 0
+  double frame_spacing = 0;  ///< of [output] frames: it stays where a run is lengthened
+  EnergyBalance energies;
+  std::vector<std::int64_t> frame_fingerprints;  ///< of the files of these frames
+  std::int64_t history_fingerprint = 0;          ///< of the values in these rows; 0: none yet
 };
+
+class OutputFolder;
 
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
  public:
   /// show_progress: a live line on a terminal, a line now and then elsewhere. A resumed run puts the state of the checkpoint into
   /// the problem and cuts frames and history back to it. Throws InputError where the folder holds the run of another scene or
-  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes).
+  /// body, or of other libraries (`libraries`: library_fingerprints; empty where nothing resumes), another
+  /// process writes into it, or (unless `force`) perikit did not write what would be replaced.
   RunRecorder(Simulation& simulation, std::filesystem::path folder, bool show_progress, RunStart start = RunStart::fresh,
-              std::string libraries = {});
+              std::string libraries = {}, bool force = false);
   ~RunRecorder() override;
 
   bool wants_sample(std::int64_t step, double time) override;
@@ -94,13 +118,24 @@ class RunRecorder final : public Observer {
  private:
   void start_fresh(RunStart start);
   void start_from_checkpoint();
+  /// InputError where a run that is lengthened cannot be.
+  void check_longer() const;
+  std::filesystem::path frame_file(std::int64_t index) const;
+  /// InputError naming the file where frames or history are not those that the run wrote.
+  void check_kept_files() const;
   bool checkpoint_due(std::int64_t step, double time) const;
   void keep_checkpoint(const StepReport& report);
   bool frame_due(std::int64_t step, double time) const;
   bool history_due(std::int64_t step) const;
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
-  void write_history(const StepReport& report);
+  /// Of a state that is sampled. RunError where the energies of a dynamic run are far from adding up. recorded: the state counts
+  /// in the balance of the run; not that of a stop alone.
+  void watch_energies(const StepReport& report, bool recorded);
+  /// What the end of the run warns of; empty where the energies add up.
+  std::string energy_warning() const;
+  /// counts: not a row of a stop alone.
+  void write_history(const StepReport& report, bool counts);
   void progress(const StepReport& report);
   /// Whether a line of progress is due, which is then taken to be shown.
   bool line_due();
@@ -108,6 +143,7 @@ class RunRecorder final : public Observer {
 
   Simulation& simulation_;
   std::filesystem::path folder_;
+  std::unique_ptr<OutputFolder> output_;
   bool show_progress_;
   PointFields fields_;
   std::vector<std::string> frame_fields_;
@@ -133,6 +169,7 @@ class RunRecorder final : public Observer {
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
   double first_time_ = 0;
   std::vector<std::string> warnings_;
+  std::set<std::string> strange_fields_;  ///< that were not finite somewhere
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.

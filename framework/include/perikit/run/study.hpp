@@ -93,10 +93,11 @@ struct RunOutcome {
 
 /// Runs one scene into a folder and never throws.
 using StudyRunner = std::function<RunOutcome(const Scene& scene, const std::filesystem::path& folder)>;
-RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
+/// force: what perikit did not write in the folder is replaced all the same.
+RunOutcome run_here(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder, bool force = false);
 /// The same in a process of its own, which may crash or run out of memory without harm. The calling process must not have
 /// computed in parallel before: a copied process has none of the threads.
-RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder);
+RunOutcome run_in_child(const Scene& scene, const PartFactory& parts, const std::filesystem::path& folder, bool force = false);
 
 /// The outcome of a run in its folder; nothing where the run came to no end.
 void keep_outcome(const std::filesystem::path& folder, const RunOutcome& outcome);
@@ -105,6 +106,7 @@ std::optional<RunOutcome> kept_outcome(const std::filesystem::path& folder);
 struct StudyExecution {
   int jobs = 1;         ///< runs side by side; more than one disturbs what is measured in seconds
   bool resume = false;  ///< keep the runs that are done already
+  bool force = false;   ///< replace what perikit did not write in the folder
 };
 
 struct StudyRow {

@@ -150,8 +150,10 @@ struct Scene {
   std::vector<PeriodicDescription> periodics;
   std::vector<LoadDescription> loads;
   OutputDescription output;
-  bool skip = true;   ///< [run]: leave out work whose result is known
-  bool share = true;  ///< [run]: compute what is equal once
+  bool skip = true;         ///< [run]: leave out work whose result is known
+  bool share = true;        ///< [run]: compute what is equal once
+  double weak_springs = 0;  ///< [run]: of loose pieces, share of a point's stiffness; 0: refused
+  SourcePosition weak_springs_position;
   std::optional<int> threads;
   std::int64_t seed = 1;
 };

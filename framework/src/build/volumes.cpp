@@ -1,0 +1,75 @@
+#include "build/volumes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/voronoi.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Samples along an axis: 64 to 2744 a cell.
+int samples(int dimension) {
+  return dimension == 1 ? 64 : dimension == 2 ? 24 : 14;
+}
+
+/// visit(x) for the midpoints of n parts along each axis of a box with this half-width around a place.
+template <class Visit>
+void over_grid(const Point& centre, double half, int n, int dimension, Visit&& visit) {
+  const auto at = [&](int k) { return half * ((2.0 * k + 1) / n - 1); };
+  for (int k = 0; k < (dimension > 2 ? n : 1); ++k)
+    for (int j = 0; j < (dimension > 1 ? n : 1); ++j)
+      for (int i = 0; i < n; ++i) {
+        Point x = centre;
+        x[0] += at(i);
+        if (dimension > 1) x[1] += at(j);
+        if (dimension > 2) x[2] += at(k);
+        visit(x);
+      }
+}
+
+double squared_distance(const Point& a, const Point& b) {
+  double sum = 0;
+  for (std::size_t c = 0; c < 3; ++c) sum += (a[c] - b[c]) * (a[c] - b[c]);
+  return sum;
+}
+
+}  // namespace
+
+double share_inside(const Expression& inside, const Point& centre, double spacing, int dimension) {
+  int all = 0, in = 0;
+  over_grid(centre, 0.5 * spacing, samples(dimension), dimension, [&](const Point& x) {
+    ++all;
+    in += inside(x) != 0;
+  });
+  return static_cast<double>(in) / all;
+}
+
+std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,
+                                    const Expression* inside) {
+  VoronoiCells cells = voronoi_cells(points, dimension, lower, upper, inside != nullptr);
+  for (std::size_t n = 0; n < points.size() && inside; ++n) {
+    // Cells all of whose surroundings are inside, on a coarse grid, are whole.
+    bool whole = true;
+    over_grid(points[n], 1.25 * cells.reach[n], 9, dimension, [&](Point x) {
+      for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) x[c] = std::clamp(x[c], lower[c], upper[c]);
+      whole = whole && (*inside)(x) != 0;
+    });
+    if (whole) continue;
+    int all = 0, in = 0;
+    over_grid(points[n], cells.reach[n], 2 * samples(dimension), dimension, [&](const Point& x) {
+      const double own = squared_distance(x, points[n]);
+      for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c)
+        if (x[c] < lower[c] || x[c] > upper[c]) return;
+      for (const std::int32_t j : cells.neighbours[n])
+        if (squared_distance(x, points[static_cast<std::size_t>(j)]) < own) return;
+      ++all;
+      in += (*inside)(x) != 0;
+    });
+    if (all > 0) cells.size[n] *= static_cast<double>(in) / all;
+  }
+  return cells.size;
+}
+
+}  // namespace perikit

@@ -1,0 +1,19 @@
+#pragma once
+/// Volumes of points where the shape of a body cuts their cells. Shares are counted on fixed grids of samples in a cell.
+
+#include <span>
+#include <vector>
+
+#include "perikit/body/body.hpp"
+#include "perikit/scene/expression.hpp"
+
+namespace perikit {
+
+/// Length, area or volume of the Voronoi cells of the points inside of a box and, unless it is null, of `inside`.
+std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,
+                                    const Expression* inside);
+
+/// Share of the cell of a lattice around a place that is inside.
+double share_inside(const Expression& inside, const Point& centre, double spacing, int dimension);
+
+}  // namespace perikit

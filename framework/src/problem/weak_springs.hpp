@@ -1,0 +1,41 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/evaluation_status.hpp"
+#include "perikit/problem/problem.hpp"
+#include "problem/loose_pieces.hpp"
+
+namespace perikit {
+
+/// What is done about the loose pieces of a body in a quasi-static run: their points hang on springs from where they came loose,
+/// -k (u - anchor) with k = share (lambda + 2 mu) V/dx^2; with a share of 0 loads that move them are refused.
+class WeakSprings {
+ public:
+  WeakSprings(const Families& families, Problem& problem, double share);
+
+  /// Looks for the pieces at u, as the terms see it. fresh: points that are loose now and were not are anchored where they are.
+  void find(ConstFieldView u, bool fresh);
+  const std::vector<LoosePiece>& pieces() const noexcept { return pieces_; }
+  bool hold() const noexcept { return share_ > 0 && !pieces_.empty(); }
+  /// The piece that the present loads move although nothing holds it; all well where springs do.
+  EvaluationStatus refuse(ConstFieldView u) const;
+
+  // Where they hold.
+  void add_forces(ConstFieldView u, FieldView force, double* energy) const;
+  void add_tangent(ConstFieldView w, FieldView Kw) const;
+  void add_to(BlockMatrix& K) const;
+
+ private:
+  double stiffness(std::int32_t point) const;
+
+  const Families& families_;
+  Problem& problem_;
+  double share_;
+  std::vector<LoosePiece> pieces_;
+  std::vector<std::uint8_t> loose_;  ///< by point
+  FieldView anchor_;                 ///< in the state; no data without springs
+};
+
+}  // namespace perikit

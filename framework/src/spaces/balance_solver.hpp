@@ -1,0 +1,60 @@
+#pragma once
+/// Conjugate gradients for the systems that balance a constant stress on a cloud. A system has
+///   make()              a vector of its unknowns
+///   apply(x, y)         y <- A x
+///   precondition(r, z)  z <- P r
+///   largest(r)          the largest |A_k| in a residual, over volume and spacing
+
+#include <algorithm>
+
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+/// Residuals below this are rounding.
+inline constexpr double rounding_residual = 2e-13;
+
+/// As many iterations as small clouds need to come to rounding; large ones get by with a smaller residual.
+inline int most_iterations(std::size_t points) {
+  return static_cast<int>(std::clamp(4e6 / static_cast<double>(points), 300.0, 4000.0));
+}
+
+/// x with A x = b, from the x that is there, to a residual of `wanted`; the number of iterations. Ends where the residual no
+/// longer falls, too.
+template <class System>
+int solve(System& system, const Field& b, double wanted, int most, Field& x) {
+  Field r = system.make(), z = r, direction = r, image = r;
+  int iterations = 0;
+  double best = 0;
+  for (int restart = 0; restart < 4; ++restart) {
+    system.apply(x, r);
+    combine(1, b, -1, r, r);
+    const double now = system.largest(r);
+    if (now <= wanted || (restart > 0 && now > 0.5 * best)) break;
+    best = now;
+    system.precondition(r, z);
+    copy(z, direction);
+    double product = dot(r, z);
+    const double start = product;
+    int since = 0;
+    for (double least = product; iterations < most && product > 0; ++iterations) {
+      system.apply(direction, image);
+      const double curvature = dot(direction, image);
+      if (!(curvature > 0)) break;
+      const double step = product / curvature;
+      combine(1, x, step, direction, x);
+      combine(1, r, -step, image, r);
+      if (system.largest(r) <= 0.5 * wanted) break;
+      system.precondition(r, z);
+      const double next = dot(r, z);
+      since = next < 0.5 * least ? 0 : since + 1;
+      least = std::min(least, next);
+      if (since > 300 || next < 1e-30 * start) break;
+      combine(1, z, next / product, direction, direction);
+      product = next;
+    }
+  }
+  return iterations;
+}
+
+}  // namespace perikit

@@ -1,0 +1,25 @@
+#pragma once
+/// Point gradients with which a constant stress is in equilibrium on a cloud. They have no weights to choose; the stencil itself
+/// moves, as little as possible: minimise sum_i W_i sum_j |d_ij|^2 / (2 omega_ij V_j) under
+///
+///   sum_j d_ij (x) xi_ij = 0 (affine motion stays exact),     A_k = sum_i W_i g_ik - W_k sum_j g_kj = 0 at closed points, g = g0
+///   + d.
+///
+/// The solution is d_ij = omega V_j z_ij, z_ij = lambda_ij - (gradient of lambda)_i xi_ij: what of a field lambda is not affine
+/// in the family. One vector a point determines it, and A_k(lambda) = A_k(0) + (S lambda)_k with the matrix S of the energy sum_i
+/// W_i sum_j omega V_j |z_ij|^2 / 2.
+
+#include "families/cloud_families.hpp"
+#include "spaces/closed_points.hpp"
+#include "spaces/consistency.hpp"
+
+namespace perikit {
+
+/// lambda by point (images included), and what was achieved.
+template <int D>
+Field find_shift(const CloudFamilies& families, const ClosedPoints& closed, const CloudConsistency& images, Balanced& result);
+
+/// g of the bonds of a loaded family, without -> with lambda: g[k * dimension + e].
+void shift_gradient(const FamilyArrays& family, std::size_t p, ConstFieldView lambda, std::vector<double>& g);
+
+}  // namespace perikit

@@ -1,0 +1,83 @@
+/// Explicit runs whose time step is too long: refused before they start, stopped where they lose their energy, warned of at the
+/// end.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include "robustness/desk.hpp"
+
+using namespace perikit::test;
+
+namespace {
+
+/// The longest stable step of the plate, as the refusal of a longer one states it.
+double stable_step(const Desk& desk) {
+  const std::string text = desk.perikit("check scene.toml --set integrator.time_step=100").err,
+                    before = "the longest stable step at the start is ";
+  REQUIRE_MESSAGE(contains(text, before), text);
+  return std::stod(text.substr(text.find(before) + before.size()));
+}
+
+std::string step(double length) {
+  return fmt::format(" --set integrator.time_step={:.17g}", length);
+}
+
+/// Neighbours that move against each other: close to the highest mode of the plate.
+const std::string rattling = "[initial]\nvelocity = [\"0.001*sin(pi*x)*sin(pi*y)\", 0]\n[integrator]";
+
+}  // namespace
+
+TEST_CASE("energies: check and run refuse a time step above the stable one, unless the scene allows it") {
+  const Desk desk;
+  const double stable = stable_step(desk);
+  for (const std::string command : {"check scene.toml", "run scene.toml --quiet -o out"}) {
+    const Result refused = desk.perikit(command + step(1.02 * stable));
+    CHECK(refused.status == 2);
+    CHECK_MESSAGE(contains(refused.err, "integrator.time_step: found "), refused.err);
+    CHECK_MESSAGE(contains(refused.err, "allow_unstable = true"), refused.err);
+    CHECK_MESSAGE(!fs::exists(desk.path("out")), "a refused scene leaves a folder");
+  }
+  CHECK(desk.perikit("check scene.toml" + step(0.98 * stable)).status == 0);
+  CHECK(desk.perikit("check scene.toml --set integrator.allow_unstable=true" + step(1.02 * stable)).status == 0);
+  const Result allowed = desk.perikit("run scene.toml -o out --set integrator.allow_unstable=true --set integrator.end_time=3.0" +
+                                      step(1.02 * stable));
+  CHECK_MESSAGE(allowed.status == 0, allowed.err);
+  CHECK_MESSAGE(contains(desk.text("out/run.log"), "allowed by allow_unstable"), desk.text("out/run.log"));
+  const Result useless = desk.perikit(
+      "check scene.toml --set integrator.allow_unstable=true --set "
+      "'integrator={type=\"verlet\",end_time=1.0,allow_unstable=true}'");
+  CHECK(useless.status == 2);
+  CHECK_MESSAGE(contains(useless.err, "integrator.allow_unstable: found without time_step"), useless.err);
+}
+
+TEST_CASE("energies: a run that loses its energy ends with status 1 and the energies") {
+  const Desk desk;
+  const Result run =
+      desk.perikit("run scene.toml --quiet -o out --set integrator.allow_unstable=true --set integrator.end_time=5000.0" +
+                   step(1.1 * stable_step(desk)));
+  CHECK(run.status == 1);
+  CHECK_MESSAGE(contains(run.err, "the energies do not add up any more: strain "), run.err);
+  CHECK_MESSAGE(contains(run.err, "last good frame: "), run.err);
+  CHECK(contains(desk.text("out/run.log"), "the energies do not add up any more"));
+}
+
+TEST_CASE("energies: what a long but stable step does to the fastest motions is a warning, also after a stop") {
+  const Desk desk(replaced(replaced(plate, "velocity = [0.1, \"free\"]", "velocity = [0, \"free\"]"), "[integrator]", rattling));
+  const std::string warning = "warning: the energies were off by up to ";
+  const double stable = stable_step(desk);
+  const Result coarse = desk.perikit("run scene.toml -o coarse --set integrator.end_time=100.0" + step(0.95 * stable));
+  CHECK_MESSAGE(coarse.status == 0, coarse.err);
+  CHECK_MESSAGE(contains(coarse.out, warning), coarse.out);
+  const Result fine = desk.perikit("run scene.toml -o fine --set integrator.end_time=100.0" + step(0.1 * stable));
+  CHECK_MESSAGE(fine.status == 0, fine.err);
+  CHECK_MESSAGE(!contains(fine.out, warning), fine.out);
+}
+
+TEST_CASE("energies: a body at rest, far from where it was, has none that could be lost") {
+  const Desk desk(replaced(replaced(plate, "displacement = [0, 0]\n", "displacement = [1e6, 0.3]\n"),
+                           "[[boundary]]\nset = \"right\"\nvelocity = [0.1, \"free\"]\n\n[integrator]",
+                           "[initial]\ndisplacement = [1e6, 0.3]\n[integrator]"));
+  const Result run = desk.perikit("run scene.toml -o out --set 'output.history=[]'");
+  CHECK_MESSAGE(run.status == 0, run.err);
+  CHECK_MESSAGE(contains(run.out, "warnings      none"), run.out);
+}
