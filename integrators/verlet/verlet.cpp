@@ -81,21 +81,24 @@ class Stepper {
     for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
   }
 
-  /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of the
-  /// prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
-  void add_work(double dt, ConstFieldView old_external) {
-    double work = 0, held = 0;
-    if (loaded_) {
-      const double now = dot(external_, v_);
-      work = dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
-    }
+  /// Work of the loads over a step of length dt that ended now [J].
+  void add_work_of_loads(double dt, ConstFieldView old_external) {
+    if (!loaded_) return;
+    const double now = dot(external_, v_);
+    state_.energies.external_work += dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
+  }
+
+  /// That of the constraints: what keeps the energy of the prescribed components in balance, their change of kinetic energy less
+  /// the work of the other forces on them.
+  void add_work_of_constraints(double dt) {
+    double held = 0;
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
       held += 0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]];
       speed_[k] = now;
     }
-    state_.energies.external_work += work + communicator().sum(held);
+    state_.energies.external_work += communicator().sum(held);
   }
 
   /// Velocities of the prescribed components at full step t.
@@ -123,23 +126,28 @@ class Stepper {
   double uniform_;
   bool loaded_;
   FieldView external_;
-  std::vector<double> held_, before_, speed_, full_;   ///< by constrained component
+  std::vector<double> held_, before_, speed_, full_;  ///< by constrained component
 };
 
 }  // namespace
 
+double Verlet::safety(const Problem& problem) const {
+  return options_.safety > 0 ? options_.safety : problem.bonds().empty() ? 0.9 : 0.5;
+}
+
 double Verlet::stable_step(Problem& problem) const {
-  if (options_.bond_based) return options_.safety * bond_based_time_step(problem.body(), problem.laws());
+  if (options_.bond_based) return safety(problem) * bond_based_time_step(problem.body(), problem.laws());
   const double eigenvalue = largest_eigenvalue(problem, problem.state().displacement());
-  return eigenvalue > 0 ? options_.safety * 2 / std::sqrt(eigenvalue) : options_.end_time;
+  return eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
 }
 
 double Verlet::steps_to_end(double time, double step) const {
-  constexpr double most = 1e15;   // whole numbers that a double holds
+  constexpr double most = 1e15;  // whole numbers that a double holds
   const double steps = std::max(1.0, std::ceil((options_.end_time - time) / step * (1 - 1e-12)));
   if (steps <= most) return steps;
-  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps",
-                                                      options_.end_time, steps, step, most));
+  throw options_.values.error(
+      "end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps", options_.end_time,
+                              steps, step, most));
 }
 
 std::string Verlet::plan(Problem& problem) {
@@ -154,12 +162,12 @@ void Verlet::run(Problem& problem, Observer& observer) {
   State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
   const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
-  double& first = plan[0];     // step at which the plan was made
-  double& start = plan[1];     // and its time
+  double& first = plan[0];  // step at which the plan was made
+  double& start = plan[1];  // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
-  double& counter = plan[4];   // steps of the plan
-  double& broke = plan[5];     // whether bonds have failed since the last estimate
+  double& counter = plan[4];  // steps of the plan
+  double& broke = plan[5];    // whether bonds have failed since the last estimate
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
     first = static_cast<double>(state.step);
@@ -183,8 +191,9 @@ void Verlet::run(Problem& problem, Observer& observer) {
   const bool fresh = dt == 0;
   double& planned_end = state.declare_numbers("planned_end", 1)[0];
   if (!fresh && planned_end != options_.end_time) {
-    make_plan(dt);   // not the step: only its end is another
-    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time, planned_end, counter, dt));
+    make_plan(dt);  // not the step: only its end is another
+    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time,
+                             planned_end, counter, dt));
   }
   planned_end = options_.end_time;
   if (fresh) {
@@ -217,13 +226,15 @@ void Verlet::run(Problem& problem, Observer& observer) {
       stepper.load();
     }
     stepper.prescribed_speed(t_next, speeds);
-    stepper.add_work(dt, old_external);
+    stepper.add_work_of_loads(dt, old_external);
+    // Forces, velocity and energies are those of the bonds that are left.
+    if (problem.advance(dt, stepper.half())) broke = 1;
+    stepper.add_work_of_constraints(dt);
     last_dt = dt;
     if (sample) {
       stepper.kick(stepper.half(), v, 0.5 * dt);
       problem.constraints().prescribe_velocity(t_next, v);
     }
-    if (problem.advance(dt, stepper.half())) broke = 1;
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
     const std::int64_t check_every = broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every;
     if (estimated && !last && !problem.constant_stiffness() && state.step % check_every == 0) {
@@ -231,8 +242,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
-                                 state.step, counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step,
+                                 counter, dt));
       }
     }
     observer.step_done(report());

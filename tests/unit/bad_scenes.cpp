@@ -43,6 +43,11 @@ displacement = [0, 0]
 type = "newton"
 )";
 
+// Up to the value of interface.0.between.
+#define INTERFACE                                                                                                      \
+  "[[region]]\nset = \"left\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }\n[damage]\n" \
+  "type = \"critical_stretch\"\nstretch = 0.1\n[[interface]]\nbetween = "
+
 struct Case {
   int line;  // replaced, 0: text is appended
   const char* text;
@@ -92,7 +97,8 @@ const Case cases[]{
     {8, "[body.latice]", 5, "body", "found none of them; allowed: exactly 1 of [body.lattice], [body.points]"},
     {9, "spacing = 0", 9, "body.lattice.spacing", "allowed: a number > 0 [m]"},
     {9, "spacing = nan", 9, "body.lattice.spacing", "found the number nan"},
-    {9, "spacing = \"0.1*x\"", 9, "body.lattice.spacing", "found the string \"0.1*x\"; allowed: a number > 0 [m], or an expression in [constants]"},
+    {9, "spacing = \"0.1*x\"", 9, "body.lattice.spacing",
+     "found the string \"0.1*x\"; allowed: a number > 0 [m], or an expression in [constants]"},
     {9, "spacing = \"-w\"", 9, "body.lattice.spacing", "found the string \"-w\" = -"},
     {9, "spacing = true", 9, "body.lattice.spacing", "found the boolean true"},
     {9, "spacing = 1e-9", 9, "body.lattice.spacing", "which gives about 1e+18 points"},
@@ -161,6 +167,14 @@ const Case cases[]{
     {0, "[[crack]]\nsegment = [[0, 0], [1]]", 30, "crack.0.segment.1", "found a list of 1; allowed: a list of 2"},
     {0, "[[crack]]\nsegment = [[0, 0], [0, 0]]", 30, "crack.0.segment", "allowed: two different ends"},
     {0, "[[crack]]", 29, "crack.0", "found none of them; allowed: exactly 1 of segment, polygon"},
+    {0, INTERFACE "[\"left\", \"rset\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "did you mean 'rest'?"},
+    {0, INTERFACE "[\"left\", \"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "allowed: two different regions"},
+    {0, INTERFACE "[\"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "allowed: a list of strings (exactly 2)"},
+    {0, "[[interface]]\nbetween = [\"left\", \"rest\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 29,
+     "interface.0.damage", "found in a scene without [damage]"},
     // initial, boundaries, loads
     {0, "[initial]\ndisplacement = [0]", 30, "initial.displacement", "found a list of 1; allowed: a list of 2"},
     {0, "[initial]\nvelocity = [0, \"free\"]", 30, "initial.velocity.1", "unknown name 'free'"},
@@ -178,7 +192,8 @@ const Case cases[]{
     {25, "face = \"+z\"", 25, "boundary.0.face", "found \"+z\" in a body of dimension 2; allowed: the axes of the body"},
     {25, "face = \"left\"", 25, "boundary.0.face", "allowed: \"+x\", \"-x\""},
     {25, "set = \"left\"\nat = 0.1", 26, "boundary.0.at", "found it without face; allowed: only with face"},
-    {0, "[[symmetry]]\naxis = \"z\"", 30, "symmetry.0.axis", "found \"z\" in a body of dimension 2; allowed: the axes of the body"},
+    {0, "[[symmetry]]\naxis = \"z\"", 30, "symmetry.0.axis",
+     "found \"z\" in a body of dimension 2; allowed: the axes of the body"},
     {0, "[[symmetry]]\nat = 0.5", 29, "symmetry.0.axis", "found nothing; allowed: \"x\""},
     {0, "[[periodic]]\naxis = 1", 30, "periodic.0.axis", "found the integer 1; allowed: \"x\""},
     {0, "[periodic]\naxis = \"x\"", 29, "periodic", "found a table; allowed: [[periodic]]"},

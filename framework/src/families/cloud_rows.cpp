@@ -27,7 +27,8 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
     units.push_back(static_cast<std::int32_t>(b));
     for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
+        const auto unit =
+            static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
         if (unit != units.back()) units.push_back(unit);
       }
     }
@@ -39,6 +40,11 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
 
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
   return QuietBlocks::moves(u, b * block_points, std::min(points, (b + 1) * block_points));
+}
+
+bool cloud_marked(const std::uint8_t* marks, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
+  const std::size_t begin = b * block_points, end = std::min(points, begin + block_points);
+  return std::any_of(marks + begin / padding, marks + (end + padding - 1) / padding, [](std::uint8_t m) { return m != 0; });
 }
 
 }  // namespace perikit

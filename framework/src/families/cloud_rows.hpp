@@ -17,7 +17,9 @@ typedef double Row __attribute__((vector_size(32)));
 
 inline constexpr std::size_t cloud_block_points = 256;
 
-constexpr std::size_t cloud_blocks(std::size_t points) noexcept { return (points + cloud_block_points - 1) / cloud_block_points; }
+constexpr std::size_t cloud_blocks(std::size_t points) noexcept {
+  return (points + cloud_block_points - 1) / cloud_block_points;
+}
 
 /// rows[p] <- components of u at p, zero in the rest.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows);
@@ -27,5 +29,8 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
 
 /// Whether a point of block b moves.
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points = cloud_block_points) noexcept;
+/// Whether a group of eight points in block b is marked.
+bool cloud_marked(const std::uint8_t* marks, std::size_t b, std::size_t points,
+                  std::size_t block_points = cloud_block_points) noexcept;
 
 }  // namespace perikit

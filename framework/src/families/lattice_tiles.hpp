@@ -14,12 +14,12 @@ struct LatticeSlots;
 inline constexpr int chunk_points = static_cast<int>(padding);
 
 struct LatticeChunk {
-  std::int32_t first;                          ///< internal index, a multiple of chunk_points
-  std::int32_t pattern;                        ///< of its bonds; -1: whole
+  std::int32_t first;    ///< internal index, a multiple of chunk_points
+  std::int32_t pattern;  ///< of its bonds; -1: whole
 };
 
-/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence. Where it is not the whole
-/// row, families reach into so many chunks before it and after it.
+/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence. Where it is
+/// not the whole row, families reach into so many chunks before it and after it.
 struct LatticeRow {
   std::int32_t first;
   std::int32_t chunks;
@@ -29,14 +29,14 @@ struct LatticeRow {
 };
 
 struct LatticeBlock {
-  std::size_t chunk_begin, chunk_end;          ///< into chunks
-  std::size_t row_begin, row_end;              ///< into rows
+  std::size_t chunk_begin, chunk_end;  ///< into chunks
+  std::size_t row_begin, row_end;      ///< into rows
 };
 
 struct LatticeTiles {
   LatticeTiles(const Body& body, const LatticeSlots& slots);
 
-  std::vector<LatticeChunk> chunks;            ///< live ones, block by block, along rows
+  std::vector<LatticeChunk> chunks;  ///< live ones, block by block, along rows
   std::vector<LatticeRow> rows;
   std::vector<LatticeBlock> blocks;
   BlockReach reach;
@@ -46,6 +46,12 @@ struct LatticeTiles {
   std::int32_t chunk_of(std::int64_t point) const noexcept { return chunk_at_[static_cast<std::size_t>(point) / chunk_points]; }
   /// Whether a point of block b moves.
   bool moves(std::size_t b, ConstFieldView u) const noexcept;
+  /// Whether a group of block b is marked.
+  bool marked(std::size_t b, const std::uint8_t* marks) const noexcept {
+    for (std::size_t c = blocks[b].chunk_begin; c < blocks[b].chunk_end; ++c)
+      if (marks[chunks[c].first / chunk_points]) return true;
+    return false;
+  }
   /// Zero in the rows of block b; in the dead cells of all rows.
   void clear(std::size_t b, FieldView out) const noexcept;
   void clear_dead(FieldView out) const noexcept;
@@ -53,13 +59,15 @@ struct LatticeTiles {
 
  private:
   struct Box {
-    std::int64_t low[3], high[3];              ///< chunk along the row, then rows
+    std::int64_t low[3], high[3];  ///< chunk along the row, then rows
   };
   /// Which tiles a block touches, and its colour. size, count: of tiles along the axes.
-  void colour(const std::vector<Box>& boxes, const std::int64_t (&size)[3], const std::int64_t (&count)[3], const LatticeSlots& slots);
+  void colour(const std::vector<Box>& boxes, const std::int64_t (&size)[3], const std::int64_t (&count)[3],
+              const LatticeSlots& slots);
 
-  std::vector<std::int32_t> chunk_at_;         ///< by group of eight cells
-  std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;   ///< first cells of such groups in rows, and which of them live
+  std::vector<std::int32_t> chunk_at_;  ///< by group of eight cells
+  std::vector<std::pair<std::int32_t, std::uint8_t>>
+      partly_dead_;  ///< first cells of such groups in rows, and which of them live
 };
 
 }  // namespace perikit

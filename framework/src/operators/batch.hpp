@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "maps/selective_map.hpp"
+#include "operators/bond_screen.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/operators/law_history.hpp"
 #include "perikit/operators/laws.hpp"
@@ -32,9 +33,10 @@ struct Balance {
 struct BatchScratch {
   alignas(64) double H[9 * batch_points];
   alignas(64) double dH[9 * batch_points];
-  alignas(64) double P[9 * batch_points];        ///< result: weighted stress
-  alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
+  alignas(64) double P[9 * batch_points];      ///< result: weighted stress
+  alignas(64) double other[9 * batch_points];  ///< stress of the far ends' material
   alignas(64) double psi[batch_points];
+  alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
   alignas(64) double A[9 * batch_points];
   alignas(64) double dA[9 * batch_points];
@@ -59,20 +61,20 @@ struct BatchScratch {
   std::int32_t far[batch_points];
   LawScratch law;
   // Laws with history: the stable numbers of the lanes, to be filled in by the space where history is kept.
-  std::int64_t first_number = -1;                ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
-  std::int64_t number[batch_points];             ///< by lane; -1: fresh, and not kept
-  std::int64_t far_number = 0;                   ///< added where a bond is evaluated for its far end
-  bool keep_history = true;                      ///< false: another block keeps that of these lanes
-  AlignedVector<double> old_state, new_state;    ///< gathered, [component][lane]
+  std::int64_t first_number = -1;     ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
+  std::int64_t number[batch_points];  ///< by lane; -1: fresh, and not kept
+  std::int64_t far_number = 0;        ///< added where a bond is evaluated for its far end
+  bool keep_history = true;           ///< false: another block keeps that of these lanes
+  AlignedVector<double> old_state, new_state;  ///< gathered, [component][lane]
 };
 
 /// Sums over lanes of sampled quantities go here, one row per owner.
 struct SampleSums {
-  double* weight;      ///< sum W
-  double* psi;         ///< sum W psi
-  double* H;           ///< tensor components x stride
+  double* weight;  ///< sum W
+  double* psi;     ///< sum W psi
+  double* H;       ///< tensor components x stride
   double* P;
-  double* cauchy;      ///< 9 x stride
+  double* cauchy;  ///< 9 x stride
   double* von_mises;
   std::size_t stride;
 };
@@ -89,14 +91,26 @@ class ScratchPool {
   std::vector<std::unique_ptr<BatchScratch>> scratch_;
 };
 
+/// Cauchy stress of a lane after an evaluation with Work::sample.
+void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)[3][3]) noexcept;
+
+class BondSamples;
+
 class BatchWork {
  public:
   /// history: null where no law has one.
-  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr)
-      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance) {}
+  /// screen: null where bonds are not screened.
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr,
+            BondScreen* screen = nullptr)
+      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance), screen_(screen) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
+  /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
+  /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
+  void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
+  /// The same where the first `lanes` lanes belong to `count` points in turn, every eighth to the same one. From any thread.
+  void screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept;
   /// Whether the numbers of lanes are asked for.
   bool history() const noexcept { return history_ != nullptr; }
   /// What is done in place of laws; null: laws are.
@@ -104,8 +118,8 @@ class BatchWork {
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
-  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
-  /// ends of at most batch_points / 2 lanes.
+  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results
+  /// too; both ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
@@ -115,11 +129,14 @@ class BatchWork {
            double* energy) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
-  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
+  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P,
+                    double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
   void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
-  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && history_->time_step() > 0 && s.keep_history; }
+  bool keeps_history(const BatchScratch& s) const noexcept {
+    return work_ == Work::force && history_->time_step() > 0 && s.keep_history;
+  }
 
   const Laws& laws_;
   Work work_;
@@ -127,6 +144,7 @@ class BatchWork {
   bool selective_;
   LawHistory* history_;
   const Balance* balance_;
+  BondScreen* screen_;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.
@@ -135,13 +153,21 @@ struct Pass {
   ConstFieldView u, w;
   FieldView out;
   const SampleSums* sums = nullptr;
-  double* energies = nullptr;     ///< by block
-  std::int64_t bad = -1;          ///< internal index
+  double* energies = nullptr;  ///< by block
+  std::int64_t bad = -1;       ///< internal index
   std::mutex guard;
-  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
+  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at
+  /// `near`.
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
+  /// By group of eight points: forces of the evaluation points alone that belong to the blocks of these, the same whatever is
+  /// quiet.
+  const std::uint8_t* nearby = nullptr;
+  BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
 
+  /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
+  /// points.
+  void add_samples(int n, const BatchScratch& s);
   /// Evaluation points are taken one by one and nothing is scattered.
   bool alone() const noexcept { return only || work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.

@@ -8,7 +8,6 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "perikit/problem/motion.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
@@ -63,7 +62,9 @@ void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const
   images()->fold(full, K);
 }
 
-EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
+EvaluationStatus BodyProblem::sample(PointSamples& samples) {
+  return terms().sample(seen(state().displacement(), seen_), samples);
+}
 
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
@@ -79,8 +80,10 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
                                      status.description, parts_.kinematics, parts_.materials[id]);
   }
   if (weak_springs_ && status.ok()) {
-    if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
-    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok()) return refused;
+    if (weak_springs_->hold())
+      weak_springs_->add_forces(u, force, energy);
+    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok())
+      return refused;
   }
   finish(force, status);
   return status;
@@ -133,7 +136,8 @@ EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K)
 AssembledSize BodyProblem::assembled_size() {
   refuse_ranks(parts_);
   AssembledSize size = terms().assembled_size();
-  if (images()) size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);   // it is there twice
+  if (images())
+    size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);  // it is there twice
   return size;
 }
 
@@ -147,16 +151,46 @@ bool BodyProblem::constant_stiffness() const noexcept {
   return terms().has_gradients() && laws().constant_tangent() && !parts_.fracture.damage();
 }
 
-bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
+bool BodyProblem::advance(double time_step, FieldView velocity) {
   if (terms().history()) terms().history()->advance();
   if (!parts_.fracture.damage()) return false;
-  const Motion half_step = [&](FieldView end) {
-    middle_of_next_step(*this, time_step, velocity, end);
-    if (images()) images()->extend(end);
+  const ConstFieldView u = state().displacement();
+  const StepBegin begin = [&](FieldView before) {
+    for (std::size_t k = 0; k < before.size(); ++k) before.data[k] = u.data[k] - time_step * velocity.data[k];
+    if (images()) images()->extend(before);
   };
-  const bool changed = parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step, velocity.data ? half_step : Motion());
+  const bool explicit_step = velocity.data != nullptr;
+  BondReaction reaction;
+  const bool changed =
+      parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
+  if (changed && explicit_step) react(reaction, velocity);
   if (changed && weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
   return changed;
+}
+
+/// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
+/// the impulse upon it; its work is that of all other forces, with the opposite sign.
+void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
+  EvaluationStatus status;
+  const FieldView impulse = reaction.impulse, drift = reaction.drift;
+  finish(impulse, status);
+  finish(drift, status);
+  const FieldView u = state().displacement();
+  const std::span<const double> by_point = masses().by_point();
+  const ConstFieldView free = constraints().free();
+  double held = 0;
+  for (std::size_t k = 0; k < velocity.size(); ++k) {
+    const double mass = by_point[k % velocity.stride];
+    if (free.data[k] != 0 && mass > 0) {
+      velocity.data[k] += impulse.data[k] / mass;
+      u.data[k] += drift.data[k] / mass;
+    } else {
+      held += impulse.data[k] * velocity.data[k];
+    }
+  }
+  state().energies.external_work -= held;
+  status = evaluate_forces(u, state().internal_force(), &state().energies.strain);
+  if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
@@ -165,7 +199,9 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
   const std::vector<LoosePiece>& pieces = weak_springs_->pieces();
   if (pieces.empty()) return {};
   const std::string first = pieces.front().name(body());
-  return pieces.size() == 1 ? first : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+  return pieces.size() == 1
+             ? first
+             : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {
@@ -215,7 +251,7 @@ struct BeforeState {
   explicit BeforeState(std::span<const std::byte> snapshot) {
     ByteReader in(snapshot);
     stride = in.value<std::uint64_t>();
-    in.value<double>();   // of the constraints
+    in.value<double>();  // of the constraints
     FractureRecord::read_bonds(in, bonds);
     history.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
     in.bytes(history.data(), history.size() * sizeof(double));
@@ -234,8 +270,9 @@ void BodyProblem::carry(std::span<const std::byte> snapshot) {
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
   if (before.stride != body().stride()) throw InputError("the earlier run had another body");
   if (before.history.size() != history.size()) throw InputError("the earlier run had other laws");
-  std::vector<BondChange> lost;   // of the bonds that cracks of this scene leave
-  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
+  std::vector<BondChange> lost;  // of the bonds that cracks of this scene leave
+  std::ranges::copy_if(before.bonds, std::back_inserter(lost),
+                       [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
   if (!lost.empty()) terms().restore_bonds(lost);
   if (history.empty()) return;
   std::ranges::copy(before.history, history.begin());

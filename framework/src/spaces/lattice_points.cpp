@@ -11,7 +11,9 @@ namespace {
 constexpr int chunks_at_once = batch_points / chunk_points;
 
 /// Rows of a block that are taken together: whole batches for the law where rows are short.
-std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<std::size_t>(std::max(1, chunks_at_once / row.chunks)); }
+std::size_t rows_at_once(const LatticeRow& row) noexcept {
+  return static_cast<std::size_t>(std::max(1, chunks_at_once / row.chunks));
+}
 
 }  // namespace
 
@@ -19,6 +21,7 @@ template <int D>
 LatticePoints<D>::LatticePoints(const SpaceParts& parts)
     : families_(*parts.families.lattice()), tiles_(families_.tiles), laws_(parts.laws), operator_(families_) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
+  local_ = parts.local_blocks(tiles_.reach);
   gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.slots.row_reach)));
   for (const LatticeRow& row : tiles_.rows) most_ = std::max(most_, static_cast<std::int64_t>(rows_at_once(row)) * width(row));
 }
@@ -30,15 +33,20 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
     const int lane = i * chunk_points;
     std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
     if (!laws_.single() || pass.alone()) {
-      for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk(index[i]).first + l;
+      for (int l = 0; l < chunk_points; ++l) {
+        s.owner[lane + l] = chunk(index[i]).first + l;
+        s.far[lane + l] = -1;
+      }
     }
   }
   if (pass.work.history()) {
     s.first_number = index[n - 1] - index[0] == n - 1 ? std::int64_t{index[0]} * chunk_points : -1;
-    for (int l = 0; l < n * chunk_points; ++l) s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
+    for (int l = 0; l < n * chunk_points; ++l)
+      s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
   }
   const int bad = pass.work.evaluate(n * chunk_points, s, false, energy);
   if (bad >= 0) pass.report(chunk(index[bad / chunk_points]).first + bad % chunk_points);
+  for (int i = 0; i < n && s.keep_history; ++i) pass.work.screen(chunk(index[i]).first, i * chunk_points, chunk_points, s);
   return bad < 0;
 }
 
@@ -63,7 +71,7 @@ void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
         const LatticePattern& pattern = families_.pattern(chunk(index[l / chunk_points]));
         if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
       }
-      pass.work.add_samples(n * chunk_points, s, *pass.sums);
+      pass.add_samples(n * chunk_points, s);
     }
     n = 0;
   }
@@ -76,12 +84,13 @@ std::int64_t LatticePoints<D>::width(const LatticeRow& row) const noexcept {
   return std::int64_t(row.chunks) * chunk_points + 2 * gap_;
 }
 
-/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows, and then the
-/// one after their last.
+/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows,
+/// and then the one after their last.
 template <int D>
 void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
   const auto zero = [&](std::int64_t from, std::int64_t to) {
-    for (int c = 0; c < D * D && to > from; ++c) std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
+    for (int c = 0; c < D * D && to > from; ++c)
+      std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
   };
   r.index.clear();
   r.at.clear();
@@ -131,7 +140,8 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   double energy = 0, of_others = 0;
   std::size_t next = block.chunk_begin;
   for (std::size_t first = block.row_begin; first < block.row_end;) {
-    const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
+    const std::span rows =
+        std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
     place(rows, next, block.chunk_end, r);
     for (std::size_t i = 0; i < r.index.size();) {
       const bool own = i < r.own;
@@ -141,14 +151,16 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
       s.keep_history = own;
       if (!evaluate(&r.index[i], n, s, pass, own ? &energy : &of_others)) return;
       for (int k = 0; k < n; ++k, ++i)
-        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i], own ? pass.out : FieldView{});
+        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i],
+                                 own ? pass.out : FieldView{});
     }
     std::int64_t start = gap_;
     for (const LatticeRow& row : rows) {
       operator_.divergence(row, r.flux, start, pass.out);
       start += width(row);
     }
-    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
+    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i)
+      operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
     first += rows.size();
   }
   s.keep_history = true;
@@ -158,14 +170,17 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
 template <int D>
 void LatticePoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
-  if (pass.alone() || pass.work.tangent()) quiet_.wake();
-  else quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+  if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
+  if (pass.alone() || pass.nearby || pass.work.tangent())
+    quiet_.wake();
+  else
+    quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { one_by_one(b, pass); });
   rows_.resize(static_cast<std::size_t>(thread_count()));
   for (Rows& r : rows_)
     if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
   tiles_.colouring.for_each([&](std::size_t b) {
-    if (quiet_.awake(b, 1)) by_rows(b, pass);
+    if (pass.nearby ? near(b, 1) : quiet_.awake(b, 1)) by_rows(b, pass);
   });
   tiles_.clear_dead(pass.out);
 }

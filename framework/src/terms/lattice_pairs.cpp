@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <vector>
 
 #include "families/lattice_families.hpp"
+#include "terms/energy_shares.hpp"
 #include "terms/pair_loop.hpp"
 
 namespace perikit {
@@ -18,20 +20,33 @@ template <int D>
 class LatticePairs final : public PairLoop {
  public:
   explicit LatticePairs(const PairLoopParts& parts)
-      : PairLoop(parts), law_(*parts.formulation.pairs), fields_(parts.fields), dilatation_(parts.formulation.dilatation != nullptr),
-        families_(*parts.families.lattice()), squared_volume_(families_.volume * families_.volume) {
+      : PairLoop(parts),
+        law_(*parts.formulation.pairs),
+        fields_(parts.fields),
+        dilatation_(parts.formulation.dilatation != nullptr),
+        families_(*parts.families.lattice()),
+        squared_volume_(families_.volume * families_.volume) {
     if (parts.quiet) watch_waves(families_.tiles.reach);
     for (std::size_t s = 0; s < families_.slots.size(); ++s) {
       const auto& xi = families_.slots.xi[s];
       length_.insert(length_.end(), chunk_points, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]));
       omega_.insert(omega_.end(), chunk_points, families_.slots.omega[s]);
     }
+    std::vector<std::uint16_t> all(families_.slots.size());
+    std::iota(all.begin(), all.end(), std::uint16_t{0});
+    FamilyArrays family;
+    AlignedVector<double> share;
+    families_.load(all, family);
+    energy_shares(parts.formulation, D, family, share);
+    for (std::size_t s = 0; s < all.size(); ++s) inverse_share_.push_back(share[s] > 0 ? 1 / share[s] : 0.0);
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
   }
 
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
   std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
+
+  bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return families_.tiles.marked(b, marks); }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
@@ -50,7 +65,8 @@ class LatticePairs final : public PairLoop {
       const LatticeChunk& chunk = families_.tiles.chunks[c];
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
-        for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
+        for (int k = 0; k < pass.out.components; ++k)
+          std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
       }
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane < 0) continue;
@@ -69,7 +85,8 @@ class LatticePairs final : public PairLoop {
   bool dilatation_;
   const LatticeFamilies& families_;
   double squared_volume_;
-  AlignedVector<double> length_, omega_;       ///< by slot, one value a lane
+  AlignedVector<double> length_, omega_;  ///< by slot, one value a lane
+  std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
 
 template <int D>
@@ -79,10 +96,12 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   constexpr int packs = chunk_points / pack_width, results = sums || work == PairWork::energy ? 1 : D;
   const LatticePattern& pattern = families_.pattern(chunk);
-  const bool weakened = !pattern.integrity.empty();   // some b lies between 0 and 1: it weighs all that its bond does
+  const bool weakened = !pattern.integrity.empty();  // some b lies between 0 and 1: it weighs all that its bond does
   const std::int64_t p = chunk.first;
   const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
-  const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
+  const bool screened = work == PairWork::force && pass.screen,
+             energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
+  Pack highest[packs];  // energy of a bond, over its share where that is asked for
   const bool uniform = fields_.modulus.size() == 0;
   alignas(64) PairScratch s;
   if constexpr (!sums) {
@@ -129,13 +148,16 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         const Stretch<D> bond(xi, length, du);
         finite[v] &= bond.e == bond.e;
         if constexpr (sums) {
-          Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          Pack term =
+              Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           own[0][v] += term;
           if constexpr (half) {
             double* target = pass.out.data + far + l;
-            if (mask == 0xff) (Pack::load(target) + term).store(target);
-            else subtract_at(target, bits, -term);
+            if (mask == 0xff)
+              (Pack::load(target) + term).store(target);
+            else
+              subtract_at(target, bits, -term);
           }
         } else {
           bond.e.store(s.e + lane);
@@ -163,7 +185,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     if constexpr (!sums) {
       const int lanes = count * chunk_points;
       law_.bond_law({lanes, length_.data() + slot * chunk_points, omega_.data() + slot * chunk_points, s.e, s.modulus,
-                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force,
+                     work == PairWork::tangent ? s.stiffness : nullptr});
       for (int k = 0; k < count; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
         const std::int64_t far = p + families_.slots.shifts[at];
@@ -173,6 +196,13 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
           const int l = v * pack_width, lane = k * chunk_points + l;
           const auto bits = static_cast<std::uint8_t>(mask >> l);
           const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
+          if (screened) {
+            Pack value = Pack::load(s.energy + lane);
+            if (pass.by_theta)
+              value += Pack(omega_[at * chunk_points] * length_[at * chunk_points]) * Pack::load(s.e + lane) *
+                       (Pack::load(pass.by_theta + p + l) + Pack::load(pass.by_theta + far + l));
+            highest[v] = max(highest[v], keep(bits, value * Pack(pass.screen->over_share ? inverse_share_[at] : 1.0)));
+          }
           if (energies) stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
           if constexpr (work == PairWork::energy) continue;
           Pack t[D], T = Pack::load(s.force + lane);
@@ -198,21 +228,32 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
             own[c][v] += t[c];
             if constexpr (half) {
               double* target = pass.out.component(c) + far + l;
-              if (mask == 0xff) (Pack::load(target) - t[c]).store(target);
-              else subtract_at(target, bits, t[c]);
+              if (mask == 0xff)
+                (Pack::load(target) - t[c]).store(target);
+              else
+                subtract_at(target, bits, t[c]);
             }
           }
         }
       }
     }
   }
+  if (screened) {
+    bool near = false;
+    for (int l = 0; l < chunk_points; ++l)
+      near |=
+          highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)];
+    if (near) pass.screen->near[static_cast<std::size_t>(p) / padding] = 1;
+  }
   int bad = -1;
   for (int l = chunk_points - 1; l >= 0; --l)
     if (!finite[l / pack_width][l % pack_width]) bad = l;
   for (int v = 0; v < packs; ++v) {
     const int l = v * pack_width;
-    if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * families_.volume) * stored[v];
-    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
+    if constexpr (work == PairWork::energy)
+      own[0][v] = Pack(0.5 * families_.volume) * stored[v];
+    else if (energies)
+      total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
     for (int c = 0; c < results; ++c) {
       double* target = pass.out.component(c) + p + l;
       (Pack::load(target) + own[c][v]).store(target);

@@ -23,12 +23,12 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
   space_->shift_gradients(parts_.shift);
 }
 
-BatchWork Mechanics::work(Work kind, bool energy) const noexcept {
-  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()};
+BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen};
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
-  const BatchWork work = this->work(Work::force, energy != nullptr);
+  const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
   std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);  // summed in the order of the blocks
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
@@ -55,6 +55,18 @@ double Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks) {
   Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
   space_->run(pass);
   return std::accumulate(energies.begin(), energies.end(), 0.0);
+}
+
+void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {
+  const BatchWork work = this->work(Work::force, false);
+  Pass pass{work, u, {}, force, nullptr, nullptr, -1, {}, nullptr, nullptr, marks.data()};
+  space_->run(pass);
+}
+
+void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+  const BatchWork work = this->work(Work::sample, false);
+  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), nullptr, &samples};
+  space_->run(pass);
 }
 
 std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {

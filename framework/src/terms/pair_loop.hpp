@@ -7,11 +7,12 @@
 #include <memory>
 #include <type_traits>
 
-#include "families/bond_monitor.hpp"
 #include "families/blocks.hpp"
+#include "families/bond_monitor.hpp"
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
+#include "operators/bond_screen.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/operators/laws.hpp"
@@ -25,25 +26,29 @@ enum class PairWork { dilatation, dilatation_rate, force, tangent, energy };
 struct PairPass {
   PairWork work;
   ConstFieldView u, w;
-  ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
+  ConstFieldView q, dq;  ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
-  double* energies = nullptr;     ///< by block
-  const std::uint8_t* only = nullptr;   ///< by group of eight points: others are left alone (dilatation and energy)
+  double* energies = nullptr;          ///< by block
+  const std::uint8_t* only = nullptr;  ///< by group of eight points: others are left alone (dilatation and energy)
+  /// Forces of the bonds alone that belong to the blocks of these groups; dilatations are there.
+  const std::uint8_t* nearby = nullptr;
+  const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
+  BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
 };
 
 /// Point quantities that bonds need.
 struct PairFields {
-  Field modulus;                  ///< c_i; empty where `uniform` holds
+  Field modulus;  ///< c_i; empty where `uniform` holds
   double uniform = 0;
-  Field correction;               ///< by axis; empty without surface correction
+  Field correction;  ///< by axis; empty without surface correction
 };
 
 struct PairLoopParts {
   const Families& families;
   const Formulation& formulation;
   const PairFields& fields;
-  bool half;                      ///< each bond once, for both ends
-  bool quiet;                     ///< without the parts that no wave has reached
+  bool half;   ///< each bond once, for both ends
+  bool quiet;  ///< without the parts that no wave has reached
 };
 
 class PairLoop {
@@ -53,7 +58,8 @@ class PairLoop {
   /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
-  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
+  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of
+  /// zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;
   virtual std::size_t bytes() const noexcept = 0;
   QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
@@ -66,9 +72,13 @@ class PairLoop {
   template <class Moves>
   void look(const PairPass& pass, const Moves& moves) {
     reach_ = pass.q.data ? 2 : 1;
-    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation)) quiet_.look(reach_, moves);
-    else quiet_.wake();
+    if (!pass.only && !pass.nearby && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
+      quiet_.look(reach_, moves);
+    else
+      quiet_.wake();
   }
+  /// Whether a group of block b is marked.
+  virtual bool holds(std::size_t b, const std::uint8_t* marks) const noexcept = 0;
   /// Each bond once, for both ends.
   bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
   /// block(work, b) for each block that is awake, `work` being pass.work as a constant; coloured where far ends are written.
@@ -76,17 +86,24 @@ class PairLoop {
   void each_block(const PairPass& pass, const Colouring& colouring, const Block& block) const {
     const auto sweep = [&]<PairWork work>(std::integral_constant<PairWork, work> constant) {
       auto body = [&](std::size_t b) {
-        if (quiet_.awake(b, reach_)) block(constant, b);
+        if (pass.nearby ? holds(b, pass.nearby) : quiet_.awake(b, reach_)) block(constant, b);
       };
-      if (at_once(pass)) colouring.for_each(body);
-      else parallel_for(blocks(), body);
+      if (at_once(pass))
+        colouring.for_each(body);
+      else
+        parallel_for(blocks(), body);
     };
     switch (pass.work) {
-      case PairWork::dilatation: return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
-      case PairWork::dilatation_rate: return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
-      case PairWork::force: return sweep(std::integral_constant<PairWork, PairWork::force>());
-      case PairWork::tangent: return sweep(std::integral_constant<PairWork, PairWork::tangent>());
-      case PairWork::energy: return sweep(std::integral_constant<PairWork, PairWork::energy>());
+      case PairWork::dilatation:
+        return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
+      case PairWork::dilatation_rate:
+        return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
+      case PairWork::force:
+        return sweep(std::integral_constant<PairWork, PairWork::force>());
+      case PairWork::tangent:
+        return sweep(std::integral_constant<PairWork, PairWork::tangent>());
+      case PairWork::energy:
+        return sweep(std::integral_constant<PairWork, PairWork::energy>());
     }
   }
   void reset_bad() noexcept { bad_ = -1; }
@@ -94,7 +111,8 @@ class PairLoop {
   /// Keeps the smallest index; from any thread.
   void report_bad(std::int64_t point) noexcept {
     std::int64_t known = bad_;
-    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {}
+    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {
+    }
   }
 
  private:
@@ -113,8 +131,8 @@ std::unique_ptr<PairLoop> make_cloud_pairs(const PairLoopParts& parts);
 struct PairScratch {
   alignas(64) double e[batch_points];
   alignas(64) double de[batch_points];
-  alignas(64) double n[3][batch_points];          ///< deformed direction
-  alignas(64) double inverse_length[batch_points];///< of the deformed bond
+  alignas(64) double n[3][batch_points];            ///< deformed direction
+  alignas(64) double inverse_length[batch_points];  ///< of the deformed bond
   alignas(64) double modulus[batch_points];
   alignas(64) double energy[batch_points];
   alignas(64) double force[batch_points];

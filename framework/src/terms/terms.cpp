@@ -9,6 +9,7 @@
 #include "families/lattice_families.hpp"
 #include "perikit/terms/terms.hpp"
 #include "spaces/consistency.hpp"
+#include "terms/bond_criterion.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
 #include "terms/zero_energy_penalty.hpp"
@@ -20,7 +21,24 @@ namespace {
 /// Zero, a piece for each thread at a time.
 void clear(double* values, std::size_t size) {
   constexpr std::size_t piece = std::size_t{1} << 16;
-  parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
+  parallel_for((size + piece - 1) / piece,
+               [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
+}
+
+/// Formulations whose bonds create energy as they fail (framework/docs/fracture.md, "Every kinematics and kernel").
+void warn_of_energy(const TermParts& parts, ModelReport& report) {
+  const Formulation& f = parts.formulation;
+  const bool by_bond = f.weighted && f.parts(parts.families->body().dimension()) == 0;
+  const char* const what = f.point && !parts.stabilization ? "one gradient per point without a stabilization"
+                           : f.bond && f.far_share == 0    ? "bond gradients that rest on the gradient of one end alone"
+                           : by_bond && f.selective()      ? "a selective map over weighted gradients of bonds"
+                           : f.weighted && !by_bond        ? "gradients of parts of families"
+                                                           : nullptr;
+  if (!what) return;
+  report.warnings.push_back(
+      fmt::format("{}: updates of bonds that fail create energy; which kinematics do not is measured in fracture.md, \"Every "
+                  "kinematics and kernel\"",
+                  what));
 }
 
 }  // namespace
@@ -29,12 +47,13 @@ void clear(double* values, std::size_t size) {
 struct Terms::Assemblies {
   BlockRows rows;
   std::vector<std::unique_ptr<Assembly>> all;
-  std::size_t version;   ///< of the bonds that they know
+  std::size_t version;  ///< of the bonds that they know
   int steps = 1;
 };
 
 struct Terms::Failing {
   Fracture fracture;
+  Field force;  ///< work field
 };
 
 Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
@@ -43,19 +62,33 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   if (formulation.pairs) {
     terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share}));
   } else {
-    auto mechanics = std::make_unique<Mechanics>(SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share});
+    auto mechanics = std::make_unique<Mechanics>(
+        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr});
     mechanics_ = mechanics.get();
     if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
   }
-  if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
+  if (parts_.stabilization)
+    terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
   if (!parts_.damage) return;
   const NearestFailure* known = nullptr;
   for (const auto& term : terms_) {
     const NearestFailure* of_term = term->watch(*parts_.damage);
     if (of_term) known = of_term;
   }
-  failing_ = std::make_unique<Failing>(Failing{Fracture(*parts_.families, *parts_.damage, parts_.skip, known)});
+  Families& all = *parts_.families;
+  all.let_fail();
+  std::unique_ptr<BondFinder> finder;
+  if (parts_.damage->by_stretch())
+    finder = all.make_monitor(*parts_.damage, parts_.skip, known);
+  else {
+    auto criterion = std::make_unique<BondCriterion>(all, formulation, parts_.damage, terms_, parts_.skip);
+    // Consistent weights are not those of the families, which the screen knows.
+    criterion_ = parts_.skip && !parts_.consistency && criterion->screen() ? criterion.get() : nullptr;
+    if (criterion_) terms_.front()->screen(criterion_->screen());
+    finder = std::move(criterion);
+  }
+  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
 }
 
 Terms::~Terms() = default;
@@ -73,8 +106,10 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
   if (energy) *energy = 0;
+  if (criterion_) criterion_->begin_forces(u);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces(u, force, energy);
+  if (criterion_ && bad < 0) criterion_->end_forces();
   return status(bad);
 }
 
@@ -130,7 +165,9 @@ Field Terms::shape_tensor_condition() const {
   return has_gradients() ? condition_field(*parts_.families) : parts_.families->body().make_field(1);
 }
 
-Field Terms::damage() const { return damage_field(*parts_.families); }
+Field Terms::damage() const {
+  return damage_field(*parts_.families);
+}
 
 QuietCounts Terms::quiet_counts() const {
   QuietCounts counts;
@@ -142,7 +179,9 @@ QuietCounts Terms::quiet_counts() const {
   return counts;
 }
 
-LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->history() : nullptr; }
+LawHistory* Terms::history() const noexcept {
+  return mechanics_ ? mechanics_->history() : nullptr;
+}
 
 void Terms::history_restored() {
   if (mechanics_) mechanics_->history_restored();
@@ -152,23 +191,45 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
   for (const auto& term : terms_) term->bonds_changed(points);
 }
 
-BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion& motion) {
+BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
+  const Families& families = *parts_.families;
   const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
     double sum = 0;
     for (const auto& term : terms_) sum += term->energy_of(at, marks);
     return sum;
   };
-  return failing_->fracture.update(u, time_step, motion, energy, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
+    Field& own = failing_->force;
+    if (own.size() == 0) own = families.body().make_field(force.components);
+    clear(own.data(), own.size());
+    GroupMarks near(marks.size(), 0);
+    std::vector<std::int32_t> points;
+    for (std::size_t p = 0; p < families.body().stride(); ++p)
+      if (marks[p / padding] && families.body().alive(p)) points.push_back(static_cast<std::int32_t>(p));
+    families.mark(points, near);
+    for (const auto& term : terms_) term->add_forces_near(at, marks, near, own);
+    for (std::size_t k = 0; k < force.size(); ++k) force.data[k] += factor * own.data()[k];
+  };
+  return failing_->fracture.update(u, time_step, begin, reaction,
+                                   {energy, forces, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
 }
 
-std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
+std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
+  return BondCriterion(*parts_.families, parts_.formulation, nullptr, terms_, parts_.skip).energies(u);
+}
+
+std::vector<BondChange> Terms::changed_bonds() const {
+  return parts_.families->changed();
+}
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {
   if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
-BondChecks Terms::bond_checks() const { return failing_ ? failing_->fracture.checks() : BondChecks{}; }
+BondChecks Terms::bond_checks() const {
+  return failing_ ? failing_->fracture.checks() : BondChecks{};
+}
 
 ModelReport Terms::report() const {
   const Families& families = *parts_.families;
@@ -180,19 +241,26 @@ ModelReport Terms::report() const {
   const int d = families.body().dimension();
   const double bond_bytes = static_cast<double>(report.bonds) * 8 * (d + 1);
   if (const LatticeFamilies* lattice = families.lattice()) {
-    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
+                            megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
     std::size_t whole = 0;
     const auto& chunks = lattice->tiles.chunks;
     for (const LatticeChunk& chunk : chunks) whole += chunk.pattern < 0;
-    report.skips.push_back({"shape tensors of whole families",
-                            fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
-                            megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) * sizeof(LatticePattern))});
+    report.skips.push_back(
+        {"shape tensors of whole families",
+         fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
+         megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) *
+                   sizeof(LatticePattern))});
   } else {
     report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
   }
-  if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  if (d < 3 && has_gradients())
+    report.skips.push_back(
+        {"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
   if (!conservative())
-    report.warnings.push_back("local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+    report.warnings.push_back(
+        "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+  if (parts_.damage) warn_of_energy(parts_, report);
   for (const auto& term : terms_) term->report(report);
   return report;
 }

@@ -20,15 +20,27 @@ std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samp
   return -1;
 }
 
+/// The penalty of a point belongs to its bonds as the rest of its energy does. It is no stress.
+void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
+  const Body& body = parts_.families.body();
+  Field density = body.make_field(1);
+  add_density(u, density.data());
+  for (const std::int32_t p : body.internal()) {
+    const auto at = static_cast<std::size_t>(p);
+    if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at), {}});
+  }
+}
+
 std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) const {
-  return with_dimension(rows.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
+  return with_dimension(rows.body().dimension(),
+                        [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
 }
 
 void ZeroEnergyPenalty::report(ModelReport& report) const {
   report.bytes += bytes();
   if (parts_.formulation.order > 1) return;
-  report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)",
-                          "a gradient and a divergence"});
+  report.skips.push_back({"adjoint of the penalty through the point gradient",
+                          "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)", "a gradient and a divergence"});
 }
 
 std::unique_ptr<Term> make_penalty(const PenaltyParts& parts) {
