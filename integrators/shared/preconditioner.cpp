@@ -114,11 +114,11 @@ class CompanionCycle final : public Preconditioner {
   Multigrid multigrid_;
 };
 
-/// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing
-/// of stiffness against changes of volume, would need too many of them (measured: framework/docs/performance.md).
+/// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing of stiffness
+/// against changes of volume, would need too many of them (measured: framework/docs/performance.md).
 bool factorisation_pays(Problem& problem) {
   if (problem.dimension() == 3) return false;
-  double stiffest = 0;  // largest ratio of bulk to shear modulus
+  double stiffest = 0;   // largest ratio of bulk to shear modulus
   for (const std::int32_t p : problem.body().owned()) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
     if (moduli.mu > 0) stiffest = std::max(stiffest, moduli.bulk() / moduli.mu);
@@ -131,7 +131,8 @@ bool factorisation_pays(Problem& problem) {
 }  // namespace
 
 Preconditioner::Preconditioner(Problem& problem)
-    : state_(problem.state().declare("preconditioner_state")), numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
+    : state_(problem.state().declare("preconditioner_state")),
+      numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;

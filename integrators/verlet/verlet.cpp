@@ -126,7 +126,7 @@ class Stepper {
   double uniform_;
   bool loaded_;
   FieldView external_;
-  std::vector<double> held_, before_, speed_, full_;  ///< by constrained component
+  std::vector<double> held_, before_, speed_, full_;   ///< by constrained component
 };
 
 }  // namespace
@@ -142,12 +142,11 @@ double Verlet::stable_step(Problem& problem) const {
 }
 
 double Verlet::steps_to_end(double time, double step) const {
-  constexpr double most = 1e15;  // whole numbers that a double holds
+  constexpr double most = 1e15;   // whole numbers that a double holds
   const double steps = std::max(1.0, std::ceil((options_.end_time - time) / step * (1 - 1e-12)));
   if (steps <= most) return steps;
-  throw options_.values.error(
-      "end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps", options_.end_time,
-                              steps, step, most));
+  throw options_.values.error("end_time", fmt::format("found {} s, which is {:.3g} steps of {:.3g} s; allowed: at most {:.0e} steps",
+                                                      options_.end_time, steps, step, most));
 }
 
 std::string Verlet::plan(Problem& problem) {
@@ -162,12 +161,12 @@ void Verlet::run(Problem& problem, Observer& observer) {
   State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
   const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
-  double& first = plan[0];  // step at which the plan was made
-  double& start = plan[1];  // and its time
+  double& first = plan[0];     // step at which the plan was made
+  double& start = plan[1];     // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
-  double& counter = plan[4];  // steps of the plan
-  double& broke = plan[5];    // whether bonds have failed since the last estimate
+  double& counter = plan[4];   // steps of the plan
+  double& broke = plan[5];     // whether bonds have failed since the last estimate
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
     first = static_cast<double>(state.step);
@@ -191,9 +190,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
   const bool fresh = dt == 0;
   double& planned_end = state.declare_numbers("planned_end", 1)[0];
   if (!fresh && planned_end != options_.end_time) {
-    make_plan(dt);  // not the step: only its end is another
-    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time,
-                             planned_end, counter, dt));
+    make_plan(dt);   // not the step: only its end is another
+    observer.log(fmt::format("verlet: the run ends at {:.6g} s, not {:.6g} s: {:.0f} more steps of {:.6g} s", options_.end_time, planned_end, counter, dt));
   }
   planned_end = options_.end_time;
   if (fresh) {
@@ -242,8 +240,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const double stable = stable_step(problem);
       if (stable < dt) {
         make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step,
-                                 counter, dt));
+        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
+                                 state.step, counter, dt));
       }
     }
     observer.step_done(report());

@@ -26,8 +26,8 @@ Subject& subject();
 /// Every part to test of one kind with each of its example tables (at least one run a part).
 struct Example {
   std::string part;
-  std::string table;               ///< TOML keys without `type`
-  std::string stabilization = {};  ///< of a kinematics: its inline table, or empty
+  std::string table;   ///< TOML keys without `type`
+  std::string stabilization = {};   ///< of a kinematics: its inline table, or empty
   bool keeps_angular_momentum = true;
 };
 std::vector<Example> examples(Kind kind);
@@ -43,15 +43,15 @@ struct BodyOptions {
   bool two_materials = false;
   std::string influence = "gaussian";
   std::string material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
-  double scale = 1.0;              ///< of all lengths
-  double modulus = 1.0;            ///< of all moduli
-  int cells = 0;                   ///< along the longest axis; 0: small
-  bool skip = true, share = true;  ///< [run]
+  double scale = 1.0;         ///< of all lengths
+  double modulus = 1.0;       ///< of all moduli
+  int cells = 0;              ///< along the longest axis; 0: small
+  bool skip = true, share = true;   ///< [run]
   double horizon_ratio = 2.515;
   std::string plane = "strain";
   std::string integrator = "type = \"evaluate\"";
-  std::string sets;        ///< further lines of [sets]
-  std::string conditions;  ///< further sections: initial, boundaries, loads
+  std::string sets;           ///< further lines of [sets]
+  std::string conditions;     ///< further sections: initial, boundaries, loads
 };
 
 /// Scene text for a kinematics (its table, `type` included).

@@ -26,9 +26,7 @@ Arguments parse(int argc, char** argv) {
   Arguments arguments;
   for (int k = 1; k < argc; ++k) {
     const std::string_view word = argv[k];
-    const auto value = [&](std::string_view option) {
-      return word.starts_with(option) ? word.substr(option.size()) : std::string_view();
-    };
+    const auto value = [&](std::string_view option) { return word.starts_with(option) ? word.substr(option.size()) : std::string_view(); };
     if (const auto parts = value("--parts="); !parts.empty()) arguments.parts = std::string(parts) + ",";
     if (const auto library = value("--library="); !library.empty()) arguments.library = library;
     if (const auto folder = value("--plugin-path="); !folder.empty()) arguments.plugin_path.emplace_back(folder);
@@ -47,15 +45,13 @@ int main(int argc, char** argv) {
     subject.third_party = !arguments.library.empty();
     for (const auto& folder : Registry::standard_search_path(arguments.plugin_path)) subject.registry.add_folder(folder);
     // Bodies, laws and steps of the suites are made of the program's own parts.
-    if (!subject.registry.known(Kind::kinematics, "conventional") ||
-        !subject.registry.known(Kind::material, "saint_venant_kirchhoff")) {
+    if (!subject.registry.known(Kind::kinematics, "conventional") || !subject.registry.known(Kind::material, "saint_venant_kirchhoff")) {
       throw InputError("the contract suites need the parts that come with perikit; they are in none of the folders of plugins");
     }
     if (!arguments.library.empty()) return contract::run_library(arguments.library, argc, argv);
     for (const Kind kind : all_kinds) {
       for (const std::string& part : subject.registry.names(kind)) {
-        if (arguments.parts.empty() || arguments.parts.find(fmt::format("{}/{},", name(kind), part)) != std::string::npos)
-          subject.parts.emplace_back(kind, part);
+        if (arguments.parts.empty() || arguments.parts.find(fmt::format("{}/{},", name(kind), part)) != std::string::npos) subject.parts.emplace_back(kind, part);
       }
     }
     if (subject.parts.empty()) {

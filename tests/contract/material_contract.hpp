@@ -132,8 +132,7 @@ class MaterialContract : MaterialCheck {
     std::vector<Values> points = random_points(n), directions = random_directions(n);
     for (auto* values : {&points, &directions})
       for (Values& H : *values) std::fill(H.begin() + gradient_components(dimension(space_)), H.end(), 0.0);
-    const Evaluation open = evaluate(points, directions),
-                     confined(material_, space_, constants_, points, directions, false, {}, true);
+    const Evaluation open = evaluate(points, directions), confined(material_, space_, constants_, points, directions, false, {}, true);
     for (int p = 0; p < n; ++p) {
       const double scale = stress_scale(open, p);
       near("P of confined points", confined.at(confined.P, p), open.at(open.P, p), 1e-12, scale);
@@ -246,9 +245,8 @@ inline void check_history(const Material& material, const std::vector<double>& c
 /// All identities.
 inline void check_material(const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
   using Contract = MaterialContract;
-  for (const auto identity : {&Contract::reference_state, &Contract::small_strains, &Contract::derivatives,
-                              &Contract::tangent_action, &Contract::free_stretches, &Contract::confined, &Contract::batches,
-                              &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
+  for (const auto identity : {&Contract::reference_state, &Contract::small_strains, &Contract::derivatives, &Contract::tangent_action,
+                              &Contract::free_stretches, &Contract::confined, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
     check_material(material, constants, options, identity);
   }
   check_history(material, constants, options);

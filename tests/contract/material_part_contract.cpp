@@ -27,24 +27,18 @@ std::vector<double> constants_of(const Material& material, const Example& exampl
   std::map<std::string, double, std::less<>> numbers;
   for (const std::string& key : part->values.keys()) {
     const ParameterValue* value = part->values.find(key);
-    if (const auto* number = std::get_if<double>(value))
-      numbers[key] = *number;
-    else if (part->values.is_expression(key))
-      numbers[key] = Expression(part->values.text(key), {}, false, {}, key)({});
-    else
-      continue;
+    if (const auto* number = std::get_if<double>(value)) numbers[key] = *number;
+    else if (part->values.is_expression(key)) numbers[key] = Expression(part->values.text(key), {}, false, {}, key)({});
+    else continue;
     if (declared(example, key).unit == "Pa") numbers[key] *= factor_of_moduli;
   }
   std::vector<double> constants(static_cast<std::size_t>(material.traits().constants), std::numeric_limits<double>::quiet_NaN());
-  material.constants({[&](std::string_view key) { return numbers.contains(key); },
-                      [&](std::string_view key) { return numbers.find(key)->second; }},
+  material.constants({[&](std::string_view key) { return numbers.contains(key); }, [&](std::string_view key) { return numbers.find(key)->second; }},
                      constants.data());
   return constants;
 }
 
-std::string label(const Example& example) {
-  return fmt::format("{} ({})", example.part, example.table);
-}
+std::string label(const Example& example) { return fmt::format("{} ({})", example.part, example.table); }
 
 /// check(material, constants, options) for every example.
 template <class Check>
@@ -60,9 +54,8 @@ void for_every_example(const Check& check) {
     for (std::size_t k = 0; k < constants.size(); ++k) {
       const double size = std::abs(constants[k]);
       const bool modulus = std::abs(scaled[k] - factor * constants[k]) <= 1e-12 * factor * size;
-      CHECK_MESSAGE((modulus || std::abs(scaled[k] - constants[k]) <= 1e-12 * size), "constant ", k,
-                    " depends on the unit of stress: ", constants[k], " becomes ", scaled[k],
-                    " where all moduli are multiplied by ", factor);
+      CHECK_MESSAGE((modulus || std::abs(scaled[k] - constants[k]) <= 1e-12 * size), "constant ", k, " depends on the unit of stress: ", constants[k],
+                    " becomes ", scaled[k], " where all moduli are multiplied by ", factor);
       options.moduli.push_back(modulus);
     }
     check(*material, constants, options);
@@ -82,41 +75,23 @@ TEST_CASE("material: no energy and no stress at rest, and linear elasticity for 
   in_every_space(&MaterialContract::small_strains);
 }
 
-TEST_CASE("material: stress is the derivative of the energy, the tangent that of the stress") {
-  in_every_space(&MaterialContract::derivatives);
-}
+TEST_CASE("material: stress is the derivative of the energy, the tangent that of the stress") { in_every_space(&MaterialContract::derivatives); }
 
-TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") {
-  in_every_space(&MaterialContract::tangent_action);
-}
+TEST_CASE("material: the tangent action is the tangent times its direction, and free stresses are zero") { in_every_space(&MaterialContract::tangent_action); }
 
-TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") {
-  in_every_space(&MaterialContract::free_stretches);
-}
-TEST_CASE("material: the promise that lateral components vanish changes nothing but the cost") {
-  in_every_space(&MaterialContract::confined);
-}
+TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") { in_every_space(&MaterialContract::free_stretches); }
+TEST_CASE("material: the promise that lateral components vanish changes nothing but the cost") { in_every_space(&MaterialContract::confined); }
 
-TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") {
-  in_every_space(&MaterialContract::batches);
-}
+TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
 
-TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") {
-  in_every_space(&MaterialContract::rotations);
-}
+TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") { in_every_space(&MaterialContract::rotations); }
 
-TEST_CASE("material: stress, energy and tangent have the unit of the moduli") {
-  in_every_space(&MaterialContract::units);
-}
+TEST_CASE("material: stress, energy and tangent have the unit of the moduli") { in_every_space(&MaterialContract::units); }
 
-TEST_CASE("material: an inadmissible deformation is named, and its neighbours do not notice") {
-  in_every_space(&MaterialContract::inadmissible);
-}
+TEST_CASE("material: an inadmissible deformation is named, and its neighbours do not notice") { in_every_space(&MaterialContract::inadmissible); }
 
 TEST_CASE("material: a law with history follows paths: objective, exact tangent, its history in its own place") {
-  for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
-    check_history(material, constants, options);
-  });
+  for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) { check_history(material, constants, options); });
 }
 
 TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {
@@ -139,13 +114,12 @@ TEST_CASE("material: the table declares a density, and what must be positive is 
     const Parameter* density = table.find("density");
     REQUIRE_MESSAGE(density != nullptr, "no parameter 'density': the material cannot run in time");
     CHECK(density->unit == "kg/m^3");
-    CHECK_THROWS_AS(parse_part(Kind::material, example.part, example.table + "\nno_such_parameter = 1.0", subject().registry),
-                    InputError);
+    CHECK_THROWS_AS(parse_part(Kind::material, example.part, example.table + "\nno_such_parameter = 1.0", subject().registry), InputError);
     for (const std::string& key : values_of(example)->values.keys()) {
       const Parameter* parameter = table.find(key);
       if (!parameter->per_point || !(parameter->lower >= 0)) continue;
       std::string bad;
-      bool written = false;  // else it has its default
+      bool written = false;   // else it has its default
       for (std::size_t begin = 0; begin < example.table.size();) {
         const std::size_t end = std::min(example.table.find('\n', begin), example.table.size());
         const std::string line = example.table.substr(begin, end - begin);
@@ -155,8 +129,7 @@ TEST_CASE("material: the table declares a density, and what must be positive is 
         begin = end + 1;
       }
       if (!written) bad += key + " = -1.0\n";
-      CHECK_THROWS_AS_MESSAGE(parse_part(Kind::material, example.part, bad, subject().registry), InputError, key,
-                              " = -1 is accepted");
+      CHECK_THROWS_AS_MESSAGE(parse_part(Kind::material, example.part, bad, subject().registry), InputError, key, " = -1 is accepted");
     }
   }
 }

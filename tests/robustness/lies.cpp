@@ -14,7 +14,7 @@ namespace {
 
 struct Lie {
   std::string name, kind;
-  std::set<std::string> broken;  ///< test cases
+  std::set<std::string> broken;   ///< test cases
 };
 
 const std::vector<Lie> lies{
@@ -28,9 +28,7 @@ const std::vector<Lie> lies{
     {"healing", "damage", {"damage: 1 up to the onset, 0 beyond failure, never rising, bits where declared"}},
     {"forgetful", "integrator", {"integrator: a run that continues from a saved state is bitwise the run without a stop"}},
     {"first_order", "integrator", {"integrator: displacements and energy converge with the square of the time step"}},
-    {"free_lunch",
-     "integrator",
-     {"integrator: a constant load gives a free body its momentum, and work is force times distance"}},
+    {"free_lunch", "integrator", {"integrator: a constant load gives a free body its momentum, and work is force times distance"}},
 };
 
 std::set<std::string> broken_cases(const std::string& out) {
@@ -49,8 +47,7 @@ TEST_CASE("contract: every lie is caught by the test case of what it breaks") {
     INFO(lie.name);
     CHECK(result.status == 1);
     const std::set<std::string> broken = broken_cases(result.out);
-    for (const std::string& name : lie.broken)
-      CHECK_MESSAGE(broken.contains(name), "not caught by '", name, "' but by ", fmt::format("{}", fmt::join(broken, "; ")));
+    for (const std::string& name : lie.broken) CHECK_MESSAGE(broken.contains(name), "not caught by '", name, "' but by ", fmt::format("{}", fmt::join(broken, "; ")));
     CHECK(contains(result.out, fmt::format("{}/{} breaks its contract", lie.kind, lie.name)));
     // What broke is said with numbers, once for each check: not once for each of a thousand points.
     CHECK(contains(result.out, "    expected "));
@@ -61,9 +58,8 @@ TEST_CASE("contract: every lie is caught by the test case of what it breaks") {
 TEST_CASE("contract: what breaks is named with numbers, and how often it breaks") {
   const Desk desk;
   const std::string out = desk.perikit(fmt::format("contract '{}/wrong_stress.so'", PERIKIT_LIES)).out;
-  for (const std::string word :
-       {"material/wrong_stress\n", "kept:   material: ", "broken: material: stress is the derivative of the energy",
-        "P : dF = dpsi (differences): ", "error ", " > 1e-", "   (material_check.hpp:", " times more\n", " test cases kept; "})
+  for (const std::string word : {"material/wrong_stress\n", "kept:   material: ", "broken: material: stress is the derivative of the energy", "P : dF = dpsi (differences): ", "error ", " > 1e-",
+                                 "   (material_check.hpp:", " times more\n", " test cases kept; "})
     CHECK_MESSAGE(contains(out, word), "no '", word, "' in\n", out);
 }
 
@@ -93,8 +89,7 @@ TEST_CASE("contract: without perikit's own parts there is nothing to test with")
   fs::create_directories(desk.path("lib"));
   const std::string library = "libperikit.so." PERIKIT_STRINGIFY(PERIKIT_ABI_VERSION);
   fs::copy_file(fs::path(PERIKIT_PARTS).parent_path() / library, desk.path("lib/" + library));
-  const Result result =
-      desk.perikit(fmt::format("contract '{}/company.so'", PERIKIT_LIES), "unset PERIKIT_PLUGIN_PATH; LD_LIBRARY_PATH=lib");
+  const Result result = desk.perikit(fmt::format("contract '{}/company.so'", PERIKIT_LIES), "unset PERIKIT_PLUGIN_PATH; LD_LIBRARY_PATH=lib");
   CHECK(result.status == 2);
   CHECK_MESSAGE(contains(result.err, "need the parts that come with perikit"), result.err);
 }

@@ -38,9 +38,7 @@ class NoDilatation final : public DilatationLaw {
 
 class Pairs : public PairKinematics {
  public:
-  PairTraits traits() const noexcept override {
-    return {.influence = false, .constant_moduli = true, .surface_correction = true};
-  }
+  PairTraits traits() const noexcept override { return {.influence = false, .constant_moduli = true, .surface_correction = true}; }
   PairModuli moduli(const PairPoint&) const noexcept override { return {}; }
   std::string warning(const PairPoint&) const override { return {}; }
   void bond_law(const BondBatch&) const noexcept override {}
@@ -72,9 +70,7 @@ std::string refusal(std::shared_ptr<const Kinematics> kinematics) {
   return "not refused";
 }
 
-int classes(const Formulation& f) {
-  return !!f.point + !!f.bond + !!f.weighted + !!f.pairs;
-}
+int classes(const Formulation& f) { return !!f.point + !!f.bond + !!f.weighted + !!f.pairs; }
 
 }  // namespace
 

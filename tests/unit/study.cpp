@@ -241,7 +241,7 @@ TEST_CASE("a study goes on where it was stopped: what is done is kept, what fail
   };
   fs::remove_all(out / "runs" / "1");
   CHECK(run_study(study, folder.parts, {}, out, counted, silent, {1, true}).csv() == first);
-  CHECK(again == std::vector<double>{2, 4});  // the one that is gone, and the one that failed
+  CHECK(again == std::vector<double>{2, 4});   // the one that is gone, and the one that failed
   again.clear();
   CHECK(run_study(study, folder.parts, {{"title=\"another\""}, false}, out, counted, silent, {1, true}).csv() == first);
   CHECK(again.size() == 6);
@@ -269,7 +269,7 @@ TEST_CASE("a logarithmic axis has labelled tics, also where it covers less than 
     CHECK_MESSAGE((shown >= 2 && shown <= 8), shown, " tics from ", least, " to ", most);
     CHECK(std::ranges::is_sorted(tics));
   }
-  CHECK(logarithmic_tics(1e-3, 1.0).empty());  // every decade
+  CHECK(logarithmic_tics(1e-3, 1.0).empty());   // every decade
   CHECK(logarithmic_tics(2.0, 2.0).empty());
 }
 
@@ -285,16 +285,14 @@ TEST_CASE("the picture has a line for each value of the series" *
   // The order of the list does not matter where the axis is a key.
   const std::string drawn = "[plot]\nx = \"constants.k\"\ny = \"top\"\nseries = \"kinematics.type\"\n";
   run_study(folder.parse(study_text + drawn), folder.parts, {}, folder.path / "sorted", pretend, silent);
-  run_study(folder.parse(replaced(study_text, "[1, 2, 4]", "[4, 1, 2]") + drawn), folder.parts, {}, folder.path / "other",
-            pretend, silent);
+  run_study(folder.parse(replaced(study_text, "[1, 2, 4]", "[4, 1, 2]") + drawn), folder.parts, {}, folder.path / "other", pretend, silent);
   CHECK(content(folder.path / "sorted" / "plot.svg") == content(folder.path / "other" / "plot.svg"));
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
   CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
                  "no run gives numbers for cost and top_error"));
 }
 
-TEST_CASE(
-    "where a series stays below a level: the last point above it counts, straight lines (of logarithms) lie between points") {
+TEST_CASE("where a series stays below a level: the last point above it counts, straight lines (of logarithms) lie between points") {
   using Points = std::vector<std::pair<double, double>>;
   using enum Crossing::Kind;
   const auto found = [](Points points, bool logarithmic) { return crossing(std::move(points), 0.01, logarithmic); };
@@ -315,11 +313,9 @@ TEST_CASE("a study with a level tells it in its table, and refuses one that a lo
     const Study study = folder.parse(study_text + plot + "level = " + level + "\n");
     return run_study(study, folder.parts, {}, folder.path / "out", pretend, silent).markdown();
   };
-  CHECK(contains(table("0.3"),
-                 "| series | constants.k from which top_error stays below 0.3 |\n| --- | --- |\n| top_error | < 1 |\n"));
+  CHECK(contains(table("0.3"), "| series | constants.k from which top_error stays below 0.3 |\n| --- | --- |\n| top_error | < 1 |\n"));
   CHECK(contains(table("0.2"), "| top_error | > 4 |\n"));
-  CHECK(contains(folder.error(study_text + plot + "level = 0\n"),
-                 "plot.level: found 0; allowed with a logarithmic axis: a number > 0"));
+  CHECK(contains(folder.error(study_text + plot + "level = 0\n"), "plot.level: found 0; allowed with a logarithmic axis: a number > 0"));
 }
 
 TEST_CASE("a run in a process of its own: its measures come back, its end is told") {

@@ -254,7 +254,8 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
     };
     const auto j = static_cast<std::size_t>(near[n]);
     add_gradient(&own_gradient_[D * j], near[n]);
-    for (std::size_t k = rows_.first(j); k < rows_.first(j + 1); ++k) add_gradient(bond_[k].gradient, rows_.lists().neighbour[k]);
+    for (std::size_t k = rows_.first(j); k < rows_.first(j + 1); ++k)
+      add_gradient(bond_[k].gradient, rows_.lists().neighbour[k]);
   }
 }
 
@@ -268,12 +269,12 @@ std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
   over_rows(rows, [&](std::size_t r) {
     point_gradients(r, u);
     std::fill_n(diagonal_.data() + coupling * r, coupling, 0.0);
-    std::fill_n(off_diagonal_.data() + coupling * rows_.first(r), coupling * (rows_.first(r + 1) - rows_.first(r)), 0.0);
+    std::fill_n(off_diagonal_.data() + coupling * rows_.first(r), coupling * (rows_.first(r + 1) - rows_.first(r)),
+                0.0);
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::int64_t point =
-        add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
+    const std::int64_t point = add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
     if (point >= 0) bad.report(point);
   });
   if (bad.point() >= 0) return bad.point();
@@ -283,7 +284,8 @@ std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
 
 template <int D>
 std::size_t BondAssembly<D>::bytes() const noexcept {
-  return bond_.size() * sizeof(Bond) + (rows_.size() * (coupling + entries + D) + rows_.bonds() * coupling) * sizeof(double);
+  return bond_.size() * sizeof(Bond) +
+         (rows_.size() * (coupling + entries + D) + rows_.bonds() * coupling) * sizeof(double);
 }
 
 template class BondAssembly<1>;

@@ -26,21 +26,16 @@ namespace {
 /// A point at a held face that a layer holds too would be held at two places.
 void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
                   const std::vector<std::size_t>& boundary_of) {
-  std::vector<std::uint8_t> held(body.stride(), 0);  // by point, a bit a component
+  std::vector<std::uint8_t> held(body.stride(), 0);   // by point, a bit a component
   for (const ImageTerm& term : images.terms)
-    if (term.motion >= 0)
-      held[static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(term.surface)])] |=
-          static_cast<std::uint8_t>(1 << term.component);
+    if (term.motion >= 0) held[static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(term.surface)])] |= static_cast<std::uint8_t>(1 << term.component);
   for (std::size_t k = 0; k < prescriptions.size(); ++k)
     for (const std::int32_t p : prescriptions[k].points) {
       if (!(held[static_cast<std::size_t>(p)] >> prescriptions[k].component & 1)) continue;
       const Point x = body.position(static_cast<std::size_t>(p));
-      throw InputError(
-          scene.boundaries[boundary_of[k]].position, fmt::format("boundary.{}", boundary_of[k]),
-          fmt::format(
-              "found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "
-              "them",
-              x[0], x[1], x[2], "xyz"[prescriptions[k].component]));
+      throw InputError(scene.boundaries[boundary_of[k]].position, fmt::format("boundary.{}", boundary_of[k]),
+                       fmt::format("found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "
+                                   "them", x[0], x[1], x[2], "xyz"[prescriptions[k].component]));
     }
 }
 
@@ -65,14 +60,13 @@ std::optional<double> contradiction(const Prescription& a, const Prescription& b
 }
 
 /// Boundaries whose sets overlap must agree there.
-void refuse_contradictions(const Scene& scene, const Body& body, const std::vector<Prescription>& prescriptions,
-                           const std::vector<std::size_t>& boundary_of, bool quasi_static) {
+void refuse_contradictions(const Scene& scene, const Body& body, const std::vector<Prescription>& prescriptions, const std::vector<std::size_t>& boundary_of,
+                           bool quasi_static) {
   const double end = end_of(scene, quasi_static);
   std::vector<std::int32_t> first(body.stride() * static_cast<std::size_t>(body.dimension()), -1);
   for (std::size_t k = 0; k < prescriptions.size(); ++k)
     for (const std::int32_t p : prescriptions[k].points) {
-      std::int32_t& other =
-          first[static_cast<std::size_t>(prescriptions[k].component) * body.stride() + static_cast<std::size_t>(p)];
+      std::int32_t& other = first[static_cast<std::size_t>(prescriptions[k].component) * body.stride() + static_cast<std::size_t>(p)];
       if (other < 0) {
         other = static_cast<std::int32_t>(k);
         continue;
@@ -92,8 +86,7 @@ void refuse_contradictions(const Scene& scene, const Body& body, const std::vect
 
 }  // namespace
 
-Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions,
-                              bool quasi_static) {
+Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions, bool quasi_static) {
   std::vector<Prescription> prescriptions;
   std::vector<std::size_t> boundary_of;
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
@@ -116,8 +109,7 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
     return Constraints(body, std::move(prescriptions), images, std::move(motions));
   } catch (const std::domain_error& error) {
     for (std::size_t k = 0; k < scene.boundaries.size(); ++k)
-      if (scene.boundaries[k].velocity && !scene.boundaries[k].face.empty())
-        throw InputError(scene.boundaries[k].position, fmt::format("boundary.{}.velocity", k), error.what());
+      if (scene.boundaries[k].velocity && !scene.boundaries[k].face.empty()) throw InputError(scene.boundaries[k].position, fmt::format("boundary.{}.velocity", k), error.what());
     throw;
   }
 }
@@ -149,18 +141,13 @@ void start_from(const std::filesystem::path& results, const Body& body, const Pa
 
 }  // namespace
 
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints,
-                       bool quasi_static, State& state) {
+void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, bool quasi_static, State& state) {
   for (const BoundaryDescription& boundary : scene.boundaries)
     if (scene.initial_from && (boundary.velocity || quasi_static) && !boundary.face.empty())
-      throw InputError(boundary.position, "boundary",
-                       "found a face together with initial.from, whose results do not say where the face was; allowed: in "
-                       "explicit runs a face with a displacement");
-  constraints.start_images(
-      [&](int c, const Point& x) {
-        return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
-      },
-      !quasi_static, state.displacement());
+      throw InputError(boundary.position, "boundary", "found a face together with initial.from, whose results do not say where the face was; allowed: in explicit runs a face with a displacement");
+  constraints.start_images([&](int c, const Point& x) {
+    return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
+  }, !quasi_static, state.displacement());
   if (scene.initial_from) start_from(*scene.initial_from, body, partition, state);
   if (!scene.initial_displacement.empty()) fill(scene.initial_displacement, body, state.displacement());
   if (!scene.initial_velocity.empty()) fill(scene.initial_velocity, body, state.velocity());

@@ -19,20 +19,16 @@ SpaceTimeFunction function_of(const Expression& expression, const RampDescriptio
 /// Throws InputError where a run without load parameter says how values ramp. key: of the boundary or load.
 void refuse_ramp(const RampDescription& ramp, const std::string& key, bool quasi_static);
 
-/// Of points and of the images that faces have. Throws InputError for prescribed velocities in quasi-static runs, and for points
-/// at a held face that are held themselves.
-Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions,
-                              bool quasi_static);
+/// Of points and of the images that faces have. Throws InputError for prescribed velocities in quasi-static runs, and for points at a held
+/// face that are held themselves.
+Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions, bool quasi_static);
 
 /// On the owned points of the body, which is a part of partition->whole() where there are several ranks: totals are those of
 /// all ranks. parts: of the terms, whose kinematics say what area a point has of a face. Throws InputError for faces without
 /// points.
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images,
-                  bool quasi_static);
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static);
 
-/// Displacements and velocities at the start, of images as the constraints have them. Throws InputError where an earlier run does
-/// not hold them.
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints,
-                       bool quasi_static, State& state);
+/// Displacements and velocities at the start, of images as the constraints have them. Throws InputError where an earlier run does not hold them.
+void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, bool quasi_static, State& state);
 
 }  // namespace perikit

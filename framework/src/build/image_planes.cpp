@@ -25,8 +25,7 @@ using Cell = std::array<std::int64_t, 2>;
 
 class PlaneBuilder {
  public:
-  PlaneBuilder(const Scene& scene, const Body& body, bool quasi_static)
-      : scene_(scene), body_(body), quasi_static_(quasi_static) {}
+  PlaneBuilder(const Scene& scene, const Body& body, bool quasi_static) : scene_(scene), body_(body), quasi_static_(quasi_static) {}
 
   ScenePlanes build() {
     for (std::size_t k = 0; k < scene_.boundaries.size(); ++k)
@@ -41,27 +40,23 @@ class PlaneBuilder {
     Cell cell{};
     for (std::size_t a = 0, k = 0; a < 3; ++a) {
       if (a == static_cast<std::size_t>(side.axis)) continue;
-      const double lower = body_.lattice() ? body_.lattice()->lower[a] : 0.0;  // lattice points lie in the middle of cells
+      const double lower = body_.lattice() ? body_.lattice()->lower[a] : 0.0;   // lattice points lie in the middle of cells
       cell[k++] = static_cast<std::int64_t>(std::floor((x[a] - lower) / body_.spacing()));
     }
     return cell;
   }
   Point position(std::int32_t p) const { return body_.position(static_cast<std::size_t>(p)); }
 
-  /// Where the side of these points lies: half a spacing beyond a lattice point; cells of points that were moved at random keep
-  /// theirs.
-  double end_of(const std::vector<std::int32_t>& points, int axis, double outward, const SourcePosition& position,
-                const std::string& key) const {
+  /// Where the side of these points lies: half a spacing beyond a lattice point; cells of points that were moved at random keep theirs.
+  double end_of(const std::vector<std::int32_t>& points, int axis, double outward, const SourcePosition& position, const std::string& key) const {
     const auto a = static_cast<std::size_t>(axis);
     double extreme = -std::numeric_limits<double>::infinity();
     for (const std::int32_t p : points) extreme = std::max(extreme, outward * this->position(p)[a]);
     extreme *= outward;
     if (body_.lattice()) return extreme + 0.5 * outward * body_.spacing();
     if (!scene_.body.lattice) {
-      throw InputError(
-          position, key,
-          fmt::format("found nothing for points from a file, whose outermost lies at {:.6g}; allowed: the coordinate of the side",
-                      extreme));
+      throw InputError(position, key,
+                       fmt::format("found nothing for points from a file, whose outermost lies at {:.6g}; allowed: the coordinate of the side", extreme));
     }
     const double lower = scene_.body.lattice->lower[a], cells = std::floor((extreme - lower) / body_.spacing());
     return lower + (cells + (outward > 0 ? 1 : 0)) * body_.spacing();
@@ -72,18 +67,17 @@ class PlaneBuilder {
     if (!body_.lattice()) return at;
     const double cells = (at - body_.lattice()->lower[static_cast<std::size_t>(axis)]) / body_.spacing();
     if (std::abs(cells - std::round(cells)) < 1e-6) return at;
-    throw InputError(
-        position, key,
-        fmt::format("found {:.6g}, which does not lie half-way between points of the lattice; allowed: its lower corner and "
-                    "multiples of the spacing from there, {:.6g} for one",
-                    at, at + (std::round(cells) - cells) * body_.spacing()));
+    throw InputError(position, key,
+                     fmt::format("found {:.6g}, which does not lie half-way between points of the lattice; allowed: its lower corner and "
+                                 "multiples of the spacing from there, {:.6g} for one",
+                                 at, at + (std::round(cells) - cells) * body_.spacing()));
   }
 
-  /// By input number: the point at the side below which each point lies; -1: below none of `points`. whole: the side is that of
-  /// the body, and no point is left out.
+  /// By input number: the point at the side below which each point lies; -1: below none of `points`. whole: the side is that of the body, and
+  /// no point is left out.
   std::vector<std::int32_t> surface(const Side& side, const std::vector<std::int32_t>& points, bool whole) const {
     const double h = body_.spacing(), layer = (body_.lattice() ? 0.75 : 1.2) * h;
-    std::map<Cell, std::vector<std::int32_t>> cells;  // of points at the side
+    std::map<Cell, std::vector<std::int32_t>> cells;   // of points at the side
     for (const std::int32_t p : body_.owned())
       if (const double d = side.depth(position(p)); d >= 0 && d < layer) cells[beside(side, position(p))].push_back(p);
     std::vector<bool> chosen(body_.stride(), false);
@@ -96,10 +90,8 @@ class PlaneBuilder {
       if (d < 0 || d > reach) continue;
       const std::int32_t nearest = nearest_of(cells, side, position(p));
       const auto input = [&](std::int32_t q) { return body_.input_of(static_cast<std::size_t>(q)); };
-      if (nearest >= 0 && (whole || chosen[static_cast<std::size_t>(nearest)]))
-        surface[static_cast<std::size_t>(input(p))] = input(nearest);
-      else if (nearest < 0 && whole)
-        surface[static_cast<std::size_t>(input(p))] = input(p);  // behind a notch
+      if (nearest >= 0 && (whole || chosen[static_cast<std::size_t>(nearest)])) surface[static_cast<std::size_t>(input(p))] = input(nearest);
+      else if (nearest < 0 && whole) surface[static_cast<std::size_t>(input(p))] = input(p);   // behind a notch
     }
     return surface;
   }
@@ -129,26 +121,19 @@ class PlaneBuilder {
     for (const std::int32_t p : body_.owned()) {
       const Point x = position(p);
       if (side.depth(x) < 0)
-        throw InputError(
-            where, key,
-            fmt::format("found a plane through the body, at {:.6g}: a point at ({:.6g}, {:.6g}, {:.6g}) lies behind it; "
-                        "allowed: a plane with all points on one side",
-                        side.at, x[0], x[1], x[2]));
+        throw InputError(where, key, fmt::format("found a plane through the body, at {:.6g}: a point at ({:.6g}, {:.6g}, {:.6g}) lies behind it; "
+                                                 "allowed: a plane with all points on one side", side.at, x[0], x[1], x[2]));
     }
   }
 
   /// may_exist: several [[boundary]] may prescribe components of one face, and sets may share a plane.
-  ImagePlane& plane_at(const Side& side, const std::string& set, const std::string& key, const SourcePosition& where,
-                       bool may_exist) {
+  ImagePlane& plane_at(const Side& side, const std::string& set, const std::string& key, const SourcePosition& where, bool may_exist) {
     for (std::size_t k = 0; k < found_.planes.size(); ++k) {
       ImagePlane& plane = found_.planes[k];
-      if (plane.axis != side.axis || std::abs(plane.at - side.at) > 1e-6 * body_.spacing() || plane.outward != side.outward)
-        continue;
+      if (plane.axis != side.axis || std::abs(plane.at - side.at) > 1e-6 * body_.spacing() || plane.outward != side.outward) continue;
       if (may_exist && found_.origins[k].set == set) return plane;
-      if (plane.period == 0 && may_exist) continue;  // of another set
-      throw InputError(
-          where, key,
-          fmt::format("found a side, at {:.6g}, that {} has too; allowed: one of the two", side.at, found_.origins[k].key));
+      if (plane.period == 0 && may_exist) continue;   // of another set
+      throw InputError(where, key, fmt::format("found a side, at {:.6g}, that {} has too; allowed: one of the two", side.at, found_.origins[k].key));
     }
     found_.origins.push_back({key, set, where});
     ImagePlane& plane = found_.planes.emplace_back();
@@ -171,17 +156,12 @@ class PlaneBuilder {
     if (plane.surface.empty()) {
       plane.surface = surface(side, points, whole);
       if (std::ranges::all_of(plane.surface, [](std::int32_t p) { return p < 0; }))
-        throw InputError(
-            boundary.face_position, key,
-            fmt::format("found \"{}\" at {:.6g}, which no point of the set \"{}\" touches; allowed: a face of the set",
-                        boundary.face, side.at, boundary.set));
+        throw InputError(boundary.face_position, key, fmt::format("found \"{}\" at {:.6g}, which no point of the set \"{}\" touches; allowed: a face of the set", boundary.face, side.at, boundary.set));
     }
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
       if (plane.odd[c])
-        throw InputError(boundary.face_position, key,
-                         fmt::format("found \"{}\", whose component {} {} prescribes too; allowed: each once", boundary.face,
-                                     "xyz"[c], found_.origins[static_cast<std::size_t>(&plane - found_.planes.data())].key));
+        throw InputError(boundary.face_position, key, fmt::format("found \"{}\", whose component {} {} prescribes too; allowed: each once", boundary.face, "xyz"[c], found_.origins[static_cast<std::size_t>(&plane - found_.planes.data())].key));
       plane.odd[c] = true;
       plane.motion[c] = static_cast<int>(found_.motions.size());
       found_.motions.push_back({boundary.velocity, function_of(*boundary.components[c], boundary.ramp, quasi_static_)});
@@ -204,8 +184,7 @@ class PlaneBuilder {
     plane.odd[a] = true;
     plane.surface = surface(side, body_.owned(), true);
     if (std::ranges::all_of(plane.surface, [](std::int32_t p) { return p < 0; }))
-      throw InputError(symmetry.position, key,
-                       fmt::format("found {:.6g}, which no point comes near; allowed: a side of the body", side.at));
+      throw InputError(symmetry.position, key, fmt::format("found {:.6g}, which no point comes near; allowed: a side of the body", side.at));
   }
 
   void add_periodic(std::size_t k) {

@@ -81,13 +81,11 @@ void add_pressure(const Scene& scene, const LoadDescription& description, const 
 
 }  // namespace
 
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images,
-                  bool quasi_static) {
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static) {
   const Body& body = parts.families->body();
   TermParts whole = parts;
   std::unique_ptr<Families> of_whole;
-  const bool faces =
-      std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
+  const bool faces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
   if (partition && faces) {
     of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
     whole.families = of_whole.get();

@@ -2,12 +2,11 @@
 /// Finds the bonds that fail by their stretch without looking at all of them in every step, and yet at the very step where they
 /// fail.
 ///
-/// A group of eight points knows its margin: how much more the nearest of its bonds could take when it was last checked. A bound
-/// of what the bonds around it have changed since a reference displacement, now and at that check, tells when it must be looked
-/// at again:
+/// A group of eight points knows its margin: how much more the nearest of its bonds could take when it was last checked. A bound of what the
+/// bonds around it have changed since a reference displacement, now and at that check, tells when it must be looked at again:
 ///   change since the check <= change since the reference + change from the reference to the check.
-/// The reference is renewed, with a check of everything, once the single checks since the last one add up to as much work. Where
-/// the loop over forces knows how far bonds are from failing, none of this is needed.
+/// The reference is renewed, with a check of everything, once the single checks since the last one add up to as much work. Where the loop over
+/// forces knows how far bonds are from failing, none of this is needed.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,16 +17,17 @@
 #include "families/cloud_rows.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/parallel.hpp"
+#include "families/cloud_rows.hpp"
 #include "perikit/families/bonds.hpp"
 
 namespace perikit {
 
-/// What a loop over forces that knows the stretch of every bond of a cloud leaves behind, so that bonds far from failing are not
-/// looked at a second time.
+/// What a loop over forces that knows the stretch of every bond of a cloud leaves behind, so that bonds far from failing are not looked at a
+/// second time.
 struct NearestFailure {
-  double least_onset = 0;                 ///< of the body
-  AlignedVector<double> excess;           ///< by point: largest e - least_onset |xi| of its bonds to larger indices [m]
-  const AlignedVector<Row>* u = nullptr;  ///< displacement of that evaluation, point-major; null: unknown
+  double least_onset = 0;                  ///< of the body
+  AlignedVector<double> excess;            ///< by point: largest e - least_onset |xi| of its bonds to larger indices [m]
+  const AlignedVector<Row>* u = nullptr;   ///< displacement of that evaluation, point-major; null: unknown
 };
 
 class BondMonitor : public BondFinder {
@@ -44,7 +44,7 @@ class BondMonitor : public BondFinder {
   struct Group {
     std::int32_t first;
     std::uint8_t live;
-    std::int32_t item;  ///< whatever the derived class finds them by
+    std::int32_t item;           ///< whatever the derived class finds them by
   };
   /// skip = false: every group in every step, for comparison.
   BondMonitor(const Body& body, bool skip) : body_(body), skip_(skip), reference_(body.make_field(body.dimension())) {}
@@ -68,24 +68,24 @@ class BondMonitor : public BondFinder {
 
   const Body& body_;
   bool skip_;
-  Field reference_;  ///< displacement
+  Field reference_;                                 ///< displacement
 
  private:
   std::vector<Group> groups_;
   std::vector<std::size_t> cell_first_;
-  std::vector<double> margin_;                  ///< by group
-  std::vector<double> offset_;                  ///< by group: bound from the reference to its last check
-  std::vector<double> moved_;                   ///< by cell
-  bool renew_ = true;                           ///< everything is to be checked
-  std::size_t since_ = 0;                       ///< checks since everything was
-  std::vector<std::vector<BondChange>> found_;  ///< by cell
-  std::vector<std::size_t> checks_;             ///< by cell, of one call
+  std::vector<double> margin_;                      ///< by group
+  std::vector<double> offset_;                      ///< by group: bound from the reference to its last check
+  std::vector<double> moved_;                       ///< by cell
+  bool renew_ = true;                               ///< everything is to be checked
+  std::size_t since_ = 0;                           ///< checks since everything was
+  std::vector<std::vector<BondChange>> found_;      ///< by cell
+  std::vector<std::size_t> checks_;                 ///< by cell, of one call
   std::size_t checked_ = 0;
 };
 
 template <class Visit>
 void BondMonitor::over_cells(Visit&& visit) const {
-  constexpr std::size_t batch = 16;  // cells a task
+  constexpr std::size_t batch = 16;   // cells a task
   const std::size_t n = cells();
   parallel_for((n + batch - 1) / batch, [&](std::size_t b) {
     for (std::size_t c = b * batch; c < std::min(n, (b + 1) * batch); ++c) visit(c);

@@ -12,17 +12,12 @@ namespace perikit {
 
 namespace {
 
-/// One point at a time; each bond at the end with the smaller index. Margins are lengths: the ends of a bond move apart by no
-/// more than the diagonal of a box around the motion of its cell and the cells of the partners. Rigid translations count for
-/// nothing.
+/// One point at a time; each bond at the end with the smaller index. Margins are lengths: the ends of a bond move apart by no more than
+/// the diagonal of a box around the motion of its cell and the cells of the partners. Rigid translations count for nothing.
 class CloudMonitor final : public BondMonitor {
  public:
   CloudMonitor(const CloudFamilies& families, const BodyDamage& damage, bool skip, const NearestFailure* known)
-      : BondMonitor(families.body(), skip),
-        families_(families),
-        lists_(families.lists()),
-        damage_(damage),
-        known_(known),
+      : BondMonitor(families.body(), skip), families_(families), lists_(families.lists()), damage_(damage), known_(known),
         position_(reinterpret_cast<const Row*>(families.body().rows().data())) {
     make_cells();
   }
@@ -41,14 +36,14 @@ class CloudMonitor final : public BondMonitor {
   const BodyDamage& damage_;
   const NearestFailure* known_;
   const Row* position_;
-  std::vector<std::vector<std::int32_t>> near_;  ///< by cell: those with partners of its points, itself too
-  std::vector<Row> low_, high_;                  ///< motion by cell
-  AlignedVector<Row> u_;                         ///< mirror, where the loop over forces has none of this displacement
-  const Row* rows_ = nullptr;                    ///< the one that is looked at
+  std::vector<std::vector<std::int32_t>> near_;   ///< by cell: those with partners of its points, itself too
+  std::vector<Row> low_, high_;                   ///< motion by cell
+  AlignedVector<Row> u_;                          ///< mirror, where the loop over forces has none of this displacement
+  const Row* rows_ = nullptr;                     ///< the one that is looked at
 };
 
 void CloudMonitor::make_cells() {
-  constexpr std::size_t cell_points = 64;  // consecutive points lie near each other
+  constexpr std::size_t cell_points = 64;   // consecutive points lie near each other
   const std::size_t n = body_.points(), cells = (n + cell_points - 1) / cell_points;
   std::vector<Group> groups;
   std::vector<std::size_t> first;
@@ -65,8 +60,7 @@ void CloudMonitor::make_cells() {
     std::vector<std::int32_t>& near = near_[c];
     near.push_back(static_cast<std::int32_t>(c));
     for (std::int64_t k = lists_.first[c * cell_points]; k < lists_.first[end]; ++k) {
-      const auto cell =
-          static_cast<std::int32_t>(static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(k)]) / cell_points);
+      const auto cell = static_cast<std::int32_t>(static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(k)]) / cell_points);
       if (cell != near.back()) near.push_back(cell);
     }
     std::sort(near.begin(), near.end());
@@ -150,13 +144,12 @@ double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondC
         limit[b] = damage_.limits(static_cast<std::size_t>(p), static_cast<std::size_t>(j)).onset;
       }
       for (int b = 0; b < n; ++b)
-        if (families_.b(static_cast<std::size_t>(k + b)) == 0)
-          square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
+        if (families_.b(static_cast<std::size_t>(k + b)) == 0) square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
       for (int b = n; b < lanes; ++b) square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
       for (int b = 0; b < lanes; b += pack_width) {
         // e = (|y|^2 - |xi|^2)/(|y| + |xi|)
-        const Pack squared = Pack::load(square + b), change = Pack::load(difference + b), length = sqrt(squared),
-                   e = change / (sqrt(squared + change) + length), left = Pack::load(limit + b) * length - e;
+        const Pack squared = Pack::load(square + b), change = Pack::load(difference + b), length = sqrt(squared), e = change / (sqrt(squared + change) + length),
+                   left = Pack::load(limit + b) * length - e;
         const PackMask far = left > Pack(1e-13) * length;
         margin = min(margin, select(far, left, none));
         if (all(far)) continue;
@@ -176,10 +169,8 @@ double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondC
   return *std::min_element(least, least + pack_width);
 }
 
-/// A bond beyond its onset: appended where its integrity falls. Whether it stays between whole and broken, to be looked at every
-/// time.
-bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, double onset,
-                           std::vector<BondChange>& changes) const {
+/// A bond beyond its onset: appended where its integrity falls. Whether it stays between whole and broken, to be looked at every time.
+bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, double onset, std::vector<BondChange>& changes) const {
   const auto k = static_cast<std::size_t>(bond);
   const std::int32_t j = lists_.neighbour[k];
   alignas(64) double s[padding] = {stretch}, start[padding] = {onset}, now[padding] = {},

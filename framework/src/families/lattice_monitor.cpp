@@ -20,10 +20,10 @@ Pack weaker(Pack a, Pack b) noexcept {
 
 /// Checks eight points at once, offset by offset; each bond at the end from which it points forward. Margins are stretches.
 ///
-/// The ends of a bond of d cells are joined by a staircase of |d_1| + |d_2| + ... steps to next neighbours, so that they moved
-/// apart by at most sum |d_a| M_a, M_a the largest difference of the motion of next neighbours along axis a nearby; and a stretch
-/// changed by at most sqrt(sum M_a^2)/spacing. Rigid translations count for nothing. Where cells of the box are empty, staircases
-/// may lead through them: their motion counts as zero.
+/// The ends of a bond of d cells are joined by a staircase of |d_1| + |d_2| + ... steps to next neighbours, so that they moved apart by
+/// at most sum |d_a| M_a, M_a the largest difference of the motion of next neighbours along axis a nearby; and a stretch changed by at
+/// most sqrt(sum M_a^2)/spacing. Rigid translations count for nothing. Where cells of the box are empty, staircases may lead through
+/// them: their motion counts as zero.
 template <int D>
 class LatticeMonitor final : public BondMonitor {
  public:
@@ -52,10 +52,10 @@ class LatticeMonitor final : public BondMonitor {
 
   const LatticeFamilies& families_;
   const BodyDamage& damage_;
-  std::vector<double> length_;                   ///< by slot
-  bool full_box_;                                ///< every cell of the box holds a point
-  std::vector<std::vector<std::int32_t>> near_;  ///< by cell: those that its bonds and their staircases meet, itself too
-  std::vector<double> steepest_;                 ///< D by cell
+  std::vector<double> length_;              ///< by slot
+  bool full_box_;                           ///< every cell of the box holds a point
+  std::vector<std::vector<std::int32_t>> near_;   ///< by cell: those that its bonds and their staircases meet, itself too
+  std::vector<double> steepest_;            ///< D by cell
 };
 
 template <int D>
@@ -65,8 +65,7 @@ void LatticeMonitor<D>::make_cells() {
   std::vector<std::tuple<std::int64_t, std::int64_t, std::int64_t, std::int32_t>> order;
   for (std::size_t c = 0; c < families_.tiles.chunks.size(); ++c) {
     const auto k = families_.grid.cell(families_.tiles.chunks[c].first);
-    order.emplace_back(k[2] / across, k[1] / across, k[0] / (D == 1 ? 4 * chunk_points : chunk_points),
-                       static_cast<std::int32_t>(c));
+    order.emplace_back(k[2] / across, k[1] / across, k[0] / (D == 1 ? 4 * chunk_points : chunk_points), static_cast<std::int32_t>(c));
   }
   std::sort(order.begin(), order.end());
   std::vector<Group> groups;
@@ -74,9 +73,7 @@ void LatticeMonitor<D>::make_cells() {
   std::vector<std::int32_t> cell_of(body_.stride() / chunk_points, -1);
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto& [c2, c1, c0, chunk] = order[k];
-    if (k == 0 ||
-        std::tie(c2, c1, c0) != std::tie(std::get<0>(order[k - 1]), std::get<1>(order[k - 1]), std::get<2>(order[k - 1])))
-      first.push_back(k);
+    if (k == 0 || std::tie(c2, c1, c0) != std::tie(std::get<0>(order[k - 1]), std::get<1>(order[k - 1]), std::get<2>(order[k - 1]))) first.push_back(k);
     const LatticeChunk& own = families_.tiles.chunks[static_cast<std::size_t>(chunk)];
     groups.push_back({own.first, families_.pattern(own).live, chunk});
     cell_of[static_cast<std::size_t>(own.first) / chunk_points] = static_cast<std::int32_t>(first.size()) - 1;
@@ -101,9 +98,7 @@ void LatticeMonitor<D>::make_cells() {
 
 template <int D>
 void LatticeMonitor<D>::steepest(std::size_t cell, ConstFieldView u) {
-  const auto motion = [&](int c, std::int64_t at) {
-    return Pack::load(u.component(c) + at) - Pack::load(reference_.component(c) + at);
-  };
+  const auto motion = [&](int c, std::int64_t at) { return Pack::load(u.component(c) + at) - Pack::load(reference_.component(c) + at); };
   Pack most[D];
   for (const Group& group : groups_of(cell)) {
     for (int l = 0; l < chunk_points; l += pack_width) {
@@ -120,8 +115,7 @@ void LatticeMonitor<D>::steepest(std::size_t cell, ConstFieldView u) {
           square += difference * difference;
         }
         if (full_box_) {
-          const auto both =
-              static_cast<std::uint8_t>((group.live & families_.live_bits(group.first + families_.grid.shift(next))) >> l);
+          const auto both = static_cast<std::uint8_t>((group.live & families_.live_bits(group.first + families_.grid.shift(next))) >> l);
           square = keep(both, square);
         }
         most[a] = select(square > most[a], square, most[a]);
@@ -194,8 +188,7 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
         // Bonds between whole and broken keep their margin: they are looked at every time.
         for (int k = 0; k < pack_width; ++k) {
           if (!(bits >> k & 1)) continue;
-          if (b[k] < pattern.b(s, l + k))
-            changes.push_back({{static_cast<std::int32_t>(p + k), static_cast<std::int32_t>(far + k)}, b[k]});
+          if (b[k] < pattern.b(s, l + k)) changes.push_back({{static_cast<std::int32_t>(p + k), static_cast<std::int32_t>(far + k)}, b[k]});
           if (b[k] == 0) left.v[k] = never[k];
         }
       }
@@ -210,12 +203,9 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
 
 std::unique_ptr<BondMonitor> LatticeFamilies::make_monitor(const BodyDamage& damage, bool skip, const NearestFailure*) const {
   switch (grid.dimension) {
-    case 1:
-      return std::make_unique<LatticeMonitor<1>>(*this, damage, skip);
-    case 2:
-      return std::make_unique<LatticeMonitor<2>>(*this, damage, skip);
-    default:
-      return std::make_unique<LatticeMonitor<3>>(*this, damage, skip);
+    case 1: return std::make_unique<LatticeMonitor<1>>(*this, damage, skip);
+    case 2: return std::make_unique<LatticeMonitor<2>>(*this, damage, skip);
+    default: return std::make_unique<LatticeMonitor<3>>(*this, damage, skip);
   }
 }
 

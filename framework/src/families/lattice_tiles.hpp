@@ -14,12 +14,12 @@ struct LatticeSlots;
 inline constexpr int chunk_points = static_cast<int>(padding);
 
 struct LatticeChunk {
-  std::int32_t first;    ///< internal index, a multiple of chunk_points
-  std::int32_t pattern;  ///< of its bonds; -1: whole
+  std::int32_t first;                          ///< internal index, a multiple of chunk_points
+  std::int32_t pattern;                        ///< of its bonds; -1: whole
 };
 
-/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence. Where it is
-/// not the whole row, families reach into so many chunks before it and after it.
+/// A piece of a row: chunks of cells first ... first + chunk_points * chunks, all of them targets of the divergence. Where it is not the whole
+/// row, families reach into so many chunks before it and after it.
 struct LatticeRow {
   std::int32_t first;
   std::int32_t chunks;
@@ -29,14 +29,14 @@ struct LatticeRow {
 };
 
 struct LatticeBlock {
-  std::size_t chunk_begin, chunk_end;  ///< into chunks
-  std::size_t row_begin, row_end;      ///< into rows
+  std::size_t chunk_begin, chunk_end;          ///< into chunks
+  std::size_t row_begin, row_end;              ///< into rows
 };
 
 struct LatticeTiles {
   LatticeTiles(const Body& body, const LatticeSlots& slots);
 
-  std::vector<LatticeChunk> chunks;  ///< live ones, block by block, along rows
+  std::vector<LatticeChunk> chunks;            ///< live ones, block by block, along rows
   std::vector<LatticeRow> rows;
   std::vector<LatticeBlock> blocks;
   BlockReach reach;
@@ -59,15 +59,13 @@ struct LatticeTiles {
 
  private:
   struct Box {
-    std::int64_t low[3], high[3];  ///< chunk along the row, then rows
+    std::int64_t low[3], high[3];              ///< chunk along the row, then rows
   };
   /// Which tiles a block touches, and its colour. size, count: of tiles along the axes.
-  void colour(const std::vector<Box>& boxes, const std::int64_t (&size)[3], const std::int64_t (&count)[3],
-              const LatticeSlots& slots);
+  void colour(const std::vector<Box>& boxes, const std::int64_t (&size)[3], const std::int64_t (&count)[3], const LatticeSlots& slots);
 
-  std::vector<std::int32_t> chunk_at_;  ///< by group of eight cells
-  std::vector<std::pair<std::int32_t, std::uint8_t>>
-      partly_dead_;  ///< first cells of such groups in rows, and which of them live
+  std::vector<std::int32_t> chunk_at_;         ///< by group of eight cells
+  std::vector<std::pair<std::int32_t, std::uint8_t>> partly_dead_;   ///< first cells of such groups in rows, and which of them live
 };
 
 }  // namespace perikit

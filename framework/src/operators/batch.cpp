@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "operators/batch.hpp"
 #include "operators/bond_samples.hpp"
 #include "perikit/core/simd.hpp"
 
@@ -15,13 +16,11 @@ void ScratchPool::prepare(const Laws& laws) {
     scratch_.push_back(std::make_unique<BatchScratch>());
     BatchScratch& s = *scratch_.back();
     laws.prepare(s.law, false);
-    for (auto* state : {&s.old_state, &s.new_state})
-      state->assign(static_cast<std::size_t>(laws.state_components()) * batch_points, 0.0);
+    for (auto* state : {&s.old_state, &s.new_state}) state->assign(static_cast<std::size_t>(laws.state_components()) * batch_points, 0.0);
   }
 }
 
-// Numbers that follow each other are read and written where they lie; others, and those of bodies with several laws, are
-// gathered.
+// Numbers that follow each other are read and written where they lie; others, and those of bodies with several laws, are gathered.
 LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept {
   const bool keep = keeps_history(s);
   if (s.first_number >= 0 && laws_.records().size() == 1) {
@@ -31,10 +30,9 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
   for (std::size_t c = 0; c < history_->components(); ++c)
     for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
       const std::int64_t q = l >= n ? -1 : s.first_number >= 0 ? s.first_number + l : s.number[l];
-      s.old_state[c * batch_points + static_cast<std::size_t>(l)] =
-          q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
+      s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
     }
-  if (keep) std::fill(s.new_state.begin(), s.new_state.end(), 0.0);  // laws without a history leave theirs alone
+  if (keep) std::fill(s.new_state.begin(), s.new_state.end(), 0.0);   // laws without a history leave theirs alone
   return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, history_->time_step()};
 }
 
@@ -43,14 +41,11 @@ void BatchWork::end_state(int n, BatchScratch& s, std::int64_t numbers) const no
   for (std::size_t c = 0; c < history_->components(); ++c)
     for (int l = 0; l < n; ++l) {
       const std::int64_t q = s.first_number >= 0 ? s.first_number + l : s.number[l];
-      if (q >= 0)
-        history_->end()[c * history_->stride() + static_cast<std::size_t>(q + numbers)] =
-            s.new_state[c * batch_points + static_cast<std::size_t>(l)];
+      if (q >= 0) history_->end()[c * history_->stride() + static_cast<std::size_t>(q + numbers)] = s.new_state[c * batch_points + static_cast<std::size_t>(l)];
     }
 }
 
-int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P,
-                             double* dP) const noexcept {
+int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept {
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
@@ -112,12 +107,10 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
     }
     s.first_number = -1;
   }
-  const int bad =
-      evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
+  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
   if (bad >= 0) return bad % lanes;
   if (!laws_.single()) {
-    // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks
-    // for them.
+    // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks for them.
     const auto tidy = [](double* x, int lanes_of) {
       for (int l = 0; l < lanes_of; l += pack_width) {
         const Pack value = Pack::load(x + l);
@@ -132,9 +125,7 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
     if (ends == 2) *energy += weighted_energy(n, s.far_weight, s.psi + lanes);
   }
   if (work_ == Work::sample) return -1;
-  selective_pull_back(
-      laws_.space(), batch,
-      {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
+  selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
   return -1;
 }
 

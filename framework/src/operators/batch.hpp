@@ -33,8 +33,8 @@ struct Balance {
 struct BatchScratch {
   alignas(64) double H[9 * batch_points];
   alignas(64) double dH[9 * batch_points];
-  alignas(64) double P[9 * batch_points];      ///< result: weighted stress
-  alignas(64) double other[9 * batch_points];  ///< stress of the far ends' material
+  alignas(64) double P[9 * batch_points];        ///< result: weighted stress
+  alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
   alignas(64) double psi[batch_points];
   alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
@@ -61,20 +61,20 @@ struct BatchScratch {
   std::int32_t far[batch_points];
   LawScratch law;
   // Laws with history: the stable numbers of the lanes, to be filled in by the space where history is kept.
-  std::int64_t first_number = -1;     ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
-  std::int64_t number[batch_points];  ///< by lane; -1: fresh, and not kept
-  std::int64_t far_number = 0;        ///< added where a bond is evaluated for its far end
-  bool keep_history = true;           ///< false: another block keeps that of these lanes
-  AlignedVector<double> old_state, new_state;  ///< gathered, [component][lane]
+  std::int64_t first_number = -1;                ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
+  std::int64_t number[batch_points];             ///< by lane; -1: fresh, and not kept
+  std::int64_t far_number = 0;                   ///< added where a bond is evaluated for its far end
+  bool keep_history = true;                      ///< false: another block keeps that of these lanes
+  AlignedVector<double> old_state, new_state;    ///< gathered, [component][lane]
 };
 
 /// Sums over lanes of sampled quantities go here, one row per owner.
 struct SampleSums {
-  double* weight;  ///< sum W
-  double* psi;     ///< sum W psi
-  double* H;       ///< tensor components x stride
+  double* weight;      ///< sum W
+  double* psi;         ///< sum W psi
+  double* H;           ///< tensor components x stride
   double* P;
-  double* cauchy;  ///< 9 x stride
+  double* cauchy;      ///< 9 x stride
   double* von_mises;
   std::size_t stride;
 };
@@ -118,8 +118,8 @@ class BatchWork {
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
-  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results
-  /// too; both ends of at most batch_points / 2 lanes.
+  /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
+  /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
@@ -129,14 +129,11 @@ class BatchWork {
            double* energy) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
-  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P,
-                    double* dP) const noexcept;
+  int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
   void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
-  bool keeps_history(const BatchScratch& s) const noexcept {
-    return work_ == Work::force && history_->time_step() > 0 && s.keep_history;
-  }
+  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && history_->time_step() > 0 && s.keep_history; }
 
   const Laws& laws_;
   Work work_;
@@ -153,11 +150,10 @@ struct Pass {
   ConstFieldView u, w;
   FieldView out;
   const SampleSums* sums = nullptr;
-  double* energies = nullptr;  ///< by block
-  std::int64_t bad = -1;       ///< internal index
+  double* energies = nullptr;     ///< by block
+  std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
-  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at
-  /// `near`.
+  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
   /// By group of eight points: forces of the evaluation points alone that belong to the blocks of these, the same whatever is

@@ -8,6 +8,7 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/problem/body_problem.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
@@ -62,9 +63,7 @@ void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const
   images()->fold(full, K);
 }
 
-EvaluationStatus BodyProblem::sample(PointSamples& samples) {
-  return terms().sample(seen(state().displacement(), seen_), samples);
-}
+EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
 
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
@@ -80,10 +79,8 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
                                      status.description, parts_.kinematics, parts_.materials[id]);
   }
   if (weak_springs_ && status.ok()) {
-    if (weak_springs_->hold())
-      weak_springs_->add_forces(u, force, energy);
-    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok())
-      return refused;
+    if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
+    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok()) return refused;
   }
   finish(force, status);
   return status;
@@ -136,8 +133,7 @@ EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K)
 AssembledSize BodyProblem::assembled_size() {
   refuse_ranks(parts_);
   AssembledSize size = terms().assembled_size();
-  if (images())
-    size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);  // it is there twice
+  if (images()) size.bytes += size.blocks * static_cast<std::size_t>(dimension() * dimension()) * sizeof(double);   // it is there twice
   return size;
 }
 
@@ -199,9 +195,7 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
   const std::vector<LoosePiece>& pieces = weak_springs_->pieces();
   if (pieces.empty()) return {};
   const std::string first = pieces.front().name(body());
-  return pieces.size() == 1
-             ? first
-             : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+  return pieces.size() == 1 ? first : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {
@@ -251,7 +245,7 @@ struct BeforeState {
   explicit BeforeState(std::span<const std::byte> snapshot) {
     ByteReader in(snapshot);
     stride = in.value<std::uint64_t>();
-    in.value<double>();  // of the constraints
+    in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
     history.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
     in.bytes(history.data(), history.size() * sizeof(double));
@@ -270,9 +264,8 @@ void BodyProblem::carry(std::span<const std::byte> snapshot) {
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
   if (before.stride != body().stride()) throw InputError("the earlier run had another body");
   if (before.history.size() != history.size()) throw InputError("the earlier run had other laws");
-  std::vector<BondChange> lost;  // of the bonds that cracks of this scene leave
-  std::ranges::copy_if(before.bonds, std::back_inserter(lost),
-                       [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
+  std::vector<BondChange> lost;   // of the bonds that cracks of this scene leave
+  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
   if (!lost.empty()) terms().restore_bonds(lost);
   if (history.empty()) return;
   std::ranges::copy(before.history, history.begin());

@@ -11,8 +11,7 @@ ImageMap::ImageMap(const Body& body, const Images& images) : map_(body.stride(),
   for (std::size_t k = 0; k < images.size(); ++k) {
     image_.push_back(body.internal()[real + k]);
     source_.push_back(body.internal()[static_cast<std::size_t>(images.source[k])]);
-    sign_.push_back(
-        {static_cast<double>(images.sign[k][0]), static_cast<double>(images.sign[k][1]), static_cast<double>(images.sign[k][2])});
+    sign_.push_back({static_cast<double>(images.sign[k][0]), static_cast<double>(images.sign[k][1]), static_cast<double>(images.sign[k][2])});
     map_[static_cast<std::size_t>(image_.back())] = static_cast<std::int32_t>(k);
   }
   const auto stride = static_cast<std::int64_t>(body.stride());
@@ -72,14 +71,13 @@ void ImageMap::fold(const BlockMatrix& full, BlockMatrix& K) const {
   std::vector<std::int32_t> row_of(map_.size(), -1), source(n, -1);
   for (std::size_t r = 0; r < n; ++r) row_of[static_cast<std::size_t>(full.point[r])] = static_cast<std::int32_t>(r);
   const auto image = [&](std::size_t r) { return map_[static_cast<std::size_t>(full.point[r])]; };
-  std::vector<std::vector<std::int32_t>> images(n);  // rows of the images of each row
+  std::vector<std::vector<std::int32_t>> images(n);   // rows of the images of each row
   for (std::size_t r = 0; r < n; ++r) {
     if (image(r) < 0) continue;
     source[r] = row_of[static_cast<std::size_t>(source_[static_cast<std::size_t>(image(r))])];
     images[static_cast<std::size_t>(source[r])].push_back(static_cast<std::int32_t>(r));
   }
-  const auto each_block = [&](std::size_t row,
-                              auto&& visit) {  // (column, factors of the row or null, of the column or null, block of full)
+  const auto each_block = [&](std::size_t row, auto&& visit) {   // (column, factors of the row or null, of the column or null, block of full)
     const auto add = [&](std::size_t from, const double* left) {
       for (std::int64_t b = full.row_first[from]; b < full.row_first[from + 1]; ++b) {
         const std::int32_t column = full.column[static_cast<std::size_t>(b)];
@@ -89,8 +87,7 @@ void ImageMap::fold(const BlockMatrix& full, BlockMatrix& K) const {
       }
     };
     add(row, nullptr);
-    for (const std::int32_t r : images[row])
-      add(static_cast<std::size_t>(r), sign_[static_cast<std::size_t>(image(static_cast<std::size_t>(r)))].data());
+    for (const std::int32_t r : images[row]) add(static_cast<std::size_t>(r), sign_[static_cast<std::size_t>(image(static_cast<std::size_t>(r)))].data());
   };
   if (!K.has_pattern()) {
     K.dimension = full.dimension;
@@ -110,8 +107,7 @@ void ImageMap::fold(const BlockMatrix& full, BlockMatrix& K) const {
   }
   parallel_for(n, [&](std::size_t r) {
     const auto begin = K.column.begin() + K.row_first[r], end = K.column.begin() + K.row_first[r + 1];
-    std::fill(K.values.begin() + K.row_first[r] * static_cast<std::int64_t>(size),
-              K.values.begin() + K.row_first[r + 1] * static_cast<std::int64_t>(size), 0.0);
+    std::fill(K.values.begin() + K.row_first[r] * static_cast<std::int64_t>(size), K.values.begin() + K.row_first[r + 1] * static_cast<std::int64_t>(size), 0.0);
     each_block(r, [&](std::int32_t column, const double* left, const double* right, std::int64_t b) {
       double* to = &K.values[static_cast<std::size_t>(std::lower_bound(begin, end, column) - K.column.begin()) * size];
       const double* from = &full.values[static_cast<std::size_t>(b) * size];

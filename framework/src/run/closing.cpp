@@ -19,29 +19,24 @@ double peak_bytes() {
 /// What was left out because no wave had arrived, in words; empty where nothing was.
 std::string quiet_summary(const QuietCounts& counts) {
   if (counts.quiet == 0) return {};
-  return fmt::format(
-      "quiet blocks  {} of {} blocks of points left out of force evaluations ({:.2f} %): no wave had reached them\n",
-      counts.quiet, counts.blocks, 100.0 * static_cast<double>(counts.quiet) / static_cast<double>(counts.blocks));
+  return fmt::format("quiet blocks  {} of {} blocks of points left out of force evaluations ({:.2f} %): no wave had reached them\n", counts.quiet, counts.blocks,
+                     100.0 * static_cast<double>(counts.quiet) / static_cast<double>(counts.blocks));
 }
 
 }  // namespace
 
 std::string RunRecorder::closing(double set_up) const {
   BodyProblem& problem = simulation_.problem();
-  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(),
-               steps_time = std::max(0.0, spent - output_seconds_);
-  const auto steps = static_cast<double>(problem.state().step - first_step_),
-             points = static_cast<double>(problem.body().points_of_all_ranks());
+  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(), steps_time = std::max(0.0, spent - output_seconds_);
+  const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.body().points_of_all_ranks());
   std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
-  text += fmt::format(
-      "time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up,
-      steps_time, output_seconds_, frames_written_, rows_written_, checkpoints_written_);
+  text += fmt::format("time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, steps_time,
+                                 output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (steps > 0) {
-    text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps,
-                        points, steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
+    text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
+                        steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
   }
-  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most\n", static_cast<double>(problem.bytes()) / 1e6,
-                      peak_bytes() / 1e6);
+  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most\n", static_cast<double>(problem.bytes()) / 1e6, peak_bytes() / 1e6);
   const Energies& e = problem.state().energies;
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, e.external_work);

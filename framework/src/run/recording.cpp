@@ -27,9 +27,7 @@ std::atomic<bool> stop{false};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
-bool reached(double time, double wanted) {
-  return time >= wanted - 1e-9 * std::abs(wanted);
-}
+bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
 std::int64_t file_fingerprint(const std::filesystem::path& file) {
   const std::string bytes = read_text(file);
@@ -66,17 +64,11 @@ ReferenceData reference_of(const BodyProblem& problem) {
 
 }  // namespace
 
-void request_stop() noexcept {
-  stop = true;
-}
-bool stop_requested() noexcept {
-  return stop;
-}
+void request_stop() noexcept { stop = true; }
+bool stop_requested() noexcept { return stop; }
 
 std::vector<std::string> history_columns(const Scene& scene) {
-  std::vector<std::string> columns{"step",           "time",          "time_step",         "strain_energy",
-                                   "kinetic_energy", "external_work", "dissipated_energy", "iterations",
-                                   "residual"};
+  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -105,12 +97,9 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   body_ = body_fingerprint(reference);
   output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
-  if (earlier)
-    start_from_checkpoint();
-  else
-    start_fresh(start);
-  writer_ =
-      std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  if (earlier) start_from_checkpoint();
+  else start_fresh(start);
+  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
 
@@ -143,8 +132,7 @@ void RunRecorder::start_from_checkpoint() {
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
   log_text_ = read_text(folder_ / "run.log");
-  if (const auto marked = read_marked(folder_ / "scene.toml"); !marked || marked->text != simulation_.scene().resolved)
-    output_->mark(simulation_.scene().resolved);
+  if (const auto marked = read_marked(folder_ / "scene.toml"); !marked || marked->text != simulation_.scene().resolved) output_->mark(simulation_.scene().resolved);
 }
 
 void RunRecorder::check_longer() const {
@@ -153,28 +141,19 @@ void RunRecorder::check_longer() const {
   const std::string& type = simulation_.scene().integrator->type;
   // What an integrator plans for is in its state where it can plan anew.
   if (state.declare_numbers("planned_end", 1)[0] == 0)
-    throw InputError(values.position("type"), "integrator",
-                     fmt::format("found another end than the run in {} had, and {} cannot plan anew; allowed: the same end",
-                                 folder_.string(), type));
+    throw InputError(values.position("type"), "integrator", fmt::format("found another end than the run in {} had, and {} cannot plan anew; allowed: the same end", folder_.string(), type));
   if (simulation_.dynamic() && values.has("end_time") && values.number("end_time") < state.time)
-    throw values.error("end_time", fmt::format("found {} s, but the run in {} has come to {:.6g} s; allowed: a later end",
-                                               values.number("end_time"), folder_.string(), state.time));
+    throw values.error("end_time", fmt::format("found {} s, but the run in {} has come to {:.6g} s; allowed: a later end", values.number("end_time"), folder_.string(), state.time));
   if (!simulation_.dynamic() && state.time >= 1)
-    throw values.error(
-        "steps",
-        fmt::format("found a run in {} that has come to its end, load parameter 1; allowed: other steps where it has not",
-                    folder_.string()));
+    throw values.error("steps", fmt::format("found a run in {} that has come to its end, load parameter 1; allowed: other steps where it has not", folder_.string()));
 }
 
 void RunRecorder::check_kept_files() const {
   const auto refuse = [](const std::filesystem::path& file) {
-    throw InputError({file.string()}, "",
-                     "found other contents than the run wrote before its checkpoint; allowed: the files as they were, or a run "
-                     "without --resume");
+    throw InputError({file.string()}, "", "found other contents than the run wrote before its checkpoint; allowed: the files as they were, or a run without --resume");
   };
   for (std::size_t k = 0; k < done_.frame_fingerprints.size(); ++k)
-    if (const auto file = frame_file(static_cast<std::int64_t>(k)); file_fingerprint(file) != done_.frame_fingerprints[k])
-      refuse(file);
+    if (const auto file = frame_file(static_cast<std::int64_t>(k)); file_fingerprint(file) != done_.frame_fingerprints[k]) refuse(file);
   if (done_.history_rows == 0) return;
   const std::filesystem::path file = folder_ / "history.csv";
   const History history = read_history(file);
@@ -189,9 +168,7 @@ void RunRecorder::check_kept_files() const {
   if (fingerprint != done_.history_fingerprint) refuse(file);
 }
 
-std::filesystem::path RunRecorder::frame_file(std::int64_t index) const {
-  return folder_ / "frames" / (frame_name(index) + ".h5");
-}
+std::filesystem::path RunRecorder::frame_file(std::int64_t index) const { return folder_ / "frames" / (frame_name(index) + ".h5"); }
 
 RunRecorder::~RunRecorder() {
   if (line_open_) std::fputc('\n', stderr);
@@ -206,9 +183,7 @@ void RunRecorder::log(std::string_view message) {
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
-bool RunRecorder::cancelled() const noexcept {
-  return stopping_;
-}
+bool RunRecorder::cancelled() const noexcept { return stopping_; }
 
 bool RunRecorder::last(std::int64_t step, double time) const {
   return ended(done_, step, time);
@@ -225,8 +200,7 @@ bool RunRecorder::frame_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::history_due(std::int64_t step) const {
-  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 ||
-         (done_.steps_expected > 0 && step >= done_.steps_expected);
+  return step == 0 || done_.history_every <= 1 || step % done_.history_every == 0 || (done_.steps_expected > 0 && step >= done_.steps_expected);
 }
 
 bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
@@ -235,23 +209,20 @@ bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::wants_sample(std::int64_t step, double time) {
-  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
-  // the run after the next step.
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
+  // run after the next step.
   stopping_ = stop_requested();
   return stopping_ || frame_due(step, time) || history_due(step);
 }
 
 void RunRecorder::step_done(const StepReport& report) {
-  if (report.step <= resumed_step_) return;  // an integrator without steps reports its one state again
+  if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
-  if (done_.frame_spacing == 0)
-    done_.frame_spacing = report.end_time / static_cast<double>(simulation_.scene().output.frames.value_or(default_frames));
+  if (done_.frame_spacing == 0) done_.frame_spacing = report.end_time / static_cast<double>(simulation_.scene().output.frames.value_or(default_frames));
   if (done_.history_every == 0) {
     const std::int64_t asked = simulation_.scene().output.history_every;
-    done_.history_every = asked > 0               ? asked
-                          : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows)
-                                                  : 1;
+    done_.history_every = asked > 0 ? asked : simulation_.dynamic() ? std::max<std::int64_t>(1, report.steps_expected / default_history_rows) : 1;
   }
   fields_.renew();
   const auto before = std::chrono::steady_clock::now();
@@ -263,9 +234,7 @@ void RunRecorder::step_done(const StepReport& report) {
   if (frame) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
   done_.history_rows += row;
   done_.frames += frame;
-  while (done_.next_time < std::ssize(frame_times_) &&
-         reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)]))
-    ++done_.next_time;
+  while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
     log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
                     report.end_time));
@@ -276,9 +245,7 @@ void RunRecorder::step_done(const StepReport& report) {
   progress(report);
 }
 
-bool RunRecorder::interrupted() const noexcept {
-  return stop_requested();
-}
+bool RunRecorder::interrupted() const noexcept { return stop_requested(); }
 
 void RunRecorder::stopped_within_step() {
   stopping_ = true;
@@ -291,15 +258,12 @@ void RunRecorder::stopped_within_step() {
 }
 
 void RunRecorder::working(std::string_view what) {
-  if (line_due())
-    show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what,
-                     std::chrono::duration<double>(shown_ - start_).count()),
-         false);
+  if (line_due()) show(fmt::format("step {}  {}  {:.0f} s", last_step_.report.step + 1, what, std::chrono::duration<double>(shown_ - start_).count()), false);
 }
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  history_->sync();  // frames are on the disk already
+  history_->sync();   // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
                              simulation_.problem().snapshot()});
 }
@@ -311,8 +275,7 @@ void RunRecorder::write_frame(const StepReport& report) {
     const std::vector<double>& values = fields.back().data;
     const auto strange = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
     if (strange == values.end() || !strange_fields_.insert(name).second) continue;
-    log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name,
-                    (strange - values.begin()) / fields.back().width,
+    log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, (strange - values.begin()) / fields.back().width,
                     name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
   }
   writer_->write(report.time, report.step, fields);
@@ -340,9 +303,7 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
 
 bool RunRecorder::line_due() {
   const auto now = std::chrono::steady_clock::now();
-  if (!show_progress_ ||
-      now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000)))
-    return false;
+  if (!show_progress_ || now - shown_ < (isatty(fileno(stderr)) ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000))) return false;
   shown_ = now;
   return true;
 }
@@ -364,16 +325,12 @@ void RunRecorder::progress(const StepReport& report) {
   const double done = report.end_time > first_time_ ? (report.time - first_time_) / (report.end_time - first_time_) : 1.0;
   const double left = done > 0 ? spent * (1 - done) / done : 0.0;
   if (!simulation_.dynamic()) {
-    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time,
-                     report.end_time, report.iterations, report.residual, left),
-         end);
+    show(fmt::format("step {}  load {:.4g}/{:.4g}  {} iterations  residual {:.2g}  {:.0f} s left", report.step, report.time, report.end_time, report.iterations,
+                     report.residual, left), end);
     return;
   }
-  const double rate = static_cast<double>(report.step - first_step_) *
-                      static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
-  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time,
-                   report.end_time, report.time_step, rate, left),
-       end);
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time, report.time_step, rate, left), end);
 }
 
 }  // namespace perikit

@@ -1,5 +1,4 @@
-// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of
-// it.
+// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -43,13 +42,11 @@ void SceneReader::read_boundaries(const toml::table& root) {
       description.face_position = values.position(values.has("at") ? "at" : "face");
       if (!values.has("set")) description.set = "all";
     } else if (!values.has("set")) {
-      reader_.errors.add(reader_.position(*boundary), values.path() + ".set",
-                         "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
+      reader_.errors.add(reader_.position(*boundary), values.path() + ".set", "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
     }
     if (values.has("at")) {
       description.at = values.number("at");
-      if (!values.has("face"))
-        reader_.errors.add(values.position("at"), values.path() + ".at", "found it without face; allowed: only with face");
+      if (!values.has("face")) reader_.errors.add(values.position("at"), values.path() + ".at", "found it without face; allowed: only with face");
     }
     description.velocity = values.has("velocity");
     for (const char* key : {"displacement", "velocity"}) {
@@ -72,9 +69,8 @@ RampDescription SceneReader::ramp_of(const ParameterValues& values, const std::v
 
 void SceneReader::check_axis(char axis, const ParameterValues& values, const char* key) {
   if (reader_.dimension <= 0 || axis - 'x' < reader_.dimension) return;
-  reader_.errors.add(
-      values.position(key), join_path(values.path(), key),
-      fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", values.text(key), reader_.dimension));
+  reader_.errors.add(values.position(key), join_path(values.path(), key),
+                     fmt::format("found \"{}\" in a body of dimension {}; allowed: the axes of the body", values.text(key), reader_.dimension));
 }
 
 void SceneReader::read_planes(const toml::table& root) {
@@ -224,8 +220,7 @@ void SceneReader::read_history(const toml::table& output) {
     }
     if (values.has("at")) std::ranges::copy(values.numbers("at"), description.at.begin());
     if (values.has("exact")) {
-      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"),
-                                join_path(path, "exact"));
+      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"), join_path(path, "exact"));
     }
     scene_.output.history.push_back(std::move(description));
   }

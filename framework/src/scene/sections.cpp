@@ -9,9 +9,7 @@ namespace {
 
 constexpr auto unbounded = std::numeric_limits<std::size_t>::max();
 
-std::vector<std::string> faces() {
-  return {"+x", "-x", "+y", "-y", "+z", "-z"};
-}
+std::vector<std::string> faces() { return {"+x", "-x", "+y", "-y", "+z", "-z"}; }
 
 }  // namespace
 
@@ -154,12 +152,9 @@ void add_ramp(ParameterTable& table) {
 
 ParameterTable boundary_parameters() {
   ParameterTable table;
-  table.string("set",
-               "The points whose motion is prescribed; with `face` those whose side it is, default: all. Needed without `face`.");
+  table.string("set", "The points whose motion is prescribed; with `face` those whose side it is, default: all. Needed without `face`.");
   table.choice("face", faces(), "Prescribe the motion of this side of the set instead of that of its points.");
-  table.number(
-      "at", "m",
-      "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
+  table.number("at", "m", "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
   table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
   table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
   add_ramp(table);
@@ -170,16 +165,14 @@ ParameterTable boundary_parameters() {
 ParameterTable symmetry_parameters() {
   ParameterTable table;
   table.choice("axis", {"x", "y", "z"}, "Normal of the plane, of which the body is one half.").require();
-  table.number("at", "m",
-               "Where the plane lies; without it half a spacing below the lowest points. Needed where points come from a file.");
+  table.number("at", "m", "Where the plane lies; without it half a spacing below the lowest points. Needed where points come from a file.");
   return table;
 }
 
 ParameterTable periodic_parameters() {
   ParameterTable table;
   table.choice("axis", {"x", "y", "z"}, "Along which the body continues with itself.").require();
-  table.number("lower", "m",
-               "Where the body begins; without it half a spacing below the lowest points. Needed where points come from a file.");
+  table.number("lower", "m", "Where the body begins; without it half a spacing below the lowest points. Needed where points come from a file.");
   table.number("upper", "m", "Where it ends and begins again, likewise.");
   return table;
 }
@@ -226,44 +219,25 @@ ParameterTable history_parameters() {
   table.choice("quantity", point_field_names(), "A point field.").require();
   table.string("component", "Component of a vector (x) or tensor (xy).");
   table
-      .choice(
-          "reduce", {"mean", "sum", "min", "max", "fit", "error"},
-          "How the values of the set become one. fit: an affine function fitted to them, taken at the place `at`; error: their "
-          "root-mean-square distance from `exact`, relative to that of `exact` from 0, weighted by volume.")
+      .choice("reduce", {"mean", "sum", "min", "max", "fit", "error"},
+              "How the values of the set become one. fit: an affine function fitted to them, taken at the place `at`; error: their "
+              "root-mean-square distance from `exact`, relative to that of `exact` from 0, weighted by volume.")
       .by_default("\"mean\"");
-  table.add(ParameterType::numbers, "at", "m", "With reduce = \"fit\": a place, which need not be a point of the body.")
-      .one_per_axis();
-  table.add(ParameterType::expression, "exact", "-", "With reduce = \"error\": what the quantity should be, in its own unit.")
-      .with_time();
+  table.add(ParameterType::numbers, "at", "m", "With reduce = \"fit\": a place, which need not be a point of the body.").one_per_axis();
+  table.add(ParameterType::expression, "exact", "-", "With reduce = \"error\": what the quantity should be, in its own unit.").with_time();
   return table;
 }
 
 ParameterTable run_parameters() {
   ParameterTable table;
-  table
-      .boolean("skip",
-               "Leave out work whose result is known: checks of bonds that cannot have failed, parts of the body that no wave "
-               "has reached. "
-               "false only to compare: the result is the same, bit for bit.")
-      .by_default("true");
-  table
-      .boolean(
-          "share",
-          "Compute what is equal once: bonds for both of their ends, stencils for equal families. false only to compare: the "
-          "result is the same to rounding.")
-      .by_default("true");
+  table.boolean("skip", "Leave out work whose result is known: checks of bonds that cannot have failed, parts of the body that no wave has reached. "
+                        "false only to compare: the result is the same, bit for bit.").by_default("true");
+  table.boolean("share", "Compute what is equal once: bonds for both of their ends, stencils for equal families. false only to compare: the "
+                         "result is the same to rounding.").by_default("true");
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
-  table
-      .number("weak_springs", "-",
-              "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, "
-              "where they are. "
-              "Without it such a piece is refused.")
-      .positive()
-      .at_most(1.0);
-  table
-      .integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.")
-      .at_least(0)
-      .by_default("1");
+  table.number("weak_springs", "-", "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, where they are. "
+                                    "Without it such a piece is refused.").positive().at_most(1.0);
+  table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;
 }
 
@@ -272,10 +246,7 @@ ParameterTable common_part_parameters(Kind kind) {
   if (kind == Kind::kinematics) table.part("stabilization", Kind::stabilization, "Against zero-energy modes.");
   if (kind == Kind::damage) {
     table.add(ParameterType::texts, "no_fail", "-", "Sets of points whose bonds never fail.").by_default("[]");
-    table
-        .boolean("gradual",
-                 "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.")
-        .by_default("false");
+    table.boolean("gradual", "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.").by_default("false");
   }
   return table;
 }

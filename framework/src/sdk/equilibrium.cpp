@@ -13,12 +13,8 @@
 namespace perikit {
 
 Equilibrium::Equilibrium(Problem& problem, double tolerance)
-    : problem_(problem),
-      tolerance_(tolerance),
-      u_(problem.make_field()),
-      scratch_(problem.make_field()),
-      free_(problem.constraints().free()),
-      external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
+    : problem_(problem), tolerance_(tolerance), u_(problem.make_field()), scratch_(problem.make_field()),
+      free_(problem.constraints().free()), external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
 
 void Equilibrium::begin(double t, ConstFieldView u) {
   t_ = t;
@@ -63,7 +59,7 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   double squares = external_.data ? dot(external_, external_) : 0.0, reactions = 0;
   for (const std::int64_t dof : problem_.constraints().dofs()) {
     const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
-    reactions += reaction * reaction - outer * outer;  // loads on prescribed components go into the reactions
+    reactions += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
   }
   squares += communicator().sum(reactions);
   mask(free_, r);
@@ -99,12 +95,10 @@ void Equilibrium::note(std::string_view line) {
   if (now - logged_ < std::chrono::seconds(5)) return;
   logged_ = now;
   std::string lines = take_notes();
-  lines.pop_back();  // a log has line ends of its own
+  lines.pop_back();   // a log has line ends of its own
   observer_->log(lines);
 }
 
-std::string Equilibrium::take_notes() {
-  return std::exchange(notes_, {});
-}
+std::string Equilibrium::take_notes() { return std::exchange(notes_, {}); }
 
 }  // namespace perikit

@@ -11,18 +11,9 @@ namespace perikit {
 
 ParameterTable load_step_parameters(std::int64_t max_iterations) {
   ParameterTable table;
-  table.integer("steps", "Planned steps of the load parameter from 0 to 1; cut back where a step fails.")
-      .by_default("10")
-      .at_least(1)
-      .at_most(1e6);
-  table.number("tolerance", "-", "Out-of-balance force over the norm of reactions and loads.")
-      .by_default("1.0e-8")
-      .positive()
-      .below(1.0);
-  table.integer("max_iterations", "Iterations of a step before it is cut back.")
-      .by_default(fmt::to_string(max_iterations))
-      .at_least(1)
-      .at_most(1e9);
+  table.integer("steps", "Planned steps of the load parameter from 0 to 1; cut back where a step fails.").by_default("10").at_least(1).at_most(1e6);
+  table.number("tolerance", "-", "Out-of-balance force over the norm of reactions and loads.").by_default("1.0e-8").positive().below(1.0);
+  table.integer("max_iterations", "Iterations of a step before it is cut back.").by_default(fmt::to_string(max_iterations)).at_least(1).at_most(1e9);
   table.integer("cut_backs", "Halvings of a planned step before the run gives up.").by_default("10").at_least(0).at_most(30);
   table
       .integer(
@@ -86,8 +77,8 @@ class LoadSteps {
   // The position counts planned steps and is a binary fraction between them: sums of it are exact.
   double& started() noexcept { return numbers_[0]; }
   double& position() noexcept { return numbers_[1]; }
-  double& increment() noexcept { return numbers_[2]; }          ///< of the position, for the next step
-  double& last_span() noexcept { return numbers_[3]; }          ///< length of the last step; 0: none to continue
+  double& increment() noexcept { return numbers_[2]; }        ///< of the position, for the next step
+  double& last_span() noexcept { return numbers_[3]; }        ///< length of the last step; 0: none to continue
   double& largest_reference() noexcept { return numbers_[4]; }  ///< of the equilibria so far [N]
   double planned() const noexcept { return static_cast<double>(options_.steps); }
 
@@ -124,8 +115,7 @@ class LoadSteps {
     position() *= ratio;
     last_span() *= ratio;
     increment() = std::min(1.0, std::exp2(std::floor(std::log2(increment() * ratio))));
-    observer_.log(
-        fmt::format("{}: goes on at load parameter {:.9g} with {} load steps", integrator_, state_.time, options_.steps));
+    observer_.log(fmt::format("{}: goes on at load parameter {:.9g} with {} load steps", integrator_, state_.time, options_.steps));
   }
 
   /// False where the run is to end within the step.
@@ -147,14 +137,12 @@ class LoadSteps {
       if (equilibrium_.stopped()) return false;
       const double t = (position() + span) / planned();
       equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
-      observer_.log(equilibrium_.take_notes());  // a step that fails may take long to do so
+      observer_.log(equilibrium_.take_notes());   // a step that fails may take long to do so
       if (span / 2 < smallest) {
-        throw RunError(
-            fmt::format("{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, "
-                        "failed because {}. More steps or cut_backs may "
-                        "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and "
-                        "the path is not followed",
-                        integrator_, state_.time, state_.step, span / planned(), solution.failure));
+        throw RunError(fmt::format(
+            "{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, failed because {}. More steps or cut_backs may "
+            "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed",
+            integrator_, state_.time, state_.step, span / planned(), solution.failure));
       }
       span /= 2;
       increment() = span;
@@ -180,8 +168,7 @@ class LoadSteps {
     if (!solution.converged) solution.failure = equilibrium_.failure();
     if (solution.converged && !equilibrium_.converged()) {
       solution.converged = false;
-      solution.failure =
-          fmt::format("the residual stays at {:.3g} (tolerance {:.3g})", equilibrium_.relative_residual(), options_.tolerance);
+      solution.failure = fmt::format("the residual stays at {:.3g} (tolerance {:.3g})", equilibrium_.relative_residual(), options_.tolerance);
     }
     return solution;
   }
@@ -270,10 +257,8 @@ class LoadSteps {
 
   /// What moves the body from outside: the loads, and on prescribed components load and reaction, -internal force [N].
   void find_driving_force(FieldView force) {
-    if (problem_.loads().any())
-      copy(state_.external_force(), force);
-    else
-      fill(0.0, force);
+    if (problem_.loads().any()) copy(state_.external_force(), force);
+    else fill(0.0, force);
     const FieldView internal = state_.internal_force();
     for (const std::int64_t dof : problem_.constraints().dofs()) force.data[dof] = -internal.data[dof];
   }
@@ -308,8 +293,7 @@ class LoadSteps {
 
 }  // namespace
 
-void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer,
-                    EquilibriumSolver& solver) {
+void run_load_steps(std::string_view integrator, const LoadStepOptions& options, Problem& problem, Observer& observer, EquilibriumSolver& solver) {
   LoadSteps(integrator, options, problem, observer, solver).run();
 }
 

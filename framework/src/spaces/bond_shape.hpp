@@ -1,7 +1,6 @@
 #pragma once
-/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points. The formula
-/// stands in bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes
-/// around them.
+/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points. The formula stands in
+/// bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes around them.
 
 #include <cstdint>
 
@@ -20,10 +19,8 @@ struct BondVectors {
 
 template <bool per_slot>
 inline Pack bond_value(const double* x, int lane) noexcept {
-  if constexpr (per_slot)
-    return Pack(x[lane / static_cast<int>(padding)]);
-  else
-    return Pack::load(x + lane);
+  if constexpr (per_slot) return Pack(x[lane / static_cast<int>(padding)]);
+  else return Pack::load(x + lane);
 }
 
 /// Row c of H_b, H_ce = A_ce + (du_c - A_ck xi_k) g_e, for numbers or packs.
@@ -116,10 +113,8 @@ inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
 
 /// to[lanes of mask] += value; other cells are not touched.
 inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
-  if (mask == pack_mask(0xff, 0))
-    (Pack::load(to) + value).store(to);
-  else
-    subtract_at(to, mask, -value);
+  if (mask == pack_mask(0xff, 0)) (Pack::load(to) + value).store(to);
+  else subtract_at(to, mask, -value);
 }
 
 /// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the
@@ -154,15 +149,11 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
           PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) add(stress.component(c) + far, other * S[c]);
         }
       };
-      if (mask == pack_mask(0xff, 0))
-        scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
-      else
-        scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
+      if (mask == pack_mask(0xff, 0)) scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
+      else scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
     }
-    PERIKIT_UNROLL for (int c = 0; c < D; ++c)(Pack::load(force.component(c) + p + l) + own_t[c])
-        .store(force.component(c) + p + l);
-    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c)(Pack::load(stress.component(c) + p + l) + own_S[c])
-        .store(stress.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
+    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
   }
 }
 

@@ -69,8 +69,8 @@ void CloudBonds<D>::shift_gradients(ConstFieldView lambda) {
 
 /// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
 template <int D>
-void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H,
-                           double* du, double* A) const noexcept {
+void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
+                           double* A) const noexcept {
   for (int l = 0; l < n; ++l) {
     const auto j = static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(begin + l)]);
     const Row d = u[j] - u[p];
@@ -126,8 +126,7 @@ void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, B
   }
   for (int c = 0; c < volume_components; ++c) {
     std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
-    for (int l = 0; l < lanes && both_ends; ++l)
-      s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
+    for (int l = 0; l < lanes && both_ends; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
   }
 }
 
@@ -145,15 +144,8 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     gather(p, begin, n, u_, gradient_, s.du, s.A);
     if (tangent) gather(p, begin, n, w_, direction_, s.dw, s.dA);
     if (selective_) volumes_of_bonds(p, lanes, both_ends, s);
-    const FamilyView view{D,
-                          n,
-                          families_.body().horizon(),
-                          {xi, xi + batch_points, xi + 2 * batch_points},
-                          s.bond[2],
-                          s.bond[2] + 2 * batch_points,
-                          s.bond[2] + batch_points,
-                          families_.inverse_shape(p),
-                          0};
+    const FamilyView view{D, n, families_.body().horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, s.bond[2], s.bond[2] + 2 * batch_points,
+                          s.bond[2] + batch_points, families_.inverse_shape(p), 0};
     formulation_.bond->correction(view, g, batch_points);
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
     bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
@@ -204,9 +196,7 @@ template <int D>
 static OwnerGradients gather_gradients(const AlignedVector<Row>& rows, std::size_t first, std::size_t n, double* H) noexcept {
   for (int c = 0; c < D; ++c)
     for (int e = 0; e < D; ++e)
-      for (std::size_t l = 0; l < padding; ++l)
-        H[static_cast<std::size_t>(c * D + e) * padding + l] =
-            l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
+      for (std::size_t l = 0; l < padding; ++l) H[static_cast<std::size_t>(c * D + e) * padding + l] = l < n ? rows[D * (first + l) + static_cast<std::size_t>(e)][c] : 0.0;
   return {static_cast<int>(padding), padding, H, nullptr};
 }
 
@@ -220,8 +210,7 @@ void CloudBonds<D>::volumes(std::size_t b, bool tangent) noexcept {
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
     owner_volume(laws_.space(), owners, volume, padding);
     for (std::size_t l = 0; l < n; ++l)
-      for (const int c : {volume_jacobian, volume_root, volume_rate})
-        volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
+      for (const int c : {volume_jacobian, volume_root, volume_rate}) volume_[first + l][c] = volume[static_cast<std::size_t>(c) * padding + l];
   }
 }
 
@@ -239,8 +228,7 @@ void CloudBonds<D>::pressures(std::size_t b, bool tangent) noexcept {
     add_owner_stress(laws_.space(), owners, pressure[0], pressure[1], stress, padding);
     for (std::size_t l = 0; l < n; ++l)
       for (int c = 0; c < D; ++c)
-        for (int e = 0; e < D; ++e)
-          flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
+        for (int e = 0; e < D; ++e) flux_[D * (first + l) + static_cast<std::size_t>(e)][c] += stress[static_cast<std::size_t>(c * D + e) * padding + l];
   }
 }
 
@@ -263,8 +251,7 @@ void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
   double energy = 0;
   for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
-    if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0)
-      return pass.report(static_cast<std::int64_t>(p));
+    if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0) return pass.report(static_cast<std::int64_t>(p));
   }
   if (pass.energies) pass.energies[b] = energy;
 }
@@ -305,10 +292,8 @@ void CloudBonds<D>::run(Pass& pass) {
       gradient_of_.times_transposed(p, &flux_[D * p], &flux_[D * p]);
     });
   };
-  if (gradient_of_.stored())
-    colouring_.for_each(stress_on_points);
-  else
-    parallel_for(blocks(), stress_on_points);
+  if (gradient_of_.stored()) colouring_.for_each(stress_on_points);
+  else parallel_for(blocks(), stress_on_points);
   if (pass.bad >= 0) return;
   parallel_for(blocks(), [&](std::size_t b) {
     if (pass.nearby && !near(b, 2)) return;

@@ -28,8 +28,7 @@ class CloudBonds final : public EvaluationSpace {
   void bonds(std::size_t b, Pass& pass);
   int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy);
   void read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
-  void gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
-              double* A) const noexcept;
+  void gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du, double* A) const noexcept;
   void scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   void number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
   void number_bonds();
@@ -37,7 +36,9 @@ class CloudBonds final : public EvaluationSpace {
   void volumes(std::size_t b, bool tangent) noexcept;
   void pressures(std::size_t b, bool tangent) noexcept;
   void volumes_of_bonds(std::size_t p, int lanes, bool both_ends, BatchScratch& s) const noexcept;
-  double share_of_volume(std::size_t p) const noexcept { return std::isfinite(families_.condition(p)) ? families_.left(p) : 0.0; }
+  double share_of_volume(std::size_t p) const noexcept {
+    return std::isfinite(families_.condition(p)) ? families_.left(p) : 0.0;
+  }
   template <class Visit>
   void over_points(std::size_t b, Visit&& visit) const {
     for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) visit(p);
@@ -53,10 +54,10 @@ class CloudBonds final : public EvaluationSpace {
   bool pairs_;       ///< each bond evaluated once for both ends
   bool two_states_;  ///< and yet with a history of its own for each
   std::size_t points_;
-  const Row* position_;  ///< {x, y, z, V}
+  const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_of_;
-  std::vector<std::int64_t> upper_;   ///< first neighbour with a larger index
-  std::vector<std::int64_t> number_;  ///< of the first bond that a point evaluates, where laws have a history
+  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
+  std::vector<std::int64_t> number_;           ///< of the first bond that a point evaluates, where laws have a history
   std::size_t one_end_ = 0;
   AlignedVector<double> scale_;       ///< V_i / N_i
   const double* factor_ = nullptr;    ///< w_ij / W_ij; null: 1

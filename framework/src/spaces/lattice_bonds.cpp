@@ -14,9 +14,7 @@ constexpr int slots_at_once = batch_points / chunk_points;
 /// Length of the run of adjacent chunks that starts at c, at most `most`.
 int run_length(const std::vector<LatticeChunk>& chunks, std::size_t c, std::size_t end, int most) noexcept {
   int n = 1;
-  while (n < most && c + static_cast<std::size_t>(n) < end &&
-         chunks[c + static_cast<std::size_t>(n)].first == chunks[c].first + n * chunk_points)
-    ++n;
+  while (n < most && c + static_cast<std::size_t>(n) < end && chunks[c + static_cast<std::size_t>(n)].first == chunks[c].first + n * chunk_points) ++n;
   return n;
 }
 
@@ -41,8 +39,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
   flux_ = body.make_field(D * D);
   gradient_ = body.make_field(D * D);
   scale_ = body.make_field(1);
-  for (const LatticeChunk& chunk : tiles_.chunks)
-    std::copy_n(families_.pattern(chunk).scale_of(formulation_.weight), chunk_points, scale_.data() + chunk.first);
+  for (const LatticeChunk& chunk : tiles_.chunks) std::copy_n(families_.pattern(chunk).scale_of(formulation_.weight), chunk_points, scale_.data() + chunk.first);
   set_whole_vectors();
   if (!formulation_.g_from_xi_only) store_corrections();
   if (!selective_) return;
@@ -93,8 +90,7 @@ void LatticeBonds<D>::gradients(std::size_t b, Pass& pass) {
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end && selective_; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
-    if (pass.gradient_wanted(chunk.first))
-      owner_volume(laws_.space(), owner_gradients(chunk, tangent), volume_.data() + chunk.first, volume_.stride());
+    if (pass.gradient_wanted(chunk.first)) owner_volume(laws_.space(), owner_gradients(chunk, tangent), volume_.data() + chunk.first, volume_.stride());
   }
 }
 
@@ -108,13 +104,11 @@ template <int D>
 void LatticeBonds<D>::point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept {
   s.owner_volumes = {volume_.data(), volume_.stride(), s.volume_group, !families_.any_weak()};
   std::fill_n(s.volume_group, slots, chunk.first);
-  for (int k = 0; k < slots && pairs_; ++k)
-    s.volume_group[slots + k] = chunk.first + families_.slots.shifts[slot + static_cast<std::size_t>(k)];
+  for (int k = 0; k < slots && pairs_; ++k) s.volume_group[slots + k] = chunk.first + families_.slots.shifts[slot + static_cast<std::size_t>(k)];
 }
 
 template <int D>
-void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends,
-                                    bool tangent) noexcept {
+void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
   const LatticePattern& pattern = families_.pattern(chunk);
   for (int c = 0; c < (tangent ? 2 : 1); ++c) {
     const double* from = c == 0 ? s.pressure : s.pressure_rate;
@@ -125,20 +119,17 @@ void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
       own.store(to + l);
       for (int k = 0; k < slots && both_ends; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
-        add_to_cells(to + families_.slots.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l),
-                     pack_mask(pattern.mask[at], l));
+        add_to_cells(to + families_.slots.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pack_mask(pattern.mask[at], l));
       }
     }
   }
 }
 
-/// Stable numbers: of bonds that are evaluated once, those of their slot in the first half. whole: this batch has the slots that
-/// are numbered, one after the other.
+/// Stable numbers: of bonds that are evaluated once, those of their slot in the first half. whole: this batch has the slots that are
+/// numbered, one after the other.
 template <int D>
 void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept {
-  const auto of = [&](std::size_t chunk, std::size_t at) {
-    return static_cast<std::int64_t>((chunk * slots_each() + at) * chunk_points);
-  };
+  const auto of = [&](std::size_t chunk, std::size_t at) { return static_cast<std::int64_t>((chunk * slots_each() + at) * chunk_points); };
   s.far_number = static_cast<std::int64_t>(two_states_ ? one_end() : 0);
   s.first_number = whole ? of(index, slot) : -1;
   const LatticePattern& pattern = families_.pattern(tiles_.chunks[index]);
@@ -151,10 +142,8 @@ void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, boo
       s.number[lane] = -1;
     } else {
       const std::int64_t far = tiles_.chunks[index].first + l + families_.slots.shifts[at];
-      const bool same = !two_states_ || (!selective_ && laws_.same(static_cast<std::size_t>(tiles_.chunks[index].first + l),
-                                                                   static_cast<std::size_t>(far)));
-      s.number[lane] = of(static_cast<std::size_t>(tiles_.chunk_of(far)), families_.slots.reverse(at)) + far % chunk_points +
-                       (same ? 0 : s.far_number);
+      const bool same = !two_states_ || (!selective_ && laws_.same(static_cast<std::size_t>(tiles_.chunks[index].first + l), static_cast<std::size_t>(far)));
+      s.number[lane] = of(static_cast<std::size_t>(tiles_.chunk_of(far)), families_.slots.reverse(at)) + far % chunk_points + (same ? 0 : s.far_number);
     }
   }
 }
@@ -252,8 +241,8 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
     const LatticeChunk& chunk = tiles_.chunks[c];
     double* const stress = flux_.data() + chunk.first;
     if (selective_) {
-      add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first,
-                       pressure_.component(1) + chunk.first, stress, flux_.stride());
+      add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
+                       stress, flux_.stride());
     }
     if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, chunk.first, pass.out);
   }
@@ -265,11 +254,9 @@ void LatticeBonds<D>::divergence(Pass& pass, int number) const {
   tiles_.colouring.for_each([&](std::size_t b) {
     if (pass.nearby ? !near(b, 2) : !quiet_.awake(b, number)) return;
     const LatticeBlock& block = tiles_.blocks[b];
-    for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c)
-      stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
     if (stencils_) return;
-    for (std::size_t r = block.row_begin; r < block.row_end; ++r)
-      operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
+    for (std::size_t r = block.row_begin; r < block.row_end; ++r) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
     for (std::size_t c = block.chunk_begin; c < block.chunk_end && families_.any_broken(); ++c)
       operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, pass.out);
   });
@@ -304,9 +291,8 @@ void LatticeBonds<D>::run(Pass& pass) {
 template <int D>
 void LatticeBonds<D>::report(ModelReport& report) const {
   report.fallbacks += stencils_ ? stencils_->fallbacks() : 0;
-  report.bytes += (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() +
-                  volume_.bytes() + pressure_.bytes() + scratch_.bytes() +
-                  (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
+  report.bytes += (stencils_ ? stencils_->bytes() : 0) + flux_.bytes() + gradient_.bytes() + direction_.bytes() + scale_.bytes() + volume_.bytes() +
+                  pressure_.bytes() + scratch_.bytes() + (pattern_g_.size() + 1) * lane_xi_.size() * sizeof(double);
   report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
   if (pairs_) report.skips.push_back(second_evaluation(families_.bonds()));
 }

@@ -4,9 +4,9 @@
 
 #include "families/lattice_families.hpp"
 #include "spaces/bond_shape.hpp"
-#include "spaces/evaluation_space.hpp"
 #include "spaces/lattice_gradient.hpp"
 #include "spaces/lattice_stencils.hpp"
+#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
 
@@ -36,8 +36,7 @@ class LatticeBonds final : public EvaluationSpace {
   void finish_stress(std::size_t b, Pass& pass);
   // Selective map.
   void point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept;
-  void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends,
-                     bool tangent) noexcept;
+  void add_pressures(const LatticeChunk& chunk, std::size_t slot, int slots, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   OwnerGradients owner_gradients(const LatticeChunk& chunk, bool tangent) const noexcept;
   double share_of_volume(std::size_t p) const noexcept;
 
@@ -60,9 +59,8 @@ class LatticeBonds final : public EvaluationSpace {
   Field volume_, pressure_;                     ///< selective: volume changes of points; pressures (and their rates) on them
   int slots_at_once_;                           ///< of a bond batch
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
-  std::vector<AlignedVector<double>>
-      pattern_g_;                  ///< corrections by pattern of the set-up: [slot group][component][lane]; empty: computed
-  AlignedVector<double> lane_xi_;  ///< bond vectors, likewise
+  std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern of the set-up: [slot group][component][lane]; empty: computed
+  AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise
   ScratchPool scratch_;
 };
 

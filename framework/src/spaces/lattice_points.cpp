@@ -11,9 +11,7 @@ namespace {
 constexpr int chunks_at_once = batch_points / chunk_points;
 
 /// Rows of a block that are taken together: whole batches for the law where rows are short.
-std::size_t rows_at_once(const LatticeRow& row) noexcept {
-  return static_cast<std::size_t>(std::max(1, chunks_at_once / row.chunks));
-}
+std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<std::size_t>(std::max(1, chunks_at_once / row.chunks)); }
 
 }  // namespace
 
@@ -41,8 +39,7 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
   }
   if (pass.work.history()) {
     s.first_number = index[n - 1] - index[0] == n - 1 ? std::int64_t{index[0]} * chunk_points : -1;
-    for (int l = 0; l < n * chunk_points; ++l)
-      s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
+    for (int l = 0; l < n * chunk_points; ++l) s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
   }
   const int bad = pass.work.evaluate(n * chunk_points, s, false, energy);
   if (bad >= 0) pass.report(chunk(index[bad / chunk_points]).first + bad % chunk_points);
@@ -84,13 +81,12 @@ std::int64_t LatticePoints<D>::width(const LatticeRow& row) const noexcept {
   return std::int64_t(row.chunks) * chunk_points + 2 * gap_;
 }
 
-/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows,
-/// and then the one after their last.
+/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows, and then the
+/// one after their last.
 template <int D>
 void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
   const auto zero = [&](std::int64_t from, std::int64_t to) {
-    for (int c = 0; c < D * D && to > from; ++c)
-      std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
+    for (int c = 0; c < D * D && to > from; ++c) std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
   };
   r.index.clear();
   r.at.clear();
@@ -140,8 +136,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   double energy = 0, of_others = 0;
   std::size_t next = block.chunk_begin;
   for (std::size_t first = block.row_begin; first < block.row_end;) {
-    const std::span rows =
-        std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
+    const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
     place(rows, next, block.chunk_end, r);
     for (std::size_t i = 0; i < r.index.size();) {
       const bool own = i < r.own;
@@ -151,16 +146,14 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
       s.keep_history = own;
       if (!evaluate(&r.index[i], n, s, pass, own ? &energy : &of_others)) return;
       for (int k = 0; k < n; ++k, ++i)
-        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i],
-                                 own ? pass.out : FieldView{});
+        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i], own ? pass.out : FieldView{});
     }
     std::int64_t start = gap_;
     for (const LatticeRow& row : rows) {
       operator_.divergence(row, r.flux, start, pass.out);
       start += width(row);
     }
-    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i)
-      operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
+    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
     first += rows.size();
   }
   s.keep_history = true;

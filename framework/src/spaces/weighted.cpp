@@ -8,8 +8,7 @@
 namespace perikit {
 
 template <int D>
-void Weighted<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, const Memory& m,
-                                   AlignedVector<double>& out) const {
+void Weighted<D>::load_differences(std::int32_t point, const AlignedVector<Row>& rows, const Memory& m, AlignedVector<double>& out) const {
   const std::size_t size = m.family.size, bonds = m.family.far.size();
   out.resize(D * size);
   for (std::size_t c = 0; c < D; ++c) std::fill_n(out.data() + c * size + bonds, size - bonds, 0.0);
@@ -35,11 +34,9 @@ void Weighted<D>::keep_owner_gradients(int points, double share, Memory& m, Batc
   for (auto& pressure : m.pressure) std::fill_n(pressure, 8, 0.0);
   owner_volume(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, s.volume, batch_points);
   s.volume[volume_share * batch_points] = share;
-  for (int c = 0; c < volume_components && points == 1; ++c)
-    std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
+  for (int c = 0; c < volume_components && points == 1; ++c) std::fill_n(s.volume + c * batch_points, 8, s.volume[c * batch_points]);
   std::fill(std::begin(s.volume_group), std::end(s.volume_group), 0);
-  s.owner_volumes = {s.volume, batch_points, s.volume_group,
-                     share == 1};  // an owner without a gradient has none at its evaluation points either
+  s.owner_volumes = {s.volume, batch_points, s.volume_group, share == 1};   // an owner without a gradient has none at its evaluation points either
 }
 
 template <int D>
@@ -61,8 +58,7 @@ void Weighted<D>::add_pressures(int lanes, int wide, const BatchScratch& s, bool
 template <int D>
 void Weighted<D>::owner_stresses(const Memory& m, bool tangent, BatchScratch& s) const noexcept {
   for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points, 8, 0.0);
-  add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, m.pressure[0], m.pressure[1], s.P,
-                   batch_points);
+  add_owner_stress(laws_.space(), {8, 8, m.owner_H, tangent ? m.owner_dH : nullptr}, m.pressure[0], m.pressure[1], s.P, batch_points);
 }
 
 template <int D>
@@ -114,8 +110,7 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
 }
 
 template <int D>
-std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass,
-                                          double* energy) {
+std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, double* energy) {
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
   const std::size_t size = m.family.size;
   load_differences(p, u_rows_, m, m.u);

@@ -1,10 +1,10 @@
 /// Which points a weighted space takes together, and the stencils that it stores for them.
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <map>
 #include <numeric>
+
+#include <fmt/format.h>
 
 #include "spaces/weighted.hpp"
 
@@ -12,18 +12,10 @@ namespace perikit {
 
 template <int D>
 Weighted<D>::Weighted(const SpaceParts& parts)
-    : families_(parts.families),
-      lattice_(families_.lattice()),
-      cloud_(families_.cloud()),
-      body_(families_.body()),
-      formulation_(parts.formulation),
-      laws_(parts.laws),
-      rules_{&formulation_, body_.horizon()},
-      selective_(formulation_.selective()),
+    : families_(parts.families), lattice_(families_.lattice()), cloud_(families_.cloud()), body_(families_.body()), formulation_(parts.formulation),
+      laws_(parts.laws), rules_{&formulation_, body_.horizon()}, selective_(formulation_.selective()),
       // Local force states have no common adjoint: every point makes its own stencil.
-      share_(parts.share && formulation_.force_state == ForceState::variational),
-      owners_(selective_ ? 1 : 0),
-      parts_(formulation_.parts(D)) {
+      share_(parts.share && formulation_.force_state == ForceState::variational), owners_(selective_ ? 1 : 0), parts_(formulation_.parts(D)) {
   lattice_ ? prepare_lattice() : prepare_cloud();
   const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), body_.points(), cloud_block);
   quiet_ = parts.quiet_blocks(reach);
@@ -55,8 +47,7 @@ std::vector<std::int32_t> Weighted<D>::store_stencils() {
   std::vector<std::int32_t> stencil_of(classes_.size(), -1);
   std::vector<std::size_t> order(classes_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return classes_[a].members > classes_[b].members; });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return classes_[a].members > classes_[b].members; });
   std::size_t bytes = 0;
   Memory m;
   for (const std::size_t k : order) {
@@ -77,8 +68,7 @@ template <int D>
 void Weighted<D>::group_points(std::span<const std::int32_t> points, std::int32_t family, std::int32_t stencil) {
   if (classes_[static_cast<std::size_t>(family)].slots.empty()) return;
   const auto add = [&](std::span<const std::int32_t> group, bool contiguous) {
-    groups_.push_back(
-        {static_cast<std::uint32_t>(members_.size()), family, stencil, static_cast<std::uint8_t>(group.size()), contiguous});
+    groups_.push_back({static_cast<std::uint32_t>(members_.size()), family, stencil, static_cast<std::uint8_t>(group.size()), contiguous});
     members_.insert(members_.end(), group.begin(), group.end());
     if (stencil >= 0) members_.insert(members_.end(), 8 - group.size(), group[0]);
   };
@@ -99,10 +89,8 @@ void Weighted<D>::group_points(std::span<const std::int32_t> points, std::int32_
   }
   for (std::size_t i = 0; i < rest.size(); i += 8) {
     const std::span<const std::int32_t> some = std::span(rest).subspan(i, std::min<std::size_t>(8, rest.size() - i));
-    if (parts_ == 0 && some.size() < fewest_together)
-      add_singly(some);
-    else
-      add(some, false);
+    if (parts_ == 0 && some.size() < fewest_together) add_singly(some);
+    else add(some, false);
   }
 }
 
@@ -154,8 +142,7 @@ void Weighted<D>::place_points() {
   for (std::size_t b = 0; b < blocks(); ++b)
     for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g)
       for (std::uint8_t l = 0; l < groups_[g].count; ++l)
-        place_[static_cast<std::size_t>(members_[groups_[g].first + l])] = {static_cast<std::uint32_t>(b),
-                                                                            static_cast<std::uint32_t>(g), l, false};
+        place_[static_cast<std::size_t>(members_[groups_[g].first + l])] = {static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(g), l, false};
 }
 
 template <int D>
@@ -169,10 +156,8 @@ void Weighted<D>::bonds_changed(std::span<const std::int32_t> points) {
     groups_[place.group].live ^= static_cast<std::uint8_t>(1u << place.lane);
     std::vector<std::int32_t>& left = left_[place.block];
     const auto entry = std::lower_bound(left.begin(), left.end(), p);
-    if (place.left)
-      left.insert(entry, p);
-    else
-      left.erase(entry);
+    if (place.left) left.insert(entry, p);
+    else left.erase(entry);
     singles_ = true;
   }
 }
@@ -182,8 +167,7 @@ void Weighted<D>::load_class(std::int32_t family, Memory& m) const {
   const FamilyClass& own = classes_[static_cast<std::size_t>(family)];
   lattice_->load(own.slots, m.family);
   m.share.assign(m.family.size, 0.0);
-  for (std::size_t k = 0; k < own.slots.size(); ++k)
-    m.share[k] = own.scale * (formulation_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
+  for (std::size_t k = 0; k < own.slots.size(); ++k) m.share[k] = own.scale * (formulation_.weight == BondWeight::kernel ? m.family.omega[k] : 1.0);
 }
 
 template <int D>
@@ -201,23 +185,21 @@ void Weighted<D>::report(ModelReport& report) const {
   for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
   for (const SparseStencils<D>& s : sparse_) report.bytes += s.bytes();
   for (const Group& group : groups_) together += group.stencil >= 0 ? group.count : 0;
-  report.bytes += stencils + groups_.size() * sizeof(Group) + number_.size() * sizeof(std::size_t) +
-                  members_.size() * sizeof(std::int32_t) + place_.size() * sizeof(Place) +
+  report.bytes += stencils + groups_.size() * sizeof(Group) + number_.size() * sizeof(std::size_t) + members_.size() * sizeof(std::int32_t) + place_.size() * sizeof(Place) +
                   (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + scratch_.bytes();
   if (stencils_.empty()) return;
   const auto slots = static_cast<double>(lattice_->slots.size());
   const double whole = 8.0 * D * slots * (parts_ > 0 ? parts_ : slots) * static_cast<double>(body_.points());
-  report.skips.push_back(
-      {"stencils of equal families",
-       fmt::format("{} stored for {} of {} points, by characters of their mirrors", stencils_.size(), together, body_.points()),
-       megabytes(static_cast<double>(stencils)) + " stored instead of " + megabytes(whole)});
+  report.skips.push_back({"stencils of equal families",
+                          fmt::format("{} stored for {} of {} points, by characters of their mirrors", stencils_.size(), together, body_.points()),
+                          megabytes(static_cast<double>(stencils)) + " stored instead of " + megabytes(whole)});
 }
 
-#define PERIKIT_INSTANTIATE(D)                                                 \
-  template Weighted<D>::Weighted(const SpaceParts&);                           \
-  template void Weighted<D>::bonds_changed(std::span<const std::int32_t>);     \
-  template void Weighted<D>::load_class(std::int32_t, Memory&) const;          \
-  template void Weighted<D>::load_family(std::size_t, BondsOf, Memory&) const; \
+#define PERIKIT_INSTANTIATE(D)                                                          \
+  template Weighted<D>::Weighted(const SpaceParts&);                                    \
+  template void Weighted<D>::bonds_changed(std::span<const std::int32_t>);              \
+  template void Weighted<D>::load_class(std::int32_t, Memory&) const;                   \
+  template void Weighted<D>::load_family(std::size_t, BondsOf, Memory&) const;          \
   template void Weighted<D>::report(ModelReport&) const;
 PERIKIT_INSTANTIATE(1)
 PERIKIT_INSTANTIATE(2)

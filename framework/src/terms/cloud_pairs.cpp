@@ -26,8 +26,7 @@ class CloudPairs final : public PairLoop {
   }
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
   std::size_t bytes() const noexcept override {
-    return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) +
-           (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
+    return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
   bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return cloud_marked(marks, b, points_); }
   std::int64_t run(const PairPass& pass) override;
@@ -39,10 +38,10 @@ class CloudPairs final : public PairLoop {
     alignas(64) double dw[3][batch_points];
     alignas(64) double length[batch_points];
     alignas(64) double omega[batch_points];
-    alignas(64) double q[batch_points];  ///< q_i + q_j
+    alignas(64) double q[batch_points];        ///< q_i + q_j
     alignas(64) double dq[batch_points];
-    alignas(64) double far_volume[batch_points];  ///< b V_j
-    alignas(64) double integrity[batch_points];   ///< b, where damage is on
+    alignas(64) double far_volume[batch_points];   ///< b V_j
+    alignas(64) double integrity[batch_points];    ///< b, where damage is on
     alignas(64) double t[3][batch_points];
   };
 
@@ -61,29 +60,21 @@ class CloudPairs final : public PairLoop {
   bool dilatation_;
   bool fails_ = false;
   std::size_t points_;
-  const Row* position_;              ///< {x, y, z, V}
-  std::vector<std::int64_t> upper_;  ///< first neighbour with a larger index
-  NearestFailure nearest_;           ///< only where damage is on
+  const Row* position_;                        ///< {x, y, z, V}
+  std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
+  NearestFailure nearest_;                     ///< only where damage is on
   Colouring colouring_;
-  AlignedVector<Row> u_, w_;   ///< {u, q} and {w, dq}
-  AlignedVector<Row> moduli_;  ///< {G_x, G_y, G_z, c}; empty where uniform
+  AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
+  AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
   AlignedVector<Row> force_;
 };
 
 template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
-    : PairLoop(parts),
-      families_(*parts.families.cloud()),
-      lists_(families_.lists()),
-      law_(*parts.formulation.pairs),
-      fields_(parts.fields),
-      dilatation_(parts.formulation.dilatation != nullptr),
-      points_(families_.body().points()),
-      position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
-      upper_(points_),
-      force_(points_) {
-  for (std::size_t p = 0; p < points_; ++p)
-    upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
+    : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
+      dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
+  for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(lists_, points_);
   colouring_ = Colouring(reach);
   if (parts.quiet) watch_waves(reach);
@@ -202,8 +193,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     for (int l = 0; l < n && energies; ++l) stored += s.energy[l] * g.far_volume[l];
     if constexpr (work == PairWork::energy) continue;
     for (int l = 0; l < n; l += pack_width) {
-      const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l),
-                 weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
+      const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
       Pack T = Pack::load(s.force + l);
       if (dilatation_) T += weight * Pack::load(g.q + l);
       if constexpr (work == PairWork::force) {
@@ -234,12 +224,9 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     excess.store(lanes);
     nearest_.excess[p] = *std::max_element(lanes, lanes + pack_width);
   }
-  if constexpr (sums)
-    pass.out.data[p] += own_sum;
-  else if constexpr (work == PairWork::energy)
-    pass.out.data[p] = 0.5 * stored;
-  else
-    force_[p] += own;
+  if constexpr (sums) pass.out.data[p] += own_sum;
+  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored;
+  else force_[p] += own;
   total += (half ? 1.0 : 0.5) * volume * stored;
   return finite;
 }
@@ -283,12 +270,9 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
       row[3] = fields_.modulus.data()[p];
       moduli_[p] = row;
     }
-    if (pass.work == PairWork::force && fails_)
-      nearest_.excess[p] = -std::numeric_limits<double>::max();  // at rest, until it is evaluated
-    if (vectors)
-      force_[p] = Row{};
-    else
-      pass.out.data[p] = 0;
+    if (pass.work == PairWork::force && fails_) nearest_.excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
+    if (vectors) force_[p] = Row{};
+    else pass.out.data[p] = 0;
   });
   each_block(pass, colouring_, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
   if (pass.work == PairWork::force && fails_ && bad() < 0) nearest_.u = &u_;

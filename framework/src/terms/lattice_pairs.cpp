@@ -20,12 +20,8 @@ template <int D>
 class LatticePairs final : public PairLoop {
  public:
   explicit LatticePairs(const PairLoopParts& parts)
-      : PairLoop(parts),
-        law_(*parts.formulation.pairs),
-        fields_(parts.fields),
-        dilatation_(parts.formulation.dilatation != nullptr),
-        families_(*parts.families.lattice()),
-        squared_volume_(families_.volume * families_.volume) {
+      : PairLoop(parts), law_(*parts.formulation.pairs), fields_(parts.fields), dilatation_(parts.formulation.dilatation != nullptr),
+        families_(*parts.families.lattice()), squared_volume_(families_.volume * families_.volume) {
     if (parts.quiet) watch_waves(families_.tiles.reach);
     for (std::size_t s = 0; s < families_.slots.size(); ++s) {
       const auto& xi = families_.slots.xi[s];
@@ -65,8 +61,7 @@ class LatticePairs final : public PairLoop {
       const LatticeChunk& chunk = families_.tiles.chunks[c];
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
-        for (int k = 0; k < pass.out.components; ++k)
-          std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
+        for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
       }
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane < 0) continue;
@@ -96,7 +91,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   constexpr int packs = chunk_points / pack_width, results = sums || work == PairWork::energy ? 1 : D;
   const LatticePattern& pattern = families_.pattern(chunk);
-  const bool weakened = !pattern.integrity.empty();  // some b lies between 0 and 1: it weighs all that its bond does
+  const bool weakened = !pattern.integrity.empty();   // some b lies between 0 and 1: it weighs all that its bond does
   const std::int64_t p = chunk.first;
   const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
   const bool screened = work == PairWork::force && pass.screen,
@@ -148,16 +143,13 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         const Stretch<D> bond(xi, length, du);
         finite[v] &= bond.e == bond.e;
         if constexpr (sums) {
-          Pack term =
-              Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           own[0][v] += term;
           if constexpr (half) {
             double* target = pass.out.data + far + l;
-            if (mask == 0xff)
-              (Pack::load(target) + term).store(target);
-            else
-              subtract_at(target, bits, -term);
+            if (mask == 0xff) (Pack::load(target) + term).store(target);
+            else subtract_at(target, bits, -term);
           }
         } else {
           bond.e.store(s.e + lane);
@@ -185,8 +177,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     if constexpr (!sums) {
       const int lanes = count * chunk_points;
       law_.bond_law({lanes, length_.data() + slot * chunk_points, omega_.data() + slot * chunk_points, s.e, s.modulus,
-                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force,
-                     work == PairWork::tangent ? s.stiffness : nullptr});
+                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
       for (int k = 0; k < count; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
         const std::int64_t far = p + families_.slots.shifts[at];
@@ -228,10 +219,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
             own[c][v] += t[c];
             if constexpr (half) {
               double* target = pass.out.component(c) + far + l;
-              if (mask == 0xff)
-                (Pack::load(target) - t[c]).store(target);
-              else
-                subtract_at(target, bits, t[c]);
+              if (mask == 0xff) (Pack::load(target) - t[c]).store(target);
+              else subtract_at(target, bits, t[c]);
             }
           }
         }
@@ -250,10 +239,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     if (!finite[l / pack_width][l % pack_width]) bad = l;
   for (int v = 0; v < packs; ++v) {
     const int l = v * pack_width;
-    if constexpr (work == PairWork::energy)
-      own[0][v] = Pack(0.5 * families_.volume) * stored[v];
-    else if (energies)
-      total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
+    if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * families_.volume) * stored[v];
+    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
     for (int c = 0; c < results; ++c) {
       double* target = pass.out.component(c) + p + l;
       (Pack::load(target) + own[c][v]).store(target);

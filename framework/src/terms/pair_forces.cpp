@@ -21,8 +21,7 @@ std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus,
   const std::size_t n = family.size;
   AlignedVector<double> omega(n, 0.0), rest(n, 0.0), moduli(n, modulus), stiffness(n, 0.0);
   for (std::size_t k = 0; k < family.far.size(); ++k) omega[k] = family.whole_omega(k);
-  law.bond_law(
-      {family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
+  law.bond_law({family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
   std::array<double, D> sum{};
   for (std::size_t k = 0; k < family.far.size(); ++k)
     for (std::size_t a = 0; a < D; ++a) {
@@ -72,12 +71,7 @@ FamilyArrays regular_family(const Families& families) {
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
-    : families_(parts.families),
-      body_(families_.body()),
-      laws_(parts.laws),
-      formulation_(parts.formulation),
-      law_(*formulation_.pairs),
-      share_(parts.share) {
+    : families_(parts.families), body_(families_.body()), laws_(parts.laws), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
   const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
   loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (formulation_.dilatation) {
@@ -122,7 +116,7 @@ void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::
       x.weighted_volume = m;
       x.intact = intact;
       moduli = law_.moduli(x);
-      if (x.bulk() > 0) warn(x, laws_.record_of(p));  // not of ghosts and images
+      if (x.bulk() > 0) warn(x, laws_.record_of(p));   // not of ghosts and images
     }
     // A point without bonds is a free mass: nothing to divide by, nothing stored.
     if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
@@ -232,7 +226,7 @@ void PairForces<D>::set_correction() {
         G.fill(1.0);
         if (!family.far.empty()) {
           PairPoint x = point(p);
-          if (!(x.bulk() > 0)) x.moduli = {1, 1};  // ghosts: the correction is one of shape
+          if (!(x.bulk() > 0)) x.moduli = {1, 1};   // ghosts: the correction is one of shape
           const auto own = stiffness(family, x), exact = stiffness(regular, x);
           for (std::size_t a = 0; a < D; ++a)
             if (own[a] > 0) G[a] = exact[a] / own[a];
@@ -244,8 +238,7 @@ void PairForces<D>::set_correction() {
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density,
-                                       const std::uint8_t* only) {
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -260,9 +253,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
-    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding,
-                             [](std::uint8_t m) { return m != 0; }))
-      return;
+    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding, [](std::uint8_t m) { return m != 0; })) return;
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
@@ -318,8 +309,7 @@ std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples)
     if (bad >= 0) return bad;
   }
   const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
-  for (std::size_t p = 0; p < body_.stride(); ++p)
-    samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
+  for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
   return bad;
 }
 
@@ -331,17 +321,13 @@ void PairForces<D>::report(ModelReport& report) const {
        {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
     report.bytes += field->bytes();
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
-  report.skips.push_back(
-      {"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
+  report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
-  if (share_ && fields_.modulus.size() == 0)
-    report.skips.push_back(
-        {"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
+  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
 }
 
 std::unique_ptr<Term> make_pair_forces(const PairParts& parts) {
-  return with_dimension(parts.families.body().dimension(),
-                        [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
+  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
 }
 
 }  // namespace perikit

@@ -42,10 +42,9 @@ class PairForces final : public Term {
   void warn(const PairPoint& point, const MaterialRecord& record);
   void set_correction();
   PairPoint point(std::size_t p) const;
-  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
-  /// density. only: groups of points to do, null for all.
-  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density,
-                          const std::uint8_t* only = nullptr);
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
+  /// only: groups of points to do, null for all.
+  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only = nullptr);
 
   const Families& families_;
   const Body& body_;
@@ -55,8 +54,8 @@ class PairForces final : public Term {
   bool share_;
   PairFields fields_;
   std::unique_ptr<PairLoop> loop_;
-  Field scale_;               ///< d/m_i; 0 without bonds
-  Field dilatation_modulus_;  ///< k_i
+  Field scale_;                  ///< d/m_i; 0 without bonds
+  Field dilatation_modulus_;     ///< k_i
   Field theta_, q_, rate_;
   Field by_theta_;  ///< phi/theta d/m, where bonds are screened
   BondScreen* screen_ = nullptr;

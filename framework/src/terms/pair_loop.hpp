@@ -7,8 +7,8 @@
 #include <memory>
 #include <type_traits>
 
-#include "families/blocks.hpp"
 #include "families/bond_monitor.hpp"
+#include "families/blocks.hpp"
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
@@ -26,7 +26,7 @@ enum class PairWork { dilatation, dilatation_rate, force, tangent, energy };
 struct PairPass {
   PairWork work;
   ConstFieldView u, w;
-  ConstFieldView q, dq;  ///< phi' d/m and its rate by point; empty without dilatation
+  ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
   double* energies = nullptr;          ///< by block
   const std::uint8_t* only = nullptr;  ///< by group of eight points: others are left alone (dilatation and energy)
@@ -38,17 +38,17 @@ struct PairPass {
 
 /// Point quantities that bonds need.
 struct PairFields {
-  Field modulus;  ///< c_i; empty where `uniform` holds
+  Field modulus;                  ///< c_i; empty where `uniform` holds
   double uniform = 0;
-  Field correction;  ///< by axis; empty without surface correction
+  Field correction;               ///< by axis; empty without surface correction
 };
 
 struct PairLoopParts {
   const Families& families;
   const Formulation& formulation;
   const PairFields& fields;
-  bool half;   ///< each bond once, for both ends
-  bool quiet;  ///< without the parts that no wave has reached
+  bool half;                      ///< each bond once, for both ends
+  bool quiet;                     ///< without the parts that no wave has reached
 };
 
 class PairLoop {
@@ -58,8 +58,7 @@ class PairLoop {
   /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
-  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of
-  /// zero or non-finite length, or -1.
+  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;
   virtual std::size_t bytes() const noexcept = 0;
   QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
@@ -88,22 +87,15 @@ class PairLoop {
       auto body = [&](std::size_t b) {
         if (pass.nearby ? holds(b, pass.nearby) : quiet_.awake(b, reach_)) block(constant, b);
       };
-      if (at_once(pass))
-        colouring.for_each(body);
-      else
-        parallel_for(blocks(), body);
+      if (at_once(pass)) colouring.for_each(body);
+      else parallel_for(blocks(), body);
     };
     switch (pass.work) {
-      case PairWork::dilatation:
-        return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
-      case PairWork::dilatation_rate:
-        return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
-      case PairWork::force:
-        return sweep(std::integral_constant<PairWork, PairWork::force>());
-      case PairWork::tangent:
-        return sweep(std::integral_constant<PairWork, PairWork::tangent>());
-      case PairWork::energy:
-        return sweep(std::integral_constant<PairWork, PairWork::energy>());
+      case PairWork::dilatation: return sweep(std::integral_constant<PairWork, PairWork::dilatation>());
+      case PairWork::dilatation_rate: return sweep(std::integral_constant<PairWork, PairWork::dilatation_rate>());
+      case PairWork::force: return sweep(std::integral_constant<PairWork, PairWork::force>());
+      case PairWork::tangent: return sweep(std::integral_constant<PairWork, PairWork::tangent>());
+      case PairWork::energy: return sweep(std::integral_constant<PairWork, PairWork::energy>());
     }
   }
   void reset_bad() noexcept { bad_ = -1; }
@@ -111,8 +103,7 @@ class PairLoop {
   /// Keeps the smallest index; from any thread.
   void report_bad(std::int64_t point) noexcept {
     std::int64_t known = bad_;
-    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {
-    }
+    while ((known < 0 || point < known) && !bad_.compare_exchange_weak(known, point)) {}
   }
 
  private:
@@ -131,8 +122,8 @@ std::unique_ptr<PairLoop> make_cloud_pairs(const PairLoopParts& parts);
 struct PairScratch {
   alignas(64) double e[batch_points];
   alignas(64) double de[batch_points];
-  alignas(64) double n[3][batch_points];            ///< deformed direction
-  alignas(64) double inverse_length[batch_points];  ///< of the deformed bond
+  alignas(64) double n[3][batch_points];          ///< deformed direction
+  alignas(64) double inverse_length[batch_points];///< of the deformed bond
   alignas(64) double modulus[batch_points];
   alignas(64) double energy[batch_points];
   alignas(64) double force[batch_points];

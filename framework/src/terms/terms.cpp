@@ -21,8 +21,7 @@ namespace {
 /// Zero, a piece for each thread at a time.
 void clear(double* values, std::size_t size) {
   constexpr std::size_t piece = std::size_t{1} << 16;
-  parallel_for((size + piece - 1) / piece,
-               [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
+  parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
 }
 
 /// Formulations whose bonds create energy as they fail (framework/docs/fracture.md, "Every kinematics and kernel").
@@ -47,7 +46,7 @@ void warn_of_energy(const TermParts& parts, ModelReport& report) {
 struct Terms::Assemblies {
   BlockRows rows;
   std::vector<std::unique_ptr<Assembly>> all;
-  std::size_t version;  ///< of the bonds that they know
+  std::size_t version;   ///< of the bonds that they know
   int steps = 1;
 };
 
@@ -68,8 +67,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
   }
-  if (parts_.stabilization)
-    terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
+  if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
   if (!parts_.damage) return;
   const NearestFailure* known = nullptr;
   for (const auto& term : terms_) {
@@ -165,9 +163,7 @@ Field Terms::shape_tensor_condition() const {
   return has_gradients() ? condition_field(*parts_.families) : parts_.families->body().make_field(1);
 }
 
-Field Terms::damage() const {
-  return damage_field(*parts_.families);
-}
+Field Terms::damage() const { return damage_field(*parts_.families); }
 
 QuietCounts Terms::quiet_counts() const {
   QuietCounts counts;
@@ -179,9 +175,7 @@ QuietCounts Terms::quiet_counts() const {
   return counts;
 }
 
-LawHistory* Terms::history() const noexcept {
-  return mechanics_ ? mechanics_->history() : nullptr;
-}
+LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->history() : nullptr; }
 
 void Terms::history_restored() {
   if (mechanics_) mechanics_->history_restored();
@@ -219,17 +213,13 @@ std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
   return BondCriterion(*parts_.families, parts_.formulation, nullptr, terms_, parts_.skip).energies(u);
 }
 
-std::vector<BondChange> Terms::changed_bonds() const {
-  return parts_.families->changed();
-}
+std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {
   if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
 }
 
-BondChecks Terms::bond_checks() const {
-  return failing_ ? failing_->fracture.checks() : BondChecks{};
-}
+BondChecks Terms::bond_checks() const { return failing_ ? failing_->fracture.checks() : BondChecks{}; }
 
 ModelReport Terms::report() const {
   const Families& families = *parts_.families;
@@ -241,22 +231,17 @@ ModelReport Terms::report() const {
   const int d = families.body().dimension();
   const double bond_bytes = static_cast<double>(report.bonds) * 8 * (d + 1);
   if (const LatticeFamilies* lattice = families.lattice()) {
-    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts",
-                            megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
+    report.skips.push_back({"neighbour lists and bond vectors", "lattice: neighbours lie at fixed shifts", megabytes(bond_bytes + 4.0 * static_cast<double>(report.bonds))});
     std::size_t whole = 0;
     const auto& chunks = lattice->tiles.chunks;
     for (const LatticeChunk& chunk : chunks) whole += chunk.pattern < 0;
-    report.skips.push_back(
-        {"shape tensors of whole families",
-         fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
-         megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) *
-                   sizeof(LatticePattern))});
+    report.skips.push_back({"shape tensors of whole families",
+                            fmt::format("one for {} of {} chunks, {} patterns for the rest", whole, chunks.size(), lattice->patterns.size()),
+                            megabytes((static_cast<double>(chunks.size()) - static_cast<double>(lattice->patterns.size())) * sizeof(LatticePattern))});
   } else {
     report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
   }
-  if (d < 3 && has_gradients())
-    report.skips.push_back(
-        {"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
   if (!conservative())
     report.warnings.push_back(
         "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");

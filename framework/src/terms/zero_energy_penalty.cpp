@@ -32,15 +32,14 @@ void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, con
 }
 
 std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) const {
-  return with_dimension(rows.body().dimension(),
-                        [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
+  return with_dimension(rows.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
 }
 
 void ZeroEnergyPenalty::report(ModelReport& report) const {
   report.bytes += bytes();
   if (parts_.formulation.order > 1) return;
-  report.skips.push_back({"adjoint of the penalty through the point gradient",
-                          "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)", "a gradient and a divergence"});
+  report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)",
+                          "a gradient and a divergence"});
 }
 
 std::unique_ptr<Term> make_penalty(const PenaltyParts& parts) {

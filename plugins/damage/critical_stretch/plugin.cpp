@@ -12,18 +12,14 @@ using namespace perikit;
 
 namespace {
 
-/// Stretch at which the bonds across a plane have taken up Gc [J/m^2] under a homogeneous expansion psi = (bulk modulus) (d
-/// s)^2/2:
+/// Stretch at which the bonds across a plane have taken up Gc [J/m^2] under a homogeneous expansion psi = (bulk modulus) (d s)^2/2:
 ///   Gc = psi <xi>/2 (3D),   2 psi <xi>/pi (2D),   psi <xi> (1D),   <xi> = int omega xi^d / int omega xi^(d-1)
 double stretch_of(double energy_release_rate, const DamagePoint& x, double mean_length) {
   const double bulk = x.bulk();
   switch (dimension(x.space)) {
-    case 3:
-      return std::sqrt(4 * energy_release_rate / (9 * bulk * mean_length));
-    case 2:
-      return std::sqrt(std::numbers::pi * energy_release_rate / (4 * bulk * mean_length));
-    default:
-      return std::sqrt(2 * energy_release_rate / (bulk * mean_length));
+    case 3: return std::sqrt(4 * energy_release_rate / (9 * bulk * mean_length));
+    case 2: return std::sqrt(std::numbers::pi * energy_release_rate / (4 * bulk * mean_length));
+    default: return std::sqrt(2 * energy_release_rate / (bulk * mean_length));
   }
 }
 
@@ -54,7 +50,7 @@ class CriticalStretch final : public Damage {
   }
 
  private:
-  double energy_release_rate_, stretch_;  ///< one of them is 0
+  double energy_release_rate_, stretch_;   ///< one of them is 0
   bool consistent_;
 };
 
@@ -74,10 +70,7 @@ PartDescription description() {
       .limits = "bonds in compression never break; a bond between two materials has the smaller limit of theirs"};
   part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").positive();
   part.parameters.number("stretch", "-", "Critical stretch s_c itself.").positive();
-  part.parameters
-      .boolean(
-          "consistent",
-          "With energy_release_rate: for bonds whose energy is shared out by the influence function (correspondence models).")
+  part.parameters.boolean("consistent", "With energy_release_rate: for bonds whose energy is shared out by the influence function (correspondence models).")
       .by_default("false");
   part.parameters.exactly(1, {"energy_release_rate", "stretch"});
   return part;
@@ -89,9 +82,7 @@ PERIKIT_PLUGIN(registrar) {
   registrar.damage(description(), [](const ParameterValues& values, const PartFactory&) {
     const bool by_energy = values.has("energy_release_rate");
     const bool consistent = values.boolean("consistent");
-    if (consistent && !by_energy)
-      throw values.error("consistent", "found true with `stretch`; allowed: only with energy_release_rate");
-    return std::make_unique<CriticalStretch>(by_energy ? values.number("energy_release_rate") : 0.0,
-                                             by_energy ? 0.0 : values.number("stretch"), consistent);
+    if (consistent && !by_energy) throw values.error("consistent", "found true with `stretch`; allowed: only with energy_release_rate");
+    return std::make_unique<CriticalStretch>(by_energy ? values.number("energy_release_rate") : 0.0, by_energy ? 0.0 : values.number("stretch"), consistent);
   });
 }

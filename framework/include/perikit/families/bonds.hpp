@@ -81,11 +81,11 @@ struct BondUpdate {
 
 /// How the checks went: what the conservative skip saved.
 struct BondChecks {
-  std::size_t updates = 0;   ///< calls of update_bonds
-  std::size_t groups = 0;    ///< groups of eight points that could have been checked, summed over updates
-  std::size_t checked = 0;   ///< groups that were
-  std::size_t failed = 0;    ///< bonds broken by now, each once
-  std::size_t weakened = 0;  ///< bonds between whole and broken
+  std::size_t updates = 0;          ///< calls of update_bonds
+  std::size_t groups = 0;           ///< groups of eight points that could have been checked, summed over updates
+  std::size_t checked = 0;          ///< groups that were
+  std::size_t failed = 0;           ///< bonds broken by now, each once
+  std::size_t weakened = 0;         ///< bonds between whole and broken
 };
 
 }  // namespace perikit

@@ -9,7 +9,7 @@ namespace perikit {
 
 /// Exactly one of the four pointers is not null. What a class does not state keeps the value given here.
 struct Formulation {
-  std::shared_ptr<const Kinematics> kinematics;  ///< keeps what the pointers show alive
+  std::shared_ptr<const Kinematics> kinematics;   ///< keeps what the pointers show alive
   const PointKinematics* point = nullptr;
   const BondKinematics* bond = nullptr;
   const WeightedKinematics* weighted = nullptr;
@@ -22,16 +22,16 @@ struct Formulation {
   PartWeight part_weight = PartWeight::equal;
   ForceState force_state = ForceState::variational;
   PairTraits pair_traits;
-  const DilatationLaw* dilatation = nullptr;  ///< pairs: null where phi is zero
+  const DilatationLaw* dilatation = nullptr;      ///< pairs: null where phi is zero
 
   bool selective() const noexcept { return map == GradientMap::selective; }
-  /// Evaluation points per point of a body of this dimension; 0: one per bond, or none at all (pairs). Throws InputError where
-  /// the kinematics does.
+  /// Evaluation points per point of a body of this dimension; 0: one per bond, or none at all (pairs). Throws InputError where the
+  /// kinematics does.
   int parts(int dimension) const { return weighted ? weighted->parts(dimension) : point ? 1 : 0; }
 };
 
-/// Throws std::invalid_argument for an object that is none of the four classes or several of them, and for a map over anything
-/// but a BondKinematics or a WeightedKinematics.
+/// Throws std::invalid_argument for an object that is none of the four classes or several of them, and for a map over anything but a
+/// BondKinematics or a WeightedKinematics.
 Formulation make_formulation(std::shared_ptr<const Kinematics> kinematics);
 
 }  // namespace perikit

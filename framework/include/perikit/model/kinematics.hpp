@@ -1,8 +1,7 @@
 #pragma once
-/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at
-/// evaluation points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the
-/// tangent and the momentum balances hold for every formulation without further code. A library implements one of four small
-/// classes:
+/// Kinematics. Correspondence formulations are linear operators from displacements to displacement gradients H = F - I at evaluation
+/// points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the
+/// momentum balances hold for every formulation without further code. A library implements one of four small classes:
 ///
 ///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
 ///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0 or 1/2
@@ -16,8 +15,8 @@
 /// All gradients are exact for affine motion whatever the library returns.
 ///
 /// A pair law is stated by its energy, with e = |xi + u_j - u_i| - |xi| the extension of a bond:
-///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e
-///   V_j, m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
+///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e V_j,
+///   m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
 /// The engine makes extensions, dilatations, forces and tangents of it; both moduli come from the small strain of the material.
 
 #include <cstddef>
@@ -50,13 +49,13 @@ struct FamilyView {
 
 /// What the moduli of a pair law at one point may depend on.
 struct PairPoint : FamilyPoint {
-  double weighted_volume = 0;  ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
-  double intact = 1;           ///< share of the family's influence that is not broken
+  double weighted_volume = 0;         ///< m_i over intact bonds [m^5 times the unit of omega]; 0 without any
+  double intact = 1;                  ///< share of the family's influence that is not broken
 };
 
 struct PairModuli {
-  double bond = 0;        ///< c_i
-  double dilatation = 0;  ///< k_i
+  double bond = 0;                    ///< c_i
+  double dilatation = 0;              ///< k_i
 };
 
 /// Arrays over n bonds that can be read (bonds at rest) and written up to padded(n). A null output is not wanted; the others are
@@ -75,11 +74,11 @@ struct BondBatch {
 /// Arrays over n points, as above.
 struct DilatationBatch {
   int n = 0;
-  const double* theta = nullptr;    ///< [-]
-  const double* modulus = nullptr;  ///< k_i
-  double* energy = nullptr;         ///< phi [J/m^3]
-  double* pressure = nullptr;       ///< dphi/dtheta [Pa]; exactly 0 at theta = 0
-  double* stiffness = nullptr;      ///< d2phi/dtheta2 [Pa]
+  const double* theta = nullptr;      ///< [-]
+  const double* modulus = nullptr;    ///< k_i
+  double* energy = nullptr;           ///< phi [J/m^3]
+  double* pressure = nullptr;         ///< dphi/dtheta [Pa]; exactly 0 at theta = 0
+  double* stiffness = nullptr;        ///< d2phi/dtheta2 [Pa]
 };
 
 enum class BondBase {
@@ -96,25 +95,25 @@ enum class PartWeight {
 enum class GradientMap { identity, selective };  ///< selective: the volume change of every evaluation point is that of its owner
 
 struct BondTraits {
-  int order = 1;  ///< of the point gradient
+  int order = 1;                            ///< of the point gradient
   BondBase base = BondBase::own;
   double far_share = 0.5;  ///< of `blend`, in [0, 1]
   BondWeight weight = BondWeight::volume;
-  bool pair_symmetric = false;  ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
-  bool g_from_xi_only = false;  ///< g is odd in xi and independent of omega and the shape tensor
+  bool pair_symmetric = false;              ///< g depends on xi alone: ij and ji give the same H and are evaluated once (base = mean)
+  bool g_from_xi_only = false;              ///< g is odd in xi and independent of omega and the shape tensor
 };
 
 struct WeightedTraits {
-  BondWeight weight = BondWeight::volume;      ///< of evaluation points that belong to bonds
-  PartWeight part_weight = PartWeight::equal;  ///< of evaluation points that belong to parts of the family
-  /// local (one evaluation point per bond only, for comparison): T_ij = (V of the domain / V of the family) omega P_ij K_ij^-1
-  /// xi_ij. Not conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
+  BondWeight weight = BondWeight::volume;       ///< of evaluation points that belong to bonds
+  PartWeight part_weight = PartWeight::equal;   ///< of evaluation points that belong to parts of the family
+  /// local (one evaluation point per bond only, for comparison): T_ij = (V of the domain / V of the family) omega P_ij K_ij^-1 xi_ij. Not
+  /// conservative: forces are not -dE/du, moments do not balance, the tangent is not symmetric.
   ForceState force_state = ForceState::variational;
 };
 
 struct PairTraits {
-  bool influence = true;         ///< w or theta depends on omega
-  bool constant_moduli = false;  ///< c_i depends on the material alone, not on the family
+  bool influence = true;                    ///< w or theta depends on omega
+  bool constant_moduli = false;             ///< c_i depends on the material alone, not on the family
   /// Moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as in a whole
   /// family (w must be proportional to c_ij).
   bool surface_correction = false;
@@ -142,13 +141,13 @@ class BondKinematics : public Kinematics {
 class WeightedKinematics : public Kinematics {
  public:
   virtual WeightedTraits traits() const noexcept = 0;
-  /// Evaluation points per point of a body of this dimension; 0: one per bond. Throws InputError where the options do not suit
-  /// the dimension; asked at set-up.
+  /// Evaluation points per point of a body of this dimension; 0: one per bond. Throws InputError where the options do not suit the
+  /// dimension; asked at set-up.
   virtual int parts(int dimension) const = 0;
-  /// Influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k], at most
-  /// the view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a
-  /// well-conditioned gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family
-  /// without any part, use the whole family.
+  /// Influence of bond k in evaluation point q (part q, or the bond q itself), for all of both: omega[q * stride + k], at most the
+  /// view's omega[k] for a part. Rows can be written up to padded(bonds); their bonds must be. A part without a well-conditioned
+  /// gradient of its own is dropped and the others share its weight; a bond's domain without one, and a family without any part, use
+  /// the whole family.
   virtual void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept = 0;
 };
 

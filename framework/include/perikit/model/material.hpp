@@ -10,20 +10,18 @@
 namespace perikit {
 
 struct MaterialTraits {
-  int constants = 0;  ///< doubles per point that `evaluate` reads
+  int constants = 0;          ///< doubles per point that `evaluate` reads
   bool constant_tangent = false;
-  bool objective = true;  ///< false for small-strain laws
+  bool objective = true;      ///< false for small-strain laws
   bool isotropic = true;
-  bool hyperelastic = true;  ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
+  bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
 };
 
 /// Lame constants of the law at F = I [Pa].
 struct Moduli {
   double lambda = 0, mu = 0;
   double bulk() const noexcept { return lambda + 2.0 * mu / 3.0; }
-  double youngs() const noexcept {
-    return mu == 0 ? 0 : mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  }  // points that store nothing have neither
+  double youngs() const noexcept { return mu == 0 ? 0 : mu * (3 * lambda + 2 * mu) / (lambda + mu); }   // points that store nothing have neither
   double poisson() const noexcept { return lambda == 0 ? 0 : lambda / (2 * (lambda + mu)); }
 };
 
@@ -75,8 +73,7 @@ class Material {
   /// (nu >= 1/2, negative modulus).
   virtual void constants(const MaterialInput& input, double* out) const = 0;
   virtual Moduli small_strain(const double* constants) const noexcept = 0;
-  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history
-  /// is zero.
+  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history is zero.
   virtual int state_components(Space) const noexcept { return 0; }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;

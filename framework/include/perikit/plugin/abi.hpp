@@ -2,8 +2,8 @@
 /// The C symbols that every perikit library exports. They are read and compared before any C++ object crosses the boundary.
 ///
 ///   int         perikit_abi_version()     equals PERIKIT_ABI_VERSION
-///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width, hash of the public headers: see
-///   PERIKIT_BUILD_ID void        perikit_register(void*)   called with a perikit::Registrar*
+///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width, hash of the public headers: see PERIKIT_BUILD_ID
+///   void        perikit_register(void*)   called with a perikit::Registrar*
 ///
 /// PERIKIT_PLUGIN(registrar) { registrar.material({...}, ...); } writes all three.
 
@@ -44,15 +44,11 @@
 
 #define PERIKIT_EXPORT extern "C" __attribute__((visibility("default")))
 
-#define PERIKIT_PLUGIN(registrar)                                        \
-  static void perikit_register_parts(::perikit::Registrar& registrar);   \
-  PERIKIT_EXPORT int perikit_abi_version() {                             \
-    return PERIKIT_ABI_VERSION;                                          \
-  }                                                                      \
-  PERIKIT_EXPORT const char* perikit_build_id() {                        \
-    return PERIKIT_BUILD_ID;                                             \
-  }                                                                      \
-  PERIKIT_EXPORT void perikit_register(void* opaque) {                   \
-    perikit_register_parts(*static_cast<::perikit::Registrar*>(opaque)); \
-  }                                                                      \
+#define PERIKIT_PLUGIN(registrar)                                                                             \
+  static void perikit_register_parts(::perikit::Registrar& registrar);                                       \
+  PERIKIT_EXPORT int perikit_abi_version() { return PERIKIT_ABI_VERSION; }                                    \
+  PERIKIT_EXPORT const char* perikit_build_id() { return PERIKIT_BUILD_ID; }                                  \
+  PERIKIT_EXPORT void perikit_register(void* opaque) {                                                        \
+    perikit_register_parts(*static_cast<::perikit::Registrar*>(opaque));                                      \
+  }                                                                                                           \
   static void perikit_register_parts(::perikit::Registrar& registrar)

@@ -23,16 +23,16 @@ struct ProblemParts {
   ProblemParts();
   ProblemParts(ProblemParts&&) noexcept;
   ~ProblemParts();
-  std::unique_ptr<const Partition> partition;  ///< null where one rank has the whole body
-  std::unique_ptr<const Body> body;            ///< of this rank, with the images of its points
-  std::unique_ptr<const ImageMap> images;      ///< null without
+  std::unique_ptr<const Partition> partition;   ///< null where one rank has the whole body
+  std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
+  std::unique_ptr<const ImageMap> images;       ///< null without
   std::unique_ptr<Laws> laws;
-  std::unique_ptr<Families> families;  ///< of the body: everything that looks at bonds borrows them
+  std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
   FractureRecord fracture;
   std::unique_ptr<Terms> terms;
-  std::string kinematics;              ///< names, for messages
-  std::vector<std::string> materials;  ///< by material of the body
-  std::vector<std::string> warnings;   ///< of what is allowed and can hardly be meant
+  std::string kinematics;                       ///< names, for messages
+  std::vector<std::string> materials;           ///< by material of the body
+  std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
 };
 
 class BodyProblem final : public Problem {
@@ -56,8 +56,8 @@ class BodyProblem final : public Problem {
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
-  /// What a snapshot of another run of this body holds of its bonds and of the history of its laws: bonds that are not as they
-  /// were at its set-up, and numbers of history.
+  /// What a snapshot of another run of this body holds of its bonds and of the history of its laws: bonds that are not as they were at its
+  /// set-up, and numbers of history.
   struct Carried {
     std::size_t bonds = 0, history = 0;
   };
@@ -65,13 +65,12 @@ class BodyProblem final : public Problem {
   /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
   void carry(std::span<const std::byte> snapshot);
 
-  /// Quasi-static runs, on one rank: from now on pieces of the body that nothing holds are known. Where loads move one, forces
-  /// are refused and the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness.
-  /// Returns what is loose now, in words; empty: nothing.
+  /// Quasi-static runs, on one rank: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
+  /// the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness. Returns what is
+  /// loose now, in words; empty: nothing.
   std::string watch_pieces(double weak_springs);
 
-  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another
-  /// problem.
+  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
 
@@ -79,9 +78,7 @@ class BodyProblem final : public Problem {
   const Terms& terms() const noexcept { return *parts_.terms; }
   /// The body of all ranks.
   const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
-  std::string fracture_summary() const {
-    return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated);
-  }
+  std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
   const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
@@ -102,9 +99,9 @@ class BodyProblem final : public Problem {
   void react(BondReaction& reaction, FieldView velocity);
 
   Field seen_, seen_direction_;
-  BlockMatrix tangent_of_terms_, companion_of_terms_;  ///< with images
-  std::unique_ptr<Companion> companion_;               ///< made when asked for
-  std::unique_ptr<WeakSprings> weak_springs_;          ///< null unless pieces are watched
+  BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
+  std::unique_ptr<Companion> companion_;        ///< made when asked for
+  std::unique_ptr<WeakSprings> weak_springs_;   ///< null unless pieces are watched
 };
 
 }  // namespace perikit

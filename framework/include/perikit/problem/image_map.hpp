@@ -1,7 +1,7 @@
 #pragma once
-/// The linear map between the displacements that a problem has and those that its terms see. An image's entry of the former holds
-/// what faces prescribe of it, a constrained component like any other, and u(image) = sign * u(source) + that entry. Forces go
-/// the other way: the source gets sign * force, and the image keeps its own, from which reactions follow.
+/// The linear map between the displacements that a problem has and those that its terms see. An image's entry of the former holds what
+/// faces prescribe of it, a constrained component like any other, and u(image) = sign * u(source) + that entry. Forces go the other way:
+/// the source gets sign * force, and the image keeps its own, from which reactions follow.
 
 #include <cstdint>
 #include <vector>
@@ -35,13 +35,13 @@ class ImageMap {
 
  private:
   struct Share {
-    std::int64_t image, surface;  ///< components of points
+    std::int64_t image, surface;               ///< components of points
     double factor;
   };
-  std::vector<std::int32_t> image_, source_;  ///< internal indices
+  std::vector<std::int32_t> image_, source_;   ///< internal indices
   std::vector<std::array<double, 3>> sign_;
   std::vector<Share> shares_;
-  std::vector<std::int32_t> map_;  ///< by internal index: number of the image, -1
+  std::vector<std::int32_t> map_;              ///< by internal index: number of the image, -1
 };
 
 }  // namespace perikit

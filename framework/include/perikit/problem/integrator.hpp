@@ -11,13 +11,13 @@ class Problem;
 
 /// What an integrator tells after every finished step.
 struct StepReport {
-  std::int64_t step = 0;  ///< 0 for the initial state
-  double time = 0;        ///< [s], or the load parameter in [0, 1]
+  std::int64_t step = 0;           ///< 0 for the initial state
+  double time = 0;                 ///< [s], or the load parameter in [0, 1]
   double time_step = 0;
-  int iterations = 0;   ///< of the nonlinear solver, 0 for explicit steps
-  double residual = 0;  ///< relative, 0 for explicit steps
+  int iterations = 0;              ///< of the nonlinear solver, 0 for explicit steps
+  double residual = 0;             ///< relative, 0 for explicit steps
   double end_time = 0;
-  std::int64_t steps_expected = 0;  ///< 0: unknown
+  std::int64_t steps_expected = 0; ///< 0: unknown
 };
 
 class Observer {

@@ -21,7 +21,7 @@ struct ProblemValues {
   Masses masses;
   Constraints constraints;
   Loads loads;
-  const ImageMap* images = nullptr;  ///< null: the body has none. They are not owned; their displacements are constrained
+  const ImageMap* images = nullptr;   ///< null: the body has none. They are not owned; their displacements are constrained
 };
 
 /// Values are the same for all who look at a problem; operations may be wrapped by those who look on or interfere.
@@ -42,8 +42,8 @@ class Problem {
   /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
   Field make_field() const { return body().make_field(dimension()); }
 
-  /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length,
-  /// and laws with history put theirs aside for `advance`; 0: nothing is kept.
+  /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and
+  /// laws with history put theirs aside for `advance`; 0: nothing is kept.
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
   /// force <- what acts from outside at time (or load parameter) t [N], fully overwritten: loads, of which some follow the
   /// surface at u.
@@ -60,8 +60,8 @@ class Problem {
   virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
   /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
   virtual AssembledSize assembled_size() = 0;
-  /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap,
-  /// spectrally close to the tangent. For preconditioners. Pattern and values as with assemble_tangent.
+  /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap, spectrally
+  /// close to the tangent. For preconditioners. Pattern and values as with assemble_tangent.
   virtual void assemble_companion(ConstFieldView u, BlockMatrix& K) = 0;
   /// False where the stiffness can change during the run (nonlinear laws, failing bonds): estimates of it do not last.
   virtual bool constant_stiffness() const noexcept = 0;

@@ -11,8 +11,8 @@
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
-#include "perikit/problem/body_problem.hpp"
 #include "perikit/problem/integrator.hpp"
+#include "perikit/problem/body_problem.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -46,7 +46,7 @@ class Simulation {
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
   std::unique_ptr<BodyProblem> problem_;
-  std::string carried_, loose_;  ///< from an earlier run, by weak springs; in words
+  std::string carried_, loose_;   ///< from an earlier run, by weak springs; in words
 };
 
 /// The columns of history.csv: the standard ones, then those that the scene asks for.
@@ -74,15 +74,15 @@ struct EnergyBalance {
 
 /// Where the output of a run stands: what a checkpoint holds besides the state.
 struct OutputProgress {
-  std::int64_t frames = 0, history_rows = 0;  ///< those that the scene asks for; not the ones of a stop
-  std::int64_t next_time = 0;                 ///< of [output] times
-  std::int64_t history_every = 0;             ///< 0: not known before the first step
+  std::int64_t frames = 0, history_rows = 0;   ///< those that the scene asks for; not the ones of a stop
+  std::int64_t next_time = 0;                  ///< of [output] times
+  std::int64_t history_every = 0;              ///< 0: not known before the first step
   std::int64_t steps_expected = 0;
   double end_time = 0;
-  double frame_spacing = 0;  ///< of [output] frames: it stays where a run is lengthened
+  double frame_spacing = 0;                    ///< of [output] frames: it stays where a run is lengthened
   EnergyBalance energies;
-  std::vector<std::int64_t> frame_fingerprints;  ///< of the files of these frames
-  std::int64_t history_fingerprint = 0;          ///< of the values in these rows; 0: none yet
+  std::vector<std::int64_t> frame_fingerprints;   ///< of the files of these frames
+  std::int64_t history_fingerprint = 0;        ///< of the values in these rows; 0: none yet
 };
 
 class OutputFolder;
@@ -109,8 +109,7 @@ class RunRecorder final : public Observer {
 
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
-  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the
-  /// run.
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
   std::string closing(double set_up) const;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
@@ -153,7 +152,7 @@ class RunRecorder final : public Observer {
   std::vector<double> frame_times_;
   OutputProgress done_;
   std::int64_t resumed_step_ = -1;
-  std::string body_, libraries_;  ///< fingerprints
+  std::string body_, libraries_;   ///< fingerprints
   std::string log_text_;
   std::chrono::steady_clock::time_point start_, shown_;
   bool line_open_ = false;
@@ -169,7 +168,7 @@ class RunRecorder final : public Observer {
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
   double first_time_ = 0;
   std::vector<std::string> warnings_;
-  std::set<std::string> strange_fields_;  ///< that were not finite somewhere
+  std::set<std::string> strange_fields_;   ///< that were not finite somewhere
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.

@@ -18,18 +18,18 @@
 namespace perikit {
 
 struct LatticeDescription {
-  double spacing = 0;                      ///< [m]
-  std::array<double, 3> lower{}, upper{};  ///< [m]; unused axes 0
-  std::optional<Expression> inside;        ///< kept where nonzero
-  double jitter = 0;                       ///< fraction of the spacing
+  double spacing = 0;                       ///< [m]
+  std::array<double, 3> lower{}, upper{};   ///< [m]; unused axes 0
+  std::optional<Expression> inside;         ///< kept where nonzero
+  double jitter = 0;                        ///< fraction of the spacing
   std::int64_t seed = 1;
-  SourcePosition position;  ///< of `inside` where it is given, else of the table
+  SourcePosition position;                  ///< of `inside` where it is given, else of the table
 };
 
 struct BodyDescription {
   int dimension = 3;
   Space space = Space::solid;
-  double section = 1.0;  ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
+  double section = 1.0;                     ///< thickness (2D) [m], area (1D) [m^2], 1 in 3D
   std::optional<LatticeDescription> lattice;
   std::optional<std::filesystem::path> points_file;
   std::optional<std::array<double, 3>> points_lower, points_upper;  ///< of the body that the points of a file are in [m]
@@ -76,9 +76,9 @@ struct RampDescription {
 /// One component of a prescribed motion: nullopt where "free".
 struct BoundaryDescription {
   std::string set;
-  std::string face;          ///< "+x" ... "-z": of the set, is held; empty: the points of the set are
-  std::optional<double> at;  ///< where the face lies [m]
-  bool velocity = false;     ///< else displacement
+  std::string face;                          ///< "+x" ... "-z": of the set, is held; empty: the points of the set are
+  std::optional<double> at;                  ///< where the face lies [m]
+  bool velocity = false;                     ///< else displacement
   std::vector<std::optional<Expression>> components;
   RampDescription ramp;
   SourcePosition position, face_position;  ///< of the displacement or velocity; of `at`, else of the face
@@ -86,13 +86,13 @@ struct BoundaryDescription {
 
 struct SymmetryDescription {
   int axis = 0;
-  std::optional<double> at;  ///< of the plane [m]; else below the lowest points
+  std::optional<double> at;                  ///< of the plane [m]; else below the lowest points
   SourcePosition position;
 };
 
 struct PeriodicDescription {
   int axis = 0;
-  std::optional<double> lower, upper;  ///< [m]; else the ends of the body
+  std::optional<double> lower, upper;        ///< [m]; else the ends of the body
   SourcePosition position;
 };
 
@@ -108,25 +108,25 @@ struct LoadDescription {
 
 struct HistoryDescription {
   std::string name, set, quantity, component, reduce;
-  SourcePosition position;          ///< of the quantity
-  std::optional<Expression> exact;  ///< with reduce "error"
-  std::array<double, 3> at{};       ///< with reduce "fit" [m]
+  SourcePosition position;                   ///< of the quantity
+  std::optional<Expression> exact;           ///< with reduce "error"
+  std::array<double, 3> at{};                ///< with reduce "fit" [m]
 };
 
 struct OutputDescription {
   std::optional<std::int64_t> frames, every;
   std::vector<double> times;
-  std::int64_t history_every = 0;     ///< 0: default (every step for statics, about 1000 samples for explicit runs)
-  std::int64_t checkpoint_every = 0;  ///< 0: none
-  std::vector<std::string> fields;    ///< empty: default
+  std::int64_t history_every = 0;            ///< 0: default (every step for statics, about 1000 samples for explicit runs)
+  std::int64_t checkpoint_every = 0;         ///< 0: none
+  std::vector<std::string> fields;           ///< empty: default
   SourcePosition fields_position;
   std::vector<HistoryDescription> history;
 };
 
 struct Scene {
   std::filesystem::path file;
-  std::string text;      ///< the file as read
-  std::string resolved;  ///< TOML with overrides applied and every default written out
+  std::string text;                          ///< the file as read
+  std::string resolved;                      ///< TOML with overrides applied and every default written out
   std::string title;
   Constants constants;
   BodyDescription body;
@@ -137,12 +137,12 @@ struct Scene {
   bool partial_volume = false;
   SourcePosition consistent_position, partial_volume_position, horizon_position;
   std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
-  std::shared_ptr<const PartValues> stabilization, damage;  ///< null where the scene has none
+  std::shared_ptr<const PartValues> stabilization, damage;   ///< null where the scene has none
   std::vector<RegionDescription> regions;
   std::vector<InterfaceDescription> interfaces;
   std::vector<CrackDescription> cracks;
-  std::vector<std::string> no_fail;                                               ///< [damage] no_fail
-  std::vector<std::optional<Expression>> initial_displacement, initial_velocity;  ///< empty or `dimension` long
+  std::vector<std::string> no_fail;          ///< [damage] no_fail
+  std::vector<std::optional<Expression>> initial_displacement, initial_velocity;   ///< empty or `dimension` long
   std::optional<std::filesystem::path> initial_from;
   SourcePosition initial_velocity_position;
   std::vector<BoundaryDescription> boundaries;
@@ -150,17 +150,17 @@ struct Scene {
   std::vector<PeriodicDescription> periodics;
   std::vector<LoadDescription> loads;
   OutputDescription output;
-  bool skip = true;         ///< [run]: leave out work whose result is known
-  bool share = true;        ///< [run]: compute what is equal once
-  double weak_springs = 0;  ///< [run]: of loose pieces, share of a point's stiffness; 0: refused
+  bool skip = true;                          ///< [run]: leave out work whose result is known
+  bool share = true;                         ///< [run]: compute what is equal once
+  double weak_springs = 0;                   ///< [run]: of loose pieces, share of a point's stiffness; 0: refused
   SourcePosition weak_springs_position;
   std::optional<int> threads;
   std::int64_t seed = 1;
 };
 
 struct SceneOptions {
-  std::vector<std::string> overrides;  ///< "integrator.steps=20": values are TOML, or else taken as strings
-  bool trust = false;                  ///< open the libraries that the scene lists
+  std::vector<std::string> overrides;        ///< "integrator.steps=20": values are TOML, or else taken as strings
+  bool trust = false;                        ///< open the libraries that the scene lists
 };
 
 /// Reads and checks a scene. Opens (through the catalogue) the libraries of the parts it names and no others.

@@ -37,8 +37,8 @@ class Equilibrium {
   /// w <- U(t) - u on prescribed components, 0 elsewhere; returns its largest magnitude [m].
   double missing(ConstFieldView u, FieldView w);
 
-  /// r <- internal + external force on free components, 0 elsewhere [N]; the internal forces are kept in the problem, the strain
-  /// energy goes to `energy` where wanted. False where u is inadmissible or r not finite; failure() then says why.
+  /// r <- internal + external force on free components, 0 elsewhere [N]; the internal forces are kept in the problem, the strain energy
+  /// goes to `energy` where wanted. False where u is inadmissible or r not finite; failure() then says why.
   bool residual(ConstFieldView u, FieldView r, double* energy = nullptr);
   /// |r| and |r|/reference of the last residual.
   double residual_norm() const noexcept { return norm_; }
@@ -67,13 +67,13 @@ class Equilibrium {
   Observer* observer_ = nullptr;
   bool stopped_ = false;
   std::string last_note_;
-  std::int64_t actions_ = 0;  ///< of the tangent since the last note
+  std::int64_t actions_ = 0;   ///< of the tangent since the last note
   std::chrono::steady_clock::time_point logged_ = std::chrono::steady_clock::now();
   double tolerance_;
   double t_ = 0, norm_ = 0, reference_ = 0, stiffness_ = 0;
   Field u_, scratch_;
   ConstFieldView free_;
-  FieldView external_;  ///< no data without loads
+  FieldView external_;   ///< no data without loads
   std::string failure_, notes_;
 };
 

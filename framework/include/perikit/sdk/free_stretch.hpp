@@ -33,8 +33,7 @@ struct FreeStress {
   T value, slope;
 };
 
-/// Laws may know the free stretch in closed form: law.free_stretch(H, k) -> H33, from the in-plane components of H, NaN where
-/// there is none;
+/// Laws may know the free stretch in closed form: law.free_stretch(H, k) -> H33, from the in-plane components of H, NaN where there is none;
 template <class Law, class T, class S, class K>
 concept HasFreeStretch = requires(const Law& law, const Tensor<T, S>& H, const K& k) {
   { law.free_stretch(H, k) } -> std::same_as<T>;
@@ -79,16 +78,15 @@ Pack solve_free_equation(const Equation& equation, Pack y, Pack size, PackMask& 
     step = select(residual == 0.0, Pack(0.0), step);
     y = select(active, y + step, y);
     h = select(active, h + x * expm1(step), h);
-    // Convergence is quadratic: the step just taken is the last that matters. Laws written in F have no zero closer than
-    // rounding.
+    // Convergence is quadratic: the step just taken is the last that matters. Laws written in F have no zero closer than rounding.
     active &= abs(step) > max(1e-8 * size, Pack(4 * std::numeric_limits<double>::epsilon()));
   }
   return h;
 }
 
 /// H with its free components such that the free stress vanishes to rounding. Lanes that are
-/// not `good` on entry keep H = 0; lanes without a solution are taken from `good`. Where the law does not know better, Newton
-/// from the exact solution for a Kirchhoff stress linear in the logarithmic strain.
+/// not `good` on entry keep H = 0; lanes without a solution are taken from `good`. Where the law does not know better, Newton from the
+/// exact solution for a Kirchhoff stress linear in the logarithmic strain.
 template <bool small_strain, class Law, class S, class K>
 Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k, Pack ratio, PackMask& good) noexcept {
   constexpr double infinity = std::numeric_limits<double>::infinity();

@@ -7,8 +7,7 @@
 ///     Moduli small_strain(const double* k) const noexcept;
 ///     template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept;             // one of these
 ///     template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept;    // or both
-///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left
-///     out
+///     template <class T, class S, class K> auto tangent(const Tensor<T, S>& H, const K& k) const noexcept;      // may be left out
 ///   };
 ///   auto material = std::make_unique<LawMaterial<MyLaw>>();
 ///
@@ -31,8 +30,8 @@
 #include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/history.hpp"
 
-// Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where
-// the checks in the inlined bodies would take minutes to compile.
+// Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
+// checks in the inlined bodies would take minutes to compile.
 #if defined(__SANITIZE_ADDRESS__)
 #define PERIKIT_FLATTEN
 #else
@@ -151,7 +150,8 @@ class LawMaterial final : public Material {
   /// A displacement gradient, or a direction of one.
   template <class S>
   static Tensor<Pack, S> load(const double* x, std::size_t stride, int p) noexcept {
-    return Tensor<Pack, S>::map([&](int c) { return always_zero<S>(row<S>(c)) ? Pack(0.0) : Pack::load(x + c * stride + p); });
+    return Tensor<Pack, S>::map(
+        [&](int c) { return always_zero<S>(row<S>(c)) ? Pack(0.0) : Pack::load(x + c * stride + p); });
   }
   template <class S>
   static void store(const Tensor<Pack, S>& t, double* x, std::size_t stride, int p) noexcept {
@@ -255,8 +255,8 @@ class LawMaterial final : public Material {
   }
 
   template <class S, bool free_stretch, class StepLaw>
-  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p,
-                                                         const Tensor<Pack, S>& H, const Constants& k) noexcept {
+  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
+                                                       const Constants& k) noexcept {
     const auto action = [&] {
       if constexpr (free_stretch)
         return condensed_tangent(law, H, k);

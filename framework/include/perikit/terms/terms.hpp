@@ -1,7 +1,6 @@
 #pragma once
-/// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to
-/// them. Their sum as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds
-/// that fail.
+/// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to them. Their sum
+/// as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds that fail.
 
 #include <memory>
 #include <span>
@@ -47,11 +46,11 @@ class Terms {
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
   /// Kw <- -d(force)/du w [N], fully overwritten.
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
-  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has
-  /// must come from these terms and stays as it is. Values are overwritten; undefined after a failure.
+  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
+  /// from these terms and stays as it is. Values are overwritten; undefined after a failure.
   EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K);
-  /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies
-  /// with no more points.
+  /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
+  /// no more points.
   AssembledSize assembled_size();
   EvaluationStatus sample(ConstFieldView u, PointSamples& samples);
 
