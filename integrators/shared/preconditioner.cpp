@@ -123,7 +123,7 @@ bool factorisation_pays(Problem& problem) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
     if (moduli.mu > 0) stiffest = std::max(stiffest, moduli.bulk() / moduli.mu);
   }
-  const bool few = problem.body().points() <= 500;
+  const bool few = problem.body().points() <= 4000;
   const bool resists_volume = stiffest > 1000 && problem.body().space() != Space::plane_stress;
   return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
 }

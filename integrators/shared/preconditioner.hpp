@@ -61,7 +61,8 @@ void add_preconditioner_key(ParameterTable& table);
 
 /// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"
 /// (a multigrid cycle on springs between nearest neighbours, never the tangent), "auto": the factorisation in 1D, and in 2D for at
-/// most 500 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else the companion. `chosen` <- what auto chose, for the log.
+/// most 4000 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else the companion.
+/// `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
 }  // namespace perikit

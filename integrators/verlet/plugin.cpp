@@ -6,7 +6,9 @@ PERIKIT_PLUGIN(registrar) {
   ParameterTable table;
   table.number("end_time", "s", "End of the run; hit exactly by equal steps.").require().positive();
   table.number("time_step", "s", "Largest step; found from the stiffness where it is not given.").positive();
-  table.number("safety", "-", "Factor to the estimated stable step.").by_default("0.9").positive().at_most(1.0);
+  table.number("safety", "-", "Factor to the estimated stable step; without it 0.9, and 0.5 where bonds may fail.")
+      .positive()
+      .at_most(1.0);
   table
       .choice("estimate", {"eigenvalue", "bond_based"},
               "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.")

@@ -81,22 +81,24 @@ class Stepper {
     for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
   }
 
-  /// Work of loads and constraints over a step of length dt that ended now [J]. A constraint's work is what keeps the energy of the
-  /// prescribed components in balance: their change of kinetic energy less the work of the other forces on them.
-  void add_work(double dt, ConstFieldView old_external) {
-    double work = 0;
+  /// Work of the loads over a step of length dt that ended now [J].
+  void add_work_of_loads(double dt, ConstFieldView old_external) {
+    if (!loaded_) return;
+    const double now = dot(external_, v_);
+    state_.energies.external_work += dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
+  }
+
+  /// That of the constraints: what keeps the energy of the prescribed components in balance, their change of kinetic energy less
+  /// the work of the other forces on them.
+  void add_work_of_constraints(double dt) {
     ExactSum held;
-    if (loaded_) {
-      const double now = dot(external_, v_);
-      work = dt * (old_external.data ? 0.5 * (now + dot(old_external, v_)) : now);
-    }
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
       held.add(0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]]);
       speed_[k] = now;
     }
-    state_.energies.external_work += work + total_over_ranks(held);
+    state_.energies.external_work += total_over_ranks(held);
   }
 
   /// Velocities of the prescribed components at full step t.
@@ -129,10 +131,14 @@ class Stepper {
 
 }  // namespace
 
+double Verlet::safety(const Problem& problem) const {
+  return options_.safety > 0 ? options_.safety : problem.bonds().empty() ? 0.9 : 0.5;
+}
+
 double Verlet::stable_step(Problem& problem) const {
-  if (options_.bond_based) return options_.safety * bond_based_time_step(problem.body(), problem.laws());
+  if (options_.bond_based) return safety(problem) * bond_based_time_step(problem.body(), problem.laws());
   const double eigenvalue = largest_eigenvalue(problem, problem.state().displacement());
-  return eigenvalue > 0 ? options_.safety * 2 / std::sqrt(eigenvalue) : options_.end_time;
+  return eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
 }
 
 double Verlet::steps_to_end(double time, double step) const {
@@ -218,13 +224,15 @@ void Verlet::run(Problem& problem, Observer& observer) {
       stepper.load();
     }
     stepper.prescribed_speed(t_next, speeds);
-    stepper.add_work(dt, old_external);
+    stepper.add_work_of_loads(dt, old_external);
+    // Forces, velocity and energies are those of the bonds that are left.
+    if (problem.advance(dt, stepper.half())) broke = 1;
+    stepper.add_work_of_constraints(dt);
     last_dt = dt;
     if (sample) {
       stepper.kick(stepper.half(), v, 0.5 * dt);
       problem.constraints().prescribe_velocity(t_next, v);
     }
-    if (problem.advance(dt, stepper.half())) broke = 1;
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
     const std::int64_t check_every = broke != 0 ? std::max<std::int64_t>(1, options_.check_every / 10) : options_.check_every;
     if (estimated && !last && !problem.constant_stiffness() && state.step % check_every == 0) {

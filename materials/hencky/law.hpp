@@ -50,7 +50,8 @@ struct Hencky {
     };
   }
 
-  /// tau33 = 0 is linear in logarithms: ln(free stretch) = -lambda/(lambda + 2 mu) ln J over the plane, in a bar -lambda/(2 (lambda + mu)) ln F11.
+  /// tau33 = 0 is linear in logarithms: ln(free stretch) = -lambda/(lambda + 2 mu) ln J over the plane, in a bar -lambda/(2
+  /// (lambda + mu)) ln F11.
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;

@@ -14,7 +14,8 @@ namespace perikit {
 /// Compressible Mooney-Rivlin rubber [Scabbia et al. 2025, eqs. 3-7].
 ///   psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J),  I1, I2 invariants of C
 ///   P = tau F^-T,  tau = dev(2 C1 J^(-2/3) b + 2 C2 J^(-4/3) (I1 b - b^2)) + J psi_vol'(J) I,  b = F F^T.
-/// Written in e = b - I, every term of the order of e: I1 b - b^2 = I2 I - cof b (Cayley-Hamilton), cof b = I + tr(e) I - e + cof e.
+/// Written in e = b - I, every term of the order of e: I1 b - b^2 = I2 I - cof b (Cayley-Hamilton), cof b = I + tr(e) I - e + cof
+/// e.
 struct MooneyRivlin {
   static constexpr MaterialTraits traits{.constants = 3};
   Volumetric volumetric = Volumetric::quadratic;

@@ -33,7 +33,8 @@ struct SaintVenantKirchhoff {
     return second + H * second;
   }
 
-  /// S33 = 0 is linear in C - I: C33 - 1 = -lambda/(lambda + 2 mu) tr (C - I over the plane), in a bar -lambda/(2 (lambda + mu)) (C11 - 1).
+  /// S33 = 0 is linear in C - I: C33 - 1 = -lambda/(lambda + 2 mu) tr (C - I over the plane), in a bar -lambda/(2 (lambda + mu))
+  /// (C11 - 1).
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;

@@ -25,7 +25,7 @@ class ForwardingProblem : public Problem {
   AssembledSize assembled_size() override { return of_.assembled_size(); }
   void assemble_companion(ConstFieldView u, BlockMatrix& K) override { of_.assemble_companion(u, K); }
   bool constant_stiffness() const noexcept override { return of_.constant_stiffness(); }
-  bool advance(double time_step, ConstFieldView velocity) override { return of_.advance(time_step, velocity); }
+  bool advance(double time_step, FieldView velocity) override { return of_.advance(time_step, velocity); }
   std::vector<std::byte> bonds() const override { return of_.bonds(); }
   void restore_bonds(std::span<const std::byte> bonds) override { of_.restore_bonds(bonds); }
 

@@ -12,7 +12,7 @@ class WitnessProblem final : public ForwardingProblem {
   using ForwardingProblem::ForwardingProblem;
   std::function<void()> before, after;  ///< of advance
 
-  bool advance(double time_step, ConstFieldView velocity) override {
+  bool advance(double time_step, FieldView velocity) override {
     if (before) before();
     const bool changed = of_.advance(time_step, velocity);
     if (after) after();

@@ -323,6 +323,8 @@ TEST_CASE("cli: newton refuses a tangent that memory does not hold, with the num
 dimension = 2
 plane = "strain"
 lattice = { spacing = 1, lower = [0, 0], upper = [300, 300] }
+[sets]
+left = "x < 1"
 [family]
 horizon_ratio = 6.015
 [kinematics]
@@ -331,6 +333,9 @@ type = "baqp"
 type = "neo_hookean"
 shear_modulus = 1.0
 bulk_modulus = 2.0
+[[boundary]]
+set = "left"
+displacement = [0, 0]
 [[load]]
 set = "all"
 force = [0, 1]

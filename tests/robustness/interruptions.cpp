@@ -197,7 +197,7 @@ TEST_CASE("disk: a folder that may not be written is one clear error") {
 
 TEST_CASE("interruptions: a signal within a load step is heeded at once, and the run goes on to the same end") {
   std::string scene = load_steps("dynamic_relaxation", 2, "tolerance = 1e-9\nmax_iterations = 1000000");
-  scene = replaced(scene, "spacing = 1.0", "spacing = 0.1");   // seconds for a step
+  scene = replaced(scene, "spacing = 1.0", "spacing = 0.1");  // seconds for a step
   const Desk desk(replaced(scene, "horizon_ratio = 2.015", "horizon_ratio = 3.015"));
   const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
   const auto running = [&] { return fs::exists(desk.path("out/history.csv")) && lines(desk.text("out/history.csv")).size() > 1; };

@@ -25,6 +25,7 @@ const std::vector<Lie> lies{
     {"one_sided", "kinematics", {"kinematics: bitwise the same for one, two and three threads, and to rounding without savings"}},
     {"opposite_force", "kinematics", {"kinematics: force = -dE/du, tangent = dF/du, symmetric"}},
     {"company", "influence", {"influence: bitwise the same for one point, for many, and again"}},
+    {"healing", "damage", {"damage: 1 up to the onset, 0 beyond failure, never rising, bits where declared"}},
     {"forgetful", "integrator", {"integrator: a run that continues from a saved state is bitwise the run without a stop"}},
     {"first_order", "integrator", {"integrator: displacements and energy converge with the square of the time step"}},
     {"free_lunch", "integrator", {"integrator: a constant load gives a free body its momentum, and work is force times distance"}},

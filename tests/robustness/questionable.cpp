@@ -53,7 +53,7 @@ TEST_CASE("questionable: boundaries that contradict each other") {
     INFO(other);
     refused(with(other), "", "boundary.2: found a ");
     refused(with(other), "",
-            "in y at the end for the point at (0.5, 0.5, 0), which boundary.0 (line 30) gives a displacement of 0; allowed: the "
+            "for the point at (0.5, 0.5, 0), which boundary.0 (line 31) gives a displacement of 0; allowed: the "
             "same motion");
   }
 }

@@ -238,8 +238,8 @@ Accuracy Specimen::accuracy() {
 
 std::unique_ptr<Simulation> Specimen::shaken(double largest, double share, std::int64_t steps) const {
   const double step = share * 2 / std::sqrt(largest);
-  auto simulation =
-      make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}", static_cast<double>(steps) * step, step));
+  auto simulation = make(fmt::format("type = \"verlet\"\nend_time = {:.17g}\ntime_step = {:.17g}\nallow_unstable = true",
+                                     static_cast<double>(steps) * step, step));
   BodyProblem& problem = simulation->problem();
   contract::Noise random(5);
   contract::set_field(problem.body(), problem.state().velocity(), [&](const Point&) {

@@ -43,6 +43,11 @@ displacement = [0, 0]
 type = "newton"
 )";
 
+// Up to the value of interface.0.between.
+#define INTERFACE                                                                                                      \
+  "[[region]]\nset = \"left\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 1, bulk_modulus = 1 }\n[damage]\n" \
+  "type = \"critical_stretch\"\nstretch = 0.1\n[[interface]]\nbetween = "
+
 struct Case {
   int line;  // replaced, 0: text is appended
   const char* text;
@@ -161,6 +166,14 @@ const Case cases[]{
     {0, "[[crack]]\nsegment = [[0, 0], [1]]", 30, "crack.0.segment.1", "found a list of 1; allowed: a list of 2"},
     {0, "[[crack]]\nsegment = [[0, 0], [0, 0]]", 30, "crack.0.segment", "allowed: two different ends"},
     {0, "[[crack]]", 29, "crack.0", "found none of them; allowed: exactly 1 of segment, polygon"},
+    {0, INTERFACE "[\"left\", \"rset\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "did you mean 'rest'?"},
+    {0, INTERFACE "[\"left\", \"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "allowed: two different regions"},
+    {0, INTERFACE "[\"left\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 36, "interface.0.between",
+     "allowed: a list of strings (exactly 2)"},
+    {0, "[[interface]]\nbetween = [\"left\", \"rest\"]\ndamage = { type = \"critical_stretch\", stretch = 1 }", 29,
+     "interface.0.damage", "found in a scene without [damage]"},
     // initial, boundaries, loads
     {0, "[initial]\ndisplacement = [0]", 30, "initial.displacement", "found a list of 1; allowed: a list of 2"},
     {0, "[initial]\nvelocity = [0, \"free\"]", 30, "initial.velocity.1", "unknown name 'free'"},

@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -13,10 +14,14 @@ using namespace perikit;
 
 namespace {
 
-std::unique_ptr<Damage> make(const std::string& type, const std::string& table) {
+Registry& parts() {
   static Registry registry;
   if (registry.names(Kind::damage).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  return registry.damage(*parse_part(Kind::damage, type, table, registry));
+  return registry;
+}
+
+std::unique_ptr<Damage> make(const std::string& type, const std::string& table) {
+  return parts().damage(*parse_part(Kind::damage, type, table, parts()));
 }
 
 }  // namespace
@@ -53,4 +58,71 @@ TEST_CASE("smooth_degradation is continuous at both ends and one half in the mid
   CHECK(b[3] == doctest::Approx((std::tanh(3.0) + std::tanh(1.5)) / (2 * std::tanh(3.0))).epsilon(1e-12));
   CHECK_THROWS_WITH_AS(make("smooth_degradation", "stretch_min = 0.3\nstretch = 0.3"),
                        doctest::Contains("found 0.3; allowed: below stretch = 0.3"), InputError);
+}
+
+TEST_CASE("critical_energy: the bonds that cross a unit of area hold the energy release rate") {
+  DamagePoint x{{Space::solid, 1.0, 0.4, {2.0, 1.5}}, 0.3};
+  x.crossing = 5.0;
+  x.crossing_shares = 2.0;
+  const auto shared = make("critical_energy", "energy_release_rate = 0.03"),
+             equal = make("critical_energy", "energy_release_rate = 0.03\nlimit = \"equal\"");
+  CHECK(shared->limits(x).failure == doctest::Approx(0.015).epsilon(1e-14));
+  CHECK(equal->limits(x).failure == doctest::Approx(0.006).epsilon(1e-14));
+  alignas(64) double length[8] = {1, 1}, s[8] = {0.1, -0.1}, share[8] = {0.5, 0.5}, energy[8] = {0.01, 0.01}, value[8];
+  shared->measure({2, length, s, share, energy, nullptr, 8, value});
+  CHECK(value[0] == 0.02);
+  CHECK(value[1] == 0);  // shorter than at rest
+  equal->measure({2, length, s, share, energy, nullptr, 8, value});
+  CHECK(value[0] == 0.01);
+  x.crossing_shares = 0;
+  CHECK_THROWS_WITH_AS(shared->limits(x), doctest::Contains("allowed: one that gives a finite energy > 0"), std::domain_error);
+}
+
+TEST_CASE("max_stress: the largest principal stress of bonds in extension") {
+  const auto damage = make("max_stress", "strength = 2.0");
+  CHECK(damage->limits({}).failure == 2.0);
+  // Uniaxial, hydrostatic, simple shear; and diag(1, 2, 3) turned about (1, 1, 0).
+  alignas(64) double stress[48] = {}, s[8] = {0.1, 0.1, 0.1, 0.1, -0.1}, value[8];
+  const double a = std::sqrt(0.5), R[3][3] = {{0.75, 0.25, a * std::sin(std::numbers::pi / 3)},
+                                              {0.25, 0.75, -a * std::sin(std::numbers::pi / 3)},
+                                              {-a * std::sin(std::numbers::pi / 3), a * std::sin(std::numbers::pi / 3), 0.5}};
+  double turned[3][3] = {};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) turned[i][j] += (k + 1.0) * R[i][k] * R[j][k];
+  const double bonds[5][6] = {{3, 0, 0, 0, 0, 0},
+                              {-1, -1, -1, 0, 0, 0},
+                              {0, 0, 0, 0.7, 0, 0},
+                              {turned[0][0], turned[1][1], turned[2][2], turned[0][1], turned[0][2], turned[1][2]},
+                              {3, 0, 0, 0, 0, 0}};
+  for (std::size_t k = 0; k < 5; ++k)
+    for (std::size_t c = 0; c < 6; ++c) stress[8 * c + k] = bonds[k][c];
+  damage->measure({5, nullptr, s, nullptr, nullptr, stress, 8, value});
+  const double expected[] = {3, -1, 0.7, 3, 0};
+  for (int k = 0; k < 5; ++k) CHECK(value[k] == doctest::Approx(expected[k]).epsilon(1e-13));
+}
+
+TEST_CASE("[[interface]]: the criterion of [damage] with other numbers") {
+  const auto scene = [](const std::string& damage) {
+    return parse_scene(
+        "format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 1]\n"
+        "[sets]\nleft = \"x < 0.5\"\n[family]\nhorizon_ratio = 3\n[kinematics]\ntype = \"baqp\"\n"
+        "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.3\n"
+        "[[region]]\nset = \"left\"\nmaterial = { type = \"linear_elastic\", youngs_modulus = 2.0, poisson_ratio = 0.3 }\n"
+        "[damage]\ntype = \"critical_energy\"\nenergy_release_rate = 1.0\n[integrator]\ntype = \"newton\"\n"
+        "[[interface]]\nbetween = [\"rest\", \"left\"]\ndamage = " +
+            damage + "\n",
+        "scene.toml", parts());
+  };
+  const Scene read = scene("{ type = \"critical_energy\", energy_release_rate = 0.5 }");
+  REQUIRE(read.interfaces.size() == 1);
+  CHECK(read.interfaces[0].between == std::array<std::string, 2>{"rest", "left"});
+  CHECK(read.interfaces[0].damage->values.number("energy_release_rate") == 0.5);
+  const auto refused = [&](const std::string& damage, const char* reason) {
+    CHECK_THROWS_WITH_AS(scene(damage), doctest::Contains(reason), InputErrors);
+  };
+  refused("{ type = \"max_stress\", strength = 1.0 }",
+          "interface.0.damage: found \"max_stress\"; allowed: the criterion of [damage], \"critical_energy\"");
+  refused("{ type = \"critical_energy\", energy_release_rate = 0.5, limit = \"equal\" }",
+          "interface.0.damage.limit: found another value than in [damage]");
 }

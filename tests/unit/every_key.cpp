@@ -52,6 +52,9 @@ type = "critical_stretch"
 stretch = 0.1
 no_fail = ["left"]
 gradual = true
+[[interface]]
+between = ["left", "rest"]
+damage = { type = "critical_stretch", stretch = 0.05 }
 [[crack]]
 segment = [[0, 0], [1, 1]]
 [initial]
@@ -178,6 +181,10 @@ SceneDraft with_part(Kind kind, const PartDescription& part) {
   }
   const std::size_t begin = text.find(fmt::format("[{}]\n", slot.section)), end = text.find("\n[", begin);
   text.replace(begin, end - begin, fmt::format("[{}]\ntype = \"{}\"\n{}", slot.section, part.name, part.examples.front()));
+  if (kind == Kind::damage) {  // interfaces have the criterion of [damage]
+    const std::size_t first = text.find("[[interface]]"), last = text.find("\n[", first) + 1;
+    text.erase(first, last - first);
+  }
   return SceneDraft(text);
 }
 
@@ -208,6 +215,7 @@ TEST_CASE("every key of every section of a scene, spoilt in every way, is refuse
                                                     {"kinematics", "kinematics"},
                                                     {"region", "region.0"},
                                                     {"damage", "damage"},
+                                                    {"interface", "interface.0"},
                                                     {"crack", "crack.0"},
                                                     {"initial", "initial"},
                                                     {"boundary", "boundary.0"},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "perikit/output/recorder.hpp"
@@ -44,17 +45,18 @@ double end_of(const Scene& scene, bool quasi_static) {
   return quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
 }
 
-/// Whether two prescriptions say the same of a component at x: at the start, half-way and at the end.
-bool agree(const Prescription& a, const Prescription& b, const Point& x, double end) {
+/// The time at which two prescriptions do not say the same of a component at x, of the start, half-way and the end.
+std::optional<double> contradiction(const Prescription& a, const Prescription& b, const Point& x, double end) {
   if (a.velocity != b.velocity) {
     const Prescription &moves = a.velocity ? a : b, &stays = a.velocity ? b : a;
-    return !stays.value.varies() && !moves.value.varies() && moves.value(x, 0) == 0;
+    const bool still = !stays.value.varies() && !moves.value.varies() && moves.value(x, 0) == 0;
+    return still ? std::nullopt : std::optional(end);
   }
   for (const double t : {0.0, 0.5 * end, end}) {
     const double u = a.value(x, t), v = b.value(x, t);
-    if (std::abs(u - v) > 1e-12 * std::max(std::abs(u), std::abs(v))) return false;
+    if (std::abs(u - v) > 1e-12 * std::max(std::abs(u), std::abs(v))) return t;
   }
-  return true;
+  return std::nullopt;
 }
 
 /// Boundaries whose sets overlap must agree there.
@@ -71,13 +73,14 @@ void refuse_contradictions(const Scene& scene, const Body& body, const std::vect
       }
       const Prescription& before = prescriptions[static_cast<std::size_t>(other)];
       const Point x = body.position(static_cast<std::size_t>(p));
-      if (agree(before, prescriptions[k], x, end)) continue;
+      const std::optional<double> when = contradiction(before, prescriptions[k], x, end);
+      if (!when) continue;
       const std::size_t j = boundary_of[static_cast<std::size_t>(other)], own = boundary_of[k];
-      const auto what = [&](const Prescription& prescription) { return fmt::format("a {} of {:.6g}", prescription.velocity ? "velocity" : "displacement", prescription.value(x, end)); };
+      const auto what = [&](const Prescription& prescription) { return fmt::format("a {} of {:.6g}", prescription.velocity ? "velocity" : "displacement", prescription.value(x, *when)); };
       throw InputError(scene.boundaries[own].position, fmt::format("boundary.{}", own),
-                       fmt::format("found {} in {} at the end for the point at ({:.6g}, {:.6g}, {:.6g}), which boundary.{} (line {}) gives {}; allowed: the same motion, or sets that "
+                       fmt::format("found {} in {} at t = {:.4g} for the point at ({:.6g}, {:.6g}, {:.6g}), which boundary.{} (line {}) gives {}; allowed: the same motion, or sets that "
                                    "do not overlap",
-                                   what(prescriptions[k]), "xyz"[prescriptions[k].component], x[0], x[1], x[2], j, scene.boundaries[j].position.line, what(before)));
+                                   what(prescriptions[k]), "xyz"[prescriptions[k].component], *when, x[0], x[1], x[2], j, scene.boundaries[j].position.line, what(before)));
     }
 }
 

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "build/crossing_bonds.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/problem/ghosts.hpp"
@@ -14,6 +16,8 @@
 namespace perikit {
 
 namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// <xi> = int omega xi^d / int omega xi^(d-1) over (0, delta), by the midpoint rule.
 double mean_bond_length(const InfluenceFunction& influence, int dimension, double horizon) {
@@ -36,10 +40,18 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images, bool ranks) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
+  const std::string criterion = fmt::format("\"{}\"", scene.damage->type);
+  if (ranks && (traits.stress || traits.energy)) refuse(criterion + " on several ranks", "one rank, or criteria by stretch");
+  if (traits.stress && formulation.pairs)
+    refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
+           "kinematics with gradients, or criteria by stretch or energy");
+  if ((traits.stress || traits.energy) && images)
+    refuse(fmt::format("{} in a body with held faces, symmetry or periodic sides, whose images store no energy", criterion),
+           "criteria by stretch, or layers of points");
   if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
 }
 
@@ -61,6 +73,52 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
   return true;
 }
 
+/// Limits of the bonds between regions: those of the weaker material for the numbers of the interface.
+void build_interfaces(const Scene& scene, const PartFactory& factory, const TermParts& parts, DamagePoint at,
+                      const ImageMap* images, const Partition* partition, BodyDamage& damage) {
+  const Body& body = parts.families->body();
+  const InterfaceDescription& first = scene.interfaces.front();
+  const auto refuse = [](const InterfaceDescription& interface, const std::string& message) {
+    throw InputError(interface.damage->values.position(""), interface.damage->values.path(), message);
+  };
+  if (!damage.law->traits().bits)
+    refuse(first,
+           fmt::format("found with \"{}\", whose bonds weaken; allowed: criteria that break bonds at once", scene.damage->type));
+  if (images) refuse(first, "found in a body with held faces, symmetry or periodic sides; allowed: bodies without");
+  // Regions may overlap: the last one has a point, as it has its material. Side 0 is the rest.
+  const auto side_of = [&](const std::string& name) {
+    for (std::size_t r = scene.regions.size(); r-- > 0;)
+      if (scene.regions[r].set == name) return static_cast<std::uint16_t>(r + 1);
+    return std::uint16_t{0};
+  };
+  damage.side.assign(body.stride(), 0);
+  for (const RegionDescription& region : scene.regions)
+    for (const std::int32_t p : body.set(region.set)) damage.side[static_cast<std::size_t>(p)] = side_of(region.set);
+  if (partition) {
+    Field sides = body.make_field(1);
+    std::copy(damage.side.begin(), damage.side.end(), sides.data());
+    Ghosts(*partition, body, 1).forward(sides);
+    std::transform(sides.data(), sides.data() + sides.size(), damage.side.begin(), [](double side) { return static_cast<std::uint16_t>(side); });
+  }
+  for (const InterfaceDescription& interface : scene.interfaces) {
+    InterfaceDamage own{side_of(interface.between[0]), side_of(interface.between[1]), {infinite, infinite}};
+    const auto law = factory.damage(*interface.damage);
+    for (const std::int32_t index : body.owned()) {
+      const auto p = static_cast<std::size_t>(index);
+      if (damage.side[p] != own.a && damage.side[p] != own.b) continue;
+      at.moduli = parts.laws->moduli(p);
+      try {
+        const DamageLimits limits = law->limits(at);
+        own.limits = {std::min(own.limits.onset, limits.onset), std::min(own.limits.failure, limits.failure)};
+      } catch (const std::domain_error& error) {
+        refuse(interface, error.what());
+      }
+    }
+    for (double* limit : {&own.limits.onset, &own.limits.failure}) *limit = -communicator().largest(-*limit);
+    damage.interfaces.push_back(own);
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
@@ -69,7 +127,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation);
+  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr, partition != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
@@ -77,8 +135,13 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   if (gradually) damage->crack_speed = body.make_field(1);
   DamagePoint at{{body.space(), body.section(), body.horizon(), {}},
                  mean_bond_length(*parts.families->influence(), body.dimension(), body.horizon())};
+  if (!damage->by_stretch()) {
+    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation);
+    at.crossing = crossing.plain;
+    at.crossing_shares = crossing.shares;
+  }
   const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
-  StretchLimits limits;
+  DamageLimits limits;
   bool equal = true;
   for (std::size_t k = 0; k < body.owned().size(); ++k) {
     const auto p = static_cast<std::size_t>(body.owned()[k]);
@@ -95,9 +158,9 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     if (gradually) damage->crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
     equal = equal && limits.onset == limits.failure;
   }
+  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, partition, *damage);
   for (const std::string& set : scene.no_fail)
-    for (const std::int32_t p : body.set(set))
-      damage->onset.data()[p] = damage->failure.data()[p] = std::numeric_limits<double>::infinity();
+    for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
   if (images)
     for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
       if (field->size() > 0) images->copy_from_sources(*field);

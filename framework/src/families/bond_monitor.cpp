@@ -1,8 +1,26 @@
 #include "families/bond_monitor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace perikit {
+
+double bond_stretch(const Body& body, ConstFieldView u, BondId bond) noexcept {
+  const auto p = static_cast<std::size_t>(bond.point), q = static_cast<std::size_t>(bond.far);
+  const Point x = body.position(p), y = body.position(q);
+  double square = 0, change = 0;  // as in Stretch: e = (|y|^2 - |xi|^2)/(|y| + |xi|)
+  for (int c = 0; c < u.components; ++c) {
+    const double xi = y[static_cast<std::size_t>(c)] - x[static_cast<std::size_t>(c)], du = u.component(c)[q] - u.component(c)[p];
+    square += xi * xi;
+    change += du * (xi + xi + du);
+  }
+  const double length = std::sqrt(square);
+  return change / (std::sqrt(square + change) + length) / length;
+}
+
+void BondMonitor::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+  for (std::size_t k = 0; k < bonds.size(); ++k) values[k] = bond_stretch(body_, u, bonds[k]);
+}
 
 void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> cell_first) {
   groups_ = std::move(groups);
@@ -29,7 +47,7 @@ std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
       if (known ? !near_failure(groups_[g]) : !all_groups && (moved_[c] + offset_[g]) * (1 + 1e-9) < margin_[g]) continue;
       const double margin = check(groups_[g], u, found_[c]);
       ++checks_[c];
-      if (known) continue;   // margins of earlier checks hold on
+      if (known) continue;  // margins of earlier checks hold on
       margin_[g] = margin;
       offset_[g] = moved_[c];
     }
@@ -49,7 +67,8 @@ std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
 }
 
 std::size_t BondMonitor::bytes() const noexcept {
-  return reference_.bytes() + groups_.size() * (sizeof(Group) + 2 * sizeof(double)) + cells() * (3 * sizeof(std::size_t) + sizeof(found_[0]));
+  return reference_.bytes() + groups_.size() * (sizeof(Group) + 2 * sizeof(double)) +
+         cells() * (3 * sizeof(std::size_t) + sizeof(found_[0]));
 }
 
 }  // namespace perikit

@@ -1,5 +1,6 @@
 #pragma once
-/// Finds the bonds that fail without looking at all of them in every step, and yet at the very step where they fail.
+/// Finds the bonds that fail by their stretch without looking at all of them in every step, and yet at the very step where they
+/// fail.
 ///
 /// A group of eight points knows its margin: how much more the nearest of its bonds could take when it was last checked. A bound of what the
 /// bonds around it have changed since a reference displacement, now and at that check, tells when it must be looked at again:
@@ -12,6 +13,8 @@
 #include <span>
 #include <vector>
 
+#include "families/bond_finder.hpp"
+#include "families/cloud_rows.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/parallel.hpp"
 #include "families/cloud_rows.hpp"
@@ -27,16 +30,14 @@ struct NearestFailure {
   const AlignedVector<Row>* u = nullptr;   ///< displacement of that evaluation, point-major; null: unknown
 };
 
-class BondMonitor {
+class BondMonitor : public BondFinder {
  public:
-  virtual ~BondMonitor() = default;
-  /// Bonds whose integrity is lower at u than it is now, in a fixed order. To be called in every step.
-  std::vector<BondChange> find(ConstFieldView u);
-  /// Forgets all margins: bonds were restored.
-  void forget() noexcept { renew_ = true; }
-  std::size_t groups() const noexcept { return groups_.size(); }
-  std::size_t checked() const noexcept { return checked_; }
-  virtual std::size_t bytes() const noexcept;
+  std::vector<BondChange> find(ConstFieldView u) override;
+  void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) override;
+  void forget() noexcept override { renew_ = true; }
+  std::size_t groups() const noexcept override { return groups_.size(); }
+  std::size_t checked() const noexcept override { return checked_; }
+  std::size_t bytes() const noexcept override;
 
  protected:
   /// Points first ... first + 7, those of the mask.

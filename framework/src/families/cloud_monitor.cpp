@@ -127,7 +127,6 @@ bool CloudMonitor::near_failure(const Group& group) const noexcept {
 double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondChange>& changes) {
   constexpr std::int64_t at_once = 64;
   alignas(64) double square[at_once], difference[at_once], limit[at_once];
-  const double* onset = damage_.onset.data();
   const Pack none(std::numeric_limits<double>::infinity());
   Pack margin = none;
   for (int l = 0; l < static_cast<int>(padding); ++l) {
@@ -142,7 +141,7 @@ double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondC
         const Row xi = position_[j] - own_position, du = rows_[j] - own_u, squares = xi * xi, changes = du * (xi + xi + du);
         square[b] = squares[0] + squares[1] + squares[2];
         difference[b] = changes[0] + changes[1] + changes[2];
-        limit[b] = 0.5 * (onset[p] + onset[j]);
+        limit[b] = damage_.limits(static_cast<std::size_t>(p), static_cast<std::size_t>(j)).onset;
       }
       for (int b = 0; b < n; ++b)
         if (families_.b(static_cast<std::size_t>(k + b)) == 0) square[b] = 1, difference[b] = 0, limit[b] = std::numeric_limits<double>::infinity();
@@ -174,8 +173,8 @@ double CloudMonitor::check(const Group& group, ConstFieldView, std::vector<BondC
 bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, double onset, std::vector<BondChange>& changes) const {
   const auto k = static_cast<std::size_t>(bond);
   const std::int32_t j = lists_.neighbour[k];
-  const double* last = damage_.last().data();
-  alignas(64) double s[padding] = {stretch}, start[padding] = {onset}, failure[padding] = {0.5 * (last[p] + last[j])}, now[padding] = {};
+  alignas(64) double s[padding] = {stretch}, start[padding] = {onset}, now[padding] = {},
+                     failure[padding] = {damage_.limits(static_cast<std::size_t>(p), static_cast<std::size_t>(j)).failure};
   damage_.law->integrity({1, s, start, failure, now});
   if (now[0] < families_.b(k)) changes.push_back({{p, j}, now[0]});
   return std::min(now[0], families_.b(k)) > 0;

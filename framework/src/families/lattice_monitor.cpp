@@ -12,6 +12,12 @@ namespace perikit {
 
 namespace {
 
+/// Limits of bonds by those of their ends: BodyDamage::limits without interfaces.
+Pack weaker(Pack a, Pack b) noexcept {
+  const Pack most(std::numeric_limits<double>::max());
+  return select(max(a, b) > most, Pack(std::numeric_limits<double>::infinity()), min(a, b));
+}
+
 /// Checks eight points at once, offset by offset; each bond at the end from which it points forward. Margins are stretches.
 ///
 /// The ends of a bond of d cells are joined by a staircase of |d_1| + |d_2| + ... steps to next neighbours, so that they moved apart by
@@ -141,7 +147,6 @@ template <int D>
 double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vector<BondChange>& changes) {
   const LatticePattern& pattern = families_.pattern(families_.tiles.chunks[static_cast<std::size_t>(group.item)]);
   const double* onset = damage_.onset.data();
-  const double* last = damage_.last().data();
   const Pack never(std::numeric_limits<double>::infinity());
   double margin = std::numeric_limits<double>::infinity();
   for (int l = 0; l < chunk_points; l += pack_width) {
@@ -159,7 +164,12 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
         du[c] = Pack::load(u.component(c) + far) - own[c];
       }
       const Stretch<D> bond(xi, Pack(length_[s]), du);
-      Pack left = Pack(0.5) * (own_onset + Pack::load(onset + far)) - bond.e * Pack(1 / length_[s]);
+      Pack left = weaker(own_onset, Pack::load(onset + far)) - bond.e * Pack(1 / length_[s]);
+      if (!damage_.side.empty())
+        for (int k = 0; k < pack_width; ++k)
+          if (bits >> k & 1)
+            left.v[k] =
+                damage_.limits(static_cast<std::size_t>(p + k), static_cast<std::size_t>(far + k)).onset - bond.e[k] / length_[s];
       if (bits != (1u << pack_width) - 1) {
         for (int k = 0; k < pack_width; ++k)
           if (!(bits >> k & 1)) left.v[k] = never[k];
@@ -169,8 +179,10 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
         alignas(64) double stretch[chunk_points] = {}, limit[chunk_points] = {}, failure[chunk_points] = {}, b[chunk_points] = {};
         for (int k = 0; k < pack_width; ++k) {
           stretch[k] = bond.e[k] / length_[s];
-          limit[k] = 0.5 * (onset[p + k] + onset[far + k]);
-          failure[k] = 0.5 * (last[p + k] + last[far + k]);
+          if (!(bits >> k & 1)) continue;
+          const DamageLimits limits = damage_.limits(static_cast<std::size_t>(p + k), static_cast<std::size_t>(far + k));
+          limit[k] = limits.onset;
+          failure[k] = limits.failure;
         }
         damage_.law->integrity({pack_width, stretch, limit, failure, b});
         // Bonds between whole and broken keep their margin: they are looked at every time.

@@ -48,6 +48,12 @@ struct LatticeTiles {
   bool owns(std::size_t b) const noexcept { return own_[b]; }
   /// Whether a point of block b moves.
   bool moves(std::size_t b, ConstFieldView u) const noexcept;
+  /// Whether a group of block b is marked.
+  bool marked(std::size_t b, const std::uint8_t* marks) const noexcept {
+    for (std::size_t c = blocks[b].chunk_begin; c < blocks[b].chunk_end; ++c)
+      if (marks[chunks[c].first / chunk_points]) return true;
+    return false;
+  }
   /// Zero in the rows of block b; in the dead cells of all rows.
   void clear(std::size_t b, FieldView out) const noexcept;
   void clear_dead(FieldView out) const noexcept;

@@ -27,6 +27,29 @@ std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) co
   return all;
 }
 
+void SharedBonds::find_here() const {
+  if (!here_.empty()) return;
+  here_.assign(body_.places().stride, -1);
+  for (const std::int32_t p : body_.internal())
+    here_[static_cast<std::size_t>(body_.places().place[static_cast<std::size_t>(p)])] = p;
+}
+
+void SharedBonds::mark(GroupMarks& marks) const {
+  if (!part()) return;
+  std::vector<std::int32_t> mine;
+  for (const std::int32_t p : body_.owned())
+    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
+  std::vector<std::byte> bytes;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine))))
+    bytes.insert(bytes.end(), of_rank.begin(), of_rank.end());
+  communicator().broadcast(bytes);
+  std::vector<std::int32_t> all(bytes.size() / sizeof(std::int32_t));
+  if (!bytes.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
+  find_here();
+  for (const std::int32_t place : all)
+    if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
+}
+
 std::vector<BondChange> SharedBonds::outward(std::span<const BondChange> changes) const {
   if (!part()) return {changes.begin(), changes.end()};
   std::vector<BondChange> own;
@@ -37,11 +60,7 @@ std::vector<BondChange> SharedBonds::outward(std::span<const BondChange> changes
 
 std::vector<BondChange> SharedBonds::inward(std::span<const BondChange> changes) const {
   if (!part()) return {changes.begin(), changes.end()};
-  if (here_.empty()) {
-    here_.assign(body_.places().stride, -1);
-    for (const std::int32_t p : body_.internal())
-      here_[static_cast<std::size_t>(body_.places().place[static_cast<std::size_t>(p)])] = p;
-  }
+  find_here();
   std::vector<BondChange> in;
   for (const auto& [bond, integrity] : changes) {
     const BondId own{here_[static_cast<std::size_t>(bond.point)], here_[static_cast<std::size_t>(bond.far)]};

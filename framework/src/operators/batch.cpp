@@ -1,8 +1,11 @@
 #include "operators/batch.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
+#include "operators/batch.hpp"
+#include "operators/bond_samples.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -48,7 +51,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   batch.H = s.H;
   batch.confined = !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain);
   batch.points = points;
-  if (energy_ || work_ == Work::sample) batch.psi = s.psi;
+  if (energy_ || screen_ || work_ == Work::sample) batch.psi = s.psi;
   batch.P = P;
   if (dP) batch.dH = s.dH;
   batch.dP = dP;
@@ -56,6 +59,8 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   if (history_) batch.state = begin_state(n, s, numbers);
   const int bad = laws_.evaluate(batch, s.law).inadmissible;
   if (history_ && bad < 0) end_state(n, s, numbers);
+  if (screen_)
+    for (int l = 0; l < n; ++l) s.highest[l] = std::max(s.highest[l], s.psi[l]);
   return bad;
 }
 
@@ -150,6 +155,7 @@ int BatchWork::balance_pass(int n, BatchScratch& s, bool both_ends) const noexce
 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
   if (balance_) return balance_pass(n, s, both_ends);
+  if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
   if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy);
@@ -176,33 +182,79 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
   return bad;
 }
 
+namespace {
+
+/// F and P of a lane as tensors of three dimensions; its determinant.
+double full_tensors(Space space, const BatchScratch& s, int l, double (&F)[3][3], double (&P)[3][3]) noexcept {
+  const int d = dimension(space), components = tensor_components(space);
+  const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      const bool held = a < d && b < d;
+      F[a][b] = (a == b ? 1.0 : 0.0) + (held ? s.H[(a * d + b) * batch_points + l] : 0.0);
+      P[a][b] = held ? s.P[(a * d + b) * batch_points + l] : 0.0;
+    }
+  for (int c = d * d; c < components; ++c) {
+    const int axis = d + c - d * d;
+    F[axis][axis] += stress_space ? s.lateral[l] : s.H[c * batch_points + l];
+    P[axis][axis] = s.P[c * batch_points + l];
+  }
+  return F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) - F[0][1] * (F[1][0] * F[2][2] - F[1][2] * F[2][0]) +
+         F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
+}
+
+void cauchy_of(const double (&F)[3][3], const double (&P)[3][3], double J, double (&sigma)[3][3]) noexcept {
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      sigma[a][b] = 0;
+      for (int k = 0; k < 3; ++k) sigma[a][b] += P[a][k] * F[b][k] / J;
+    }
+}
+
+}  // namespace
+
+void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)[3][3]) noexcept {
+  double F[3][3], P[3][3];
+  const double J = full_tensors(space, s, lane, F, P);
+  cauchy_of(F, P, J, sigma);
+}
+
+void Pass::add_samples(int n, const BatchScratch& s) {
+  if (bonds)
+    bonds->add(n, s);
+  else
+    work.add_samples(n, s, *sums);
+}
+
+void BatchWork::screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept {
+  if (!screen_) return;
+  constexpr auto group = static_cast<int>(padding);
+  const double* limit = screen_->density.data() + first_point;
+  bool near = false;
+  for (int l = 0; l < lanes; ++l) near |= s.highest[first_lane + l] > limit[l % group];
+  if (near) screen_->near[static_cast<std::size_t>(first_point) / padding] = 1;
+}
+
+void BatchWork::screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept {
+  if (!screen_) return;
+  for (int l = 0; l < lanes; ++l) {
+    if (count > 1 && l % 8 >= count) continue;
+    const auto p = static_cast<std::size_t>(points[count > 1 ? l % 8 : 0]);
+    if (s.highest[l] > screen_->density[p]) std::atomic_ref(screen_->near[p / padding]).store(1, std::memory_order_relaxed);
+  }
+}
+
 void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept {
   const Space space = laws_.space();
   const int d = dimension(space), components = tensor_components(space);
-  const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
   for (int l = 0; l < n; ++l) {
     const double w = s.weight[l];
     const auto p = static_cast<std::size_t>(s.owner[l]);
     if (w == 0) continue;
-    double F[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, P[3][3] = {};
-    for (int a = 0; a < d; ++a)
-      for (int b = 0; b < d; ++b) {
-        F[a][b] += s.H[(a * d + b) * batch_points + l];
-        P[a][b] = s.P[(a * d + b) * batch_points + l];
-      }
-    for (int c = d * d; c < components; ++c) {
-      const int axis = d + c - d * d;
-      F[axis][axis] += stress_space ? s.lateral[l] : s.H[c * batch_points + l];
-      P[axis][axis] = s.P[c * batch_points + l];
-    }
-    const double J = F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) - F[0][1] * (F[1][0] * F[2][2] - F[1][2] * F[2][0]) +
-                     F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
-    double sigma[3][3] = {};
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        for (int k = 0; k < 3; ++k) sigma[a][b] += P[a][k] * F[b][k] / J;
-        sums.cauchy[static_cast<std::size_t>(3 * a + b) * sums.stride + p] += w * sigma[a][b];
-      }
+    double F[3][3], P[3][3], sigma[3][3];
+    const double J = full_tensors(space, s, l, F, P);
+    cauchy_of(F, P, J, sigma);
+    for (int c = 0; c < 9; ++c) sums.cauchy[static_cast<std::size_t>(c) * sums.stride + p] += w * sigma[c / 3][c % 3];
     const double xy = sigma[0][1] * sigma[0][1] + sigma[1][2] * sigma[1][2] + sigma[0][2] * sigma[0][2];
     const double dx = sigma[0][0] - sigma[1][1], dy = sigma[1][1] - sigma[2][2], dz = sigma[2][2] - sigma[0][0];
     sums.von_mises[p] += w * std::sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + 3 * xy);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "maps/selective_map.hpp"
+#include "operators/bond_screen.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/operators/law_history.hpp"
 #include "perikit/operators/laws.hpp"
@@ -35,6 +36,7 @@ struct BatchScratch {
   alignas(64) double P[9 * batch_points];        ///< result: weighted stress
   alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
   alignas(64) double psi[batch_points];
+  alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
   alignas(64) double A[9 * batch_points];
   alignas(64) double dA[9 * batch_points];
@@ -89,14 +91,26 @@ class ScratchPool {
   std::vector<std::unique_ptr<BatchScratch>> scratch_;
 };
 
+/// Cauchy stress of a lane after an evaluation with Work::sample.
+void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)[3][3]) noexcept;
+
+class BondSamples;
+
 class BatchWork {
  public:
   /// history: null where no law has one.
-  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr)
-      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance) {}
+  /// screen: null where bonds are not screened.
+  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr,
+            BondScreen* screen = nullptr)
+      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance), screen_(screen) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
+  /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
+  /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
+  void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
+  /// The same where the first `lanes` lanes belong to `count` points in turn, every eighth to the same one. From any thread.
+  void screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept;
   /// Whether the numbers of lanes are asked for.
   bool history() const noexcept { return history_ != nullptr; }
   /// What is done in place of laws; null: laws are.
@@ -127,6 +141,7 @@ class BatchWork {
   bool selective_;
   LawHistory* history_;
   const Balance* balance_;
+  BondScreen* screen_;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.
@@ -141,7 +156,14 @@ struct Pass {
   /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
+  /// By group of eight points: forces of the evaluation points alone that belong to the blocks of these, the same whatever is
+  /// quiet.
+  const std::uint8_t* nearby = nullptr;
+  BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
 
+  /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
+  /// points.
+  void add_samples(int n, const BatchScratch& s);
   /// Evaluation points are taken one by one and nothing is scattered.
   bool alone() const noexcept { return only || work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.

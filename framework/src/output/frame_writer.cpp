@@ -108,7 +108,11 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
   write_run_attributes(self.results, self.run);
   self.results.external_link("/reference", "reference.h5");
   self.results.group("/frames");
-  for (; self.frames < first_frame; ++self.frames) self.list_existing(self.frames);
+  // What stands in the file depends on when it is flushed: frame by frame, as it was the first time.
+  for (self.results.bytes(); self.frames < first_frame; ++self.frames) {
+    self.list_existing(self.frames);
+    self.results.bytes();
+  }
   // The lists lose the later frames before the files go, so that nothing ever names a missing file.
   self.store_sidecar();
   store_atomically(self.folder / "reference.h5", reference_image(reference, self.run).bytes());

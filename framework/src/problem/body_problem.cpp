@@ -8,7 +8,7 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "perikit/problem/motion.hpp"
+#include "perikit/problem/body_problem.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
@@ -175,17 +175,47 @@ bool BodyProblem::constant_stiffness() const noexcept {
   return terms().has_gradients() && laws().constant_tangent() && !parts_.fracture.damage();
 }
 
-bool BodyProblem::advance(double time_step, ConstFieldView velocity) {
+bool BodyProblem::advance(double time_step, FieldView velocity) {
   if (terms().history()) terms().history()->advance();
   if (!parts_.fracture.damage()) return false;
-  const Motion half_step = [&](FieldView end) {
-    middle_of_next_step(*this, time_step, velocity, end);
-    if (ghosts_) ghosts_->forward(end);
-    if (images()) images()->extend(end);
+  const ConstFieldView u = state().displacement();
+  const StepBegin begin = [&](FieldView before) {
+    for (std::size_t k = 0; k < before.size(); ++k) before.data[k] = u.data[k] - time_step * velocity.data[k];
+    if (ghosts_) ghosts_->forward(before);
+    if (images()) images()->extend(before);
   };
-  const bool changed = parts_.fracture.update(terms(), seen(state().displacement(), seen_), state(), time_step, velocity.data ? half_step : Motion());
+  const bool explicit_step = velocity.data != nullptr;
+  BondReaction reaction;
+  const bool changed =
+      parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
+  if (changed && explicit_step) react(reaction, velocity);
   if (changed && weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
   return changed;
+}
+
+/// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
+/// the impulse upon it; its work is that of all other forces, with the opposite sign.
+void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
+  EvaluationStatus status;
+  const FieldView impulse = reaction.impulse, drift = reaction.drift;
+  finish(impulse, status);
+  finish(drift, status);
+  const FieldView u = state().displacement();
+  const std::span<const double> by_point = masses().by_point();
+  const ConstFieldView free = constraints().free();
+  ExactSum held;
+  for (std::size_t k = 0; k < velocity.size(); ++k) {
+    const double mass = by_point[k % velocity.stride];
+    if (free.data[k] != 0 && mass > 0) {
+      velocity.data[k] += impulse.data[k] / mass;
+      u.data[k] += drift.data[k] / mass;
+    } else {
+      held.add(impulse.data[k] * velocity.data[k]);
+    }
+  }
+  state().energies.external_work -= total_over_ranks(held);
+  status = evaluate_forces(u, state().internal_force(), &state().energies.strain);
+  if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {

@@ -6,8 +6,9 @@
 
 namespace perikit {
 
-bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const Motion& motion) {
-  const BondUpdate update = terms.update_bonds(u, time_step, motion);
+bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
+                            BondReaction* reaction) {
+  const BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.released;
   if (update.dissipated < 0) {
@@ -48,7 +49,7 @@ void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
 }
 
 void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
-  in.value<std::int64_t>();   // updates that gained energy, and what they gained
+  in.value<std::int64_t>();  // updates that gained energy, and what they gained
   in.value<double>();
   for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
     BondChange b;

@@ -45,18 +45,6 @@ Field reactions(Problem& problem, bool dynamic, double t) {
   return r;
 }
 
-void middle_of_next_step(Problem& problem, double time_step, ConstFieldView velocity, FieldView end) {
-  const std::span<const double> masses = problem.masses().by_point();
-  const ConstFieldView free = problem.constraints().free(), u = problem.state().displacement(),
-                       internal = problem.state().internal_force(),
-                       external = problem.loads().any() ? ConstFieldView(problem.state().external_force()) : ConstFieldView();
-  for (std::size_t k = 0; k < end.size(); ++k) {
-    const double m = masses[k % end.stride], force = internal.data[k] + (external.data ? external.data[k] : 0.0);
-    const double next = velocity.data[k] + (m > 0 ? free.data[k] * time_step * force / m : 0.0);
-    end.data[k] = u.data[k] + 0.5 * time_step * next;
-  }
-}
-
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
   const int d = body.dimension();
   Point middle{};

@@ -167,6 +167,59 @@ void SceneReader::read_regions(const toml::table& root) {
   }
 }
 
+void SceneReader::read_interfaces(const toml::table& root) {
+  const ParameterTable table = interface_parameters();
+  std::vector<std::string> regions{"rest"};
+  for (const RegionDescription& region : scene_.regions) regions.push_back(region.set);
+  for (const toml::table* interface : sections(root, "interface", "interface")) {
+    const std::string path = fmt::format("interface.{}", scene_.interfaces.size());
+    const ParameterValues values = reader_.read(*interface, table, path);
+    writer_.header("interface", true);
+    writer_.lines(table, values);
+    InterfaceDescription description;
+    description.position = values.position("between");
+    if (values.has("damage")) description.damage = values.shared_part("damage");
+    const auto refuse = [&](const SourcePosition& at, const std::string& key, const std::string& message) {
+      reader_.errors.add(at, join_path(path, key), message);
+    };
+    if (values.has("between")) {
+      const std::vector<std::string>& names = values.texts("between");
+      std::copy_n(names.begin(), 2, description.between.begin());
+      for (const std::string& name : names)
+        if (std::find(regions.begin(), regions.end(), name) == regions.end())
+          refuse(description.position, "between",
+                 fmt::format("found {}; allowed: sets of [[region]], and \"rest\" for what belongs to none: {}{}",
+                             toml_string(name), fmt::join(regions, ", "), did_you_mean(name, regions)));
+      if (names[0] == names[1])
+        refuse(description.position, "between",
+               fmt::format("found {} twice; allowed: two different regions", toml_string(names[0])));
+      for (const InterfaceDescription& other : scene_.interfaces)
+        if (std::is_permutation(names.begin(), names.end(), other.between.begin()))
+          refuse(description.position, "between",
+                 fmt::format("found {} and {} again; allowed: each pair of regions once", toml_string(names[0]),
+                             toml_string(names[1])));
+    }
+    if (!scene_.damage) {
+      refuse(reader_.position(*interface), "damage", "found in a scene without [damage]; allowed: beside [damage]");
+    } else if (description.damage) {
+      const ParameterValues &own = description.damage->values, &all = scene_.damage->values;
+      if (description.damage->type != scene_.damage->type)
+        refuse(values.position("damage"), "damage",
+               fmt::format("found \"{}\"; allowed: the criterion of [damage], \"{}\"", description.damage->type,
+                           scene_.damage->type));
+      else
+        for (const std::string& key : own.keys()) {
+          const ParameterValue* value = own.find(key);
+          const ParameterValue* of_body = all.find(key);
+          if (std::holds_alternative<double>(*value) || (of_body && *of_body == *value)) continue;
+          refuse(own.position(key), "damage." + key,
+                 "found another value than in [damage]; allowed: that one. Only numbers differ at interfaces");
+        }
+    }
+    scene_.interfaces.push_back(std::move(description));
+  }
+}
+
 void SceneReader::read_cracks(const toml::table& root) {
   const ParameterTable table = crack_parameters();
   for (const toml::table* crack : sections(root, "crack", "crack")) {

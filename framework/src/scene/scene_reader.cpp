@@ -14,9 +14,9 @@ namespace perikit {
 
 namespace {
 
-const std::vector<std::string> section_names{"constants", "body",   "sets",       "family", "kinematics",
-                                             "material",  "region", "damage",     "crack",  "initial",
-                                             "boundary",  "symmetry", "periodic", "load", "integrator", "output", "run"};
+const std::vector<std::string> section_names{"constants", "body",     "sets",      "family",     "kinematics", "material",
+                                             "region",    "damage",   "interface", "crack",      "initial",    "boundary",
+                                             "symmetry",  "periodic", "load",      "integrator", "output",     "run"};
 
 bool identifier(std::string_view name) {
   return !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
@@ -39,6 +39,7 @@ void SceneReader::read(toml::table& root) {
   read_family(root);
   read_parts(root);
   read_regions(root);
+  read_interfaces(root);
   read_cracks(root);
   read_initial(root);
   read_boundaries(root);

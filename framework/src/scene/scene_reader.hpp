@@ -30,6 +30,7 @@ class SceneReader {
   void read_family(const toml::table& root);
   void read_parts(const toml::table& root);
   void read_regions(const toml::table& root);
+  void read_interfaces(const toml::table& root);
   void read_cracks(const toml::table& root);
   void read_initial(const toml::table& root);
   void read_boundaries(const toml::table& root);

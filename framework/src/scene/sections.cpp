@@ -113,6 +113,17 @@ ParameterTable region_parameters() {
   return table;
 }
 
+ParameterTable interface_parameters() {
+  ParameterTable table;
+  table
+      .add(ParameterType::texts, "between", "-",
+           "The two regions, by the names of their sets; \"rest\": what belongs to no region.")
+      .require()
+      .length(2, 2);
+  table.part("damage", Kind::damage, "Limits of the bonds between them: the criterion of [damage] with other numbers.").require();
+  return table;
+}
+
 ParameterTable crack_parameters() {
   ParameterTable table;
   table.add(ParameterType::points, "segment", "m", "2D: the two ends of the crack.").length(2, 2).one_per_axis();
@@ -255,6 +266,7 @@ const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
                                                                {"kinematics", common_part_parameters(Kind::kinematics)},
                                                                {"region", region_parameters()},
                                                                {"damage", common_part_parameters(Kind::damage)},
+                                                               {"interface", interface_parameters()},
                                                                {"crack", crack_parameters()},
                                                                {"initial", initial_parameters()},
                                                                {"boundary", boundary_parameters()},

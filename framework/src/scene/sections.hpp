@@ -13,6 +13,7 @@ ParameterTable points_parameters();
 ParameterTable set_parameters();
 ParameterTable family_parameters();
 ParameterTable region_parameters();
+ParameterTable interface_parameters();
 ParameterTable crack_parameters();
 ParameterTable initial_parameters();
 ParameterTable boundary_parameters();

@@ -25,6 +25,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
   const BlockReach reach = cloud_reach(families_.lists(), points_);
   colouring_ = cloud_colouring(families_.body(), reach);
   quiet_ = parts.quiet_blocks(reach);
+  local_ = parts.local_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
@@ -152,7 +153,9 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     if (pass.work.history()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
-    if (pass.work.work() == Work::sample) pass.work.add_samples(n, s, *pass.sums);
+    const auto owner = static_cast<std::int32_t>(p);
+    pass.work.screen(&owner, 1, selective_ && both_ends ? 2 * lanes : n, s);
+    if (pass.work.work() == Work::sample) pass.add_samples(n, s);
     if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;
     bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
@@ -263,23 +266,26 @@ void CloudBonds<D>::run(Pass& pass) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
   }
-  if (pass.everywhere())
+  if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
+  if (pass.nearby || pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  const auto awake = [&](auto&& block) {
-    return [&](std::size_t b) {
-      if (quiet_.awake(b, 2)) block(b);
+  // The stress on Hbar reaches one family beyond the bonds, its divergence two; what they read is cleared up to three.
+  const auto works = [&](std::size_t b, int k) { return pass.nearby ? near(b, k) : quiet_.awake(b, 2); };
+  const auto awake = [&](int k, auto&& block) {
+    return [&, k](std::size_t b) {
+      if (works(b, k)) block(b);
     };
   };
   parallel_for(blocks(), [&](std::size_t b) {
-    if (quiet_.begins(b)) gradients(b, pass);
+    if (pass.nearby ? near(b, 3) : quiet_.begins(b)) gradients(b, pass);
   });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
-  colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
-  if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, tangent); }));
+  colouring_.for_each(awake(0, [&](std::size_t b) { bonds(b, pass); }));
+  if (selective_) parallel_for(blocks(), awake(1, [&](std::size_t b) { pressures(b, tangent); }));
   auto stress_on_points = [&](std::size_t b) {
-    if (!quiet_.awake(b, 2)) return;
+    if (!works(b, 1)) return;
     over_points(b, [&](std::size_t p) {
       if (gradient_of_.stored()) return gradient_of_.scatter(p, &flux_[D * p], force_);
       if (gradient_of_.shifted()) std::copy_n(&flux_[D * p], D, &stress_[D * p]);
@@ -290,7 +296,8 @@ void CloudBonds<D>::run(Pass& pass) {
   else parallel_for(blocks(), stress_on_points);
   if (pass.bad >= 0) return;
   parallel_for(blocks(), [&](std::size_t b) {
-    const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
+    if (pass.nearby && !near(b, 2)) return;
+    const bool gather = !gradient_of_.stored() && (pass.nearby || quiet_.awake(b, last));
     over_points(b, [&](std::size_t p) {
       Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
       if (gather && gradient_of_.shifted()) f = gradient_of_.shifted_divergence(p, stress_, f);

@@ -6,9 +6,16 @@ namespace perikit {
 
 template <int D>
 CloudPoints<D>::CloudPoints(const SpaceParts& parts)
-    : families_(*parts.families.cloud()), laws_(parts.laws), points_(families_.body().points()),
-      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), gradient_(families_), u_(points_), flux_(D * points_) {
-  quiet_ = parts.quiet_blocks(cloud_reach(families_.lists(), points_));
+    : families_(*parts.families.cloud()),
+      laws_(parts.laws),
+      points_(families_.body().points()),
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
+      gradient_(families_),
+      u_(points_),
+      flux_(D * points_) {
+  const BlockReach reach = cloud_reach(families_.lists(), points_);
+  quiet_ = parts.quiet_blocks(reach);
+  local_ = parts.local_blocks(reach);
 }
 
 template <int D>
@@ -25,7 +32,10 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
   for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
-    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding, [](std::uint8_t m) { return m != 0; })) continue;
+    if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding,
+                                  [](std::uint8_t m) { return m != 0; }))
+      continue;
+    std::fill_n(s.far, lanes, -1);
     for (int l = 0; l < lanes; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       if (l >= n || !pass.wanted(static_cast<std::int64_t>(p))) {
@@ -42,9 +52,11 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     s.first_number = static_cast<std::int64_t>(first);
     const int bad = pass.work.evaluate(n, s, false, &energy);
     if (bad >= 0) return pass.report(static_cast<std::int64_t>(first) + bad);
+    for (int l = 0; l < lanes; l += static_cast<int>(padding))
+      pass.work.screen(static_cast<std::int64_t>(first) + l, l, static_cast<int>(padding), s);
     if (pass.work.work() == Work::sample) {
-      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);   // a lone point shows its own values
-      pass.work.add_samples(n, s, *pass.sums);
+      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);  // a lone point shows its own values
+      pass.add_samples(n, s);
       continue;
     }
     for (int l = 0; l < n && !pass.only; ++l) {
@@ -66,12 +78,17 @@ void CloudPoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   mirror_rows(pass.u, points_, u_);
   if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
-  if (pass.alone() || pass.work.tangent()) quiet_.wake();
-  else quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) block(b, pass); });
+  if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
+  if (pass.alone() || pass.nearby || pass.work.tangent())
+    quiet_.wake();
+  else
+    quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  parallel_for(blocks(), [&](std::size_t b) {
+    if (pass.nearby ? near(b, 2) : quiet_.begins(b)) block(b, pass);
+  });
   if (pass.bad >= 0 || pass.alone()) return;
   parallel_for(blocks(), [&](std::size_t b) {
-    if (!quiet_.awake(b, 2)) return;
+    if (pass.nearby ? !near(b, 1) : !quiet_.awake(b, 2)) return;
     for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
       Row f = gradient_.divergence(p, flux_);
       if (gradient_.shifted()) f = gradient_.shifted_divergence(p, stress_, f);

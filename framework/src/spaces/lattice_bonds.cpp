@@ -33,6 +33,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       operator_(families_),
       slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
+  local_ = parts.local_blocks(tiles_.reach);
   const Body& body = families_.body();
   if (formulation_.order > 1) stencils_.emplace(families_, formulation_.order);
   flux_ = body.make_field(D * D);
@@ -204,8 +205,9 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   if (pass.work.history()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
   const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
+  pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
   if (sample) {
-    pass.work.add_samples(lanes, s, *pass.sums);
+    pass.add_samples(lanes, s);
     return -1;
   }
   if (pass.only) return -1;
@@ -250,7 +252,7 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeBonds<D>::divergence(Pass& pass, int number) const {
   tiles_.colouring.for_each([&](std::size_t b) {
-    if (!quiet_.awake(b, number)) return;
+    if (pass.nearby ? !near(b, 2) : !quiet_.awake(b, number)) return;
     const LatticeBlock& block = tiles_.blocks[b];
     for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
     if (stencils_) return;
@@ -265,13 +267,23 @@ void LatticeBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
   constexpr int last = 3;
   if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
-  if (pass.alone() || pass.work.tangent()) quiet_.wake();
-  else quiet_.look(last, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
-  const auto awake = [&](auto&& block) { return [&](std::size_t b) { if (quiet_.awake(b, 2)) block(b); }; };
-  parallel_for(blocks(), [&](std::size_t b) { if (quiet_.begins(b)) gradients(b, pass); });
+  if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
+  if (pass.alone() || pass.nearby || pass.work.tangent())
+    quiet_.wake();
+  else
+    quiet_.look(last, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+  // The stress on Hbar reaches one family beyond the bonds, its divergence two; what they read is cleared up to three.
+  const auto awake = [&](int k, auto&& block) {
+    return [&, k](std::size_t b) {
+      if (pass.nearby ? near(b, k) : quiet_.awake(b, 2)) block(b);
+    };
+  };
+  parallel_for(blocks(), [&](std::size_t b) {
+    if (pass.nearby ? near(b, 3) : quiet_.begins(b)) gradients(b, pass);
+  });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
-  tiles_.colouring.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
-  parallel_for(blocks(), awake([&](std::size_t b) { finish_stress(b, pass); }));
+  tiles_.colouring.for_each(awake(0, [&](std::size_t b) { bonds(b, pass); }));
+  parallel_for(blocks(), awake(1, [&](std::size_t b) { finish_stress(b, pass); }));
   if (pass.bad < 0) divergence(pass, last);
   tiles_.clear_dead(pass.out);
 }

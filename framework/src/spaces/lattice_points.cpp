@@ -19,6 +19,7 @@ template <int D>
 LatticePoints<D>::LatticePoints(const SpaceParts& parts)
     : families_(*parts.families.lattice()), tiles_(families_.tiles), laws_(parts.laws), operator_(families_) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
+  local_ = parts.local_blocks(tiles_.reach);
   gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.slots.row_reach)));
   for (const LatticeRow& row : tiles_.rows) most_ = std::max(most_, static_cast<std::int64_t>(rows_at_once(row)) * width(row));
 }
@@ -30,7 +31,10 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
     const int lane = i * chunk_points;
     std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
     if (!laws_.single() || pass.alone()) {
-      for (int l = 0; l < chunk_points; ++l) s.owner[lane + l] = chunk(index[i]).first + l;
+      for (int l = 0; l < chunk_points; ++l) {
+        s.owner[lane + l] = chunk(index[i]).first + l;
+        s.far[lane + l] = -1;
+      }
     }
   }
   if (pass.work.history()) {
@@ -39,6 +43,7 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
   }
   const int bad = pass.work.evaluate(n * chunk_points, s, false, energy);
   if (bad >= 0) pass.report(chunk(index[bad / chunk_points]).first + bad % chunk_points);
+  for (int i = 0; i < n && s.keep_history; ++i) pass.work.screen(chunk(index[i]).first, i * chunk_points, chunk_points, s);
   return bad < 0;
 }
 
@@ -63,7 +68,7 @@ void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
         const LatticePattern& pattern = families_.pattern(chunk(index[l / chunk_points]));
         if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
       }
-      pass.work.add_samples(n * chunk_points, s, *pass.sums);
+      pass.add_samples(n * chunk_points, s);
     }
     n = 0;
   }
@@ -158,14 +163,17 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
 template <int D>
 void LatticePoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_);
-  if (pass.alone() || pass.work.tangent()) quiet_.wake();
-  else quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+  if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
+  if (pass.alone() || pass.nearby || pass.work.tangent())
+    quiet_.wake();
+  else
+    quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { one_by_one(b, pass); });
   rows_.resize(static_cast<std::size_t>(thread_count()));
   for (Rows& r : rows_)
     if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
   tiles_.colouring.for_each([&](std::size_t b) {
-    if (quiet_.awake(b, 1)) by_rows(b, pass);
+    if (pass.nearby ? near(b, 1) : quiet_.awake(b, 1)) by_rows(b, pass);
   });
   tiles_.clear_dead(pass.out);
 }

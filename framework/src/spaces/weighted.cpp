@@ -135,12 +135,14 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
       const int k = first + l - owners_, original = k < 0 || m.original.empty() ? k : m.original[static_cast<std::size_t>(k)];
       s.weight[l] = volume * stencil.share(first + l) * factor(p, original);
       s.number[l] = k < 0 ? -1 : number + 8 * original;
+      if (sample) s.far[l] = k < 0 || parts_ > 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
     if (pass.work.balance() && alone)
       for (int l = std::max(0, owners_ - first); l < n; ++l)
         pass.work.balance()->factors[factor_of(p, first + l - owners_)] = s.psi[l];
-    if (sample) pass.work.add_samples(n, s, *pass.sums);
+    pass.work.screen(&p, 1, n, s);
+    if (sample) pass.add_samples(n, s);
     if (alone) continue;
     if (selective_) add_pressures(n, 1, s, tangent, m);
     stencil.add_stress(first, n, s.P, batch_points);
@@ -210,12 +212,14 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
           s.owner[lane] = members[l];
           s.weight[lane] = lane_weight[l] * stencil.share(end->element[i]);
           s.number[lane] = k < 0 || !(here >> l & 1) ? -1 : number + 8 * k + l;
+          if (sample) s.far[lane] = k < 0 || parts_ > 0 ? -1 : members[l] + points.shift[k];
         }
     }
     if (selective_ && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
-    if (sample) pass.work.add_samples(slots * 8, s, *pass.sums);
+    pass.work.screen(members, 8, slots * 8, s);
+    if (sample) pass.add_samples(slots * 8, s);
     if (selective_ && !alone) add_pressures(slots * 8, 8, s, tangent, m);
     slots = 0;
     for (; begin != end; slots += begin++->size)
@@ -272,7 +276,11 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
     }
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
     if (bad >= 0) return s.owner[bad];
-    if (sample) pass.work.add_samples(8 * n, s, *pass.sums);
+    pass.work.screen(members.data(), static_cast<int>(members.size()), 8 * n, s);
+    if (sample) {
+      std::fill_n(s.far, 8 * n, -1);
+      pass.add_samples(8 * n, s);
+    }
     for (int l = 0; l < 8 * n && alone && pass.work.balance(); ++l)
       if (const int k = first + l / 8 - owners_; k >= 0 && l % 8 < g.count)
         pass.work.balance()->factors[factor_of(s.owner[l], k)] = s.psi[l];
@@ -318,14 +326,18 @@ void Weighted<D>::run(Pass& pass) {
   }
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { block(b, pass); });
   if (singles_) out_rows_.assign(stride, Row{});
-  if (pass.everywhere())
+  if (pass.nearby)
+    look_around([&](std::size_t b) {
+      return lattice_ ? lattice_->tiles.marked(b, pass.nearby) : cloud_marked(pass.nearby, b, body_.points(), cloud_block);
+    });
+  if (pass.nearby || pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(1, [&](std::size_t b) {
       return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points(), cloud_block);
     });
   (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
-    if (quiet_.awake(b, 1)) block(b, pass);
+    if (pass.nearby ? near(b, 0) : quiet_.awake(b, 1)) block(b, pass);
   });
   if (!singles_) return;
   parallel_for(cloud_blocks(stride), [&](std::size_t b) {

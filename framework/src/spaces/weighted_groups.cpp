@@ -17,7 +17,9 @@ Weighted<D>::Weighted(const SpaceParts& parts)
       // Local force states have no common adjoint: every point makes its own stencil.
       share_(parts.share && formulation_.force_state == ForceState::variational), owners_(selective_ ? 1 : 0), parts_(formulation_.parts(D)) {
   lattice_ ? prepare_lattice() : prepare_cloud();
-  quiet_ = parts.quiet_blocks(lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), body_.points(), cloud_block));
+  const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), body_.points(), cloud_block);
+  quiet_ = parts.quiet_blocks(reach);
+  local_ = parts.local_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
   if (parts.history()) number_groups();
 }

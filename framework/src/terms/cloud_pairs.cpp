@@ -7,6 +7,7 @@
 
 #include "families/cloud_families.hpp"
 #include "families/cloud_rows.hpp"
+#include "terms/energy_shares.hpp"
 #include "terms/pair_loop.hpp"
 
 namespace perikit {
@@ -28,6 +29,7 @@ class CloudPairs final : public PairLoop {
   std::size_t bytes() const noexcept override {
     return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
+  bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return cloud_marked(marks, b, points_); }
   std::int64_t run(const PairPass& pass) override;
 
  private:
@@ -135,7 +137,9 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   const bool half = at_once(pass);
-  const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
+  const bool screened = work == PairWork::force && pass.screen;
+  const bool energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
+  double highest = 0;  // energy of a bond, over its share where that is asked for
   alignas(64) PairScratch s;
   alignas(64) Gathered g;
   const double volume = position_[p][3];
@@ -176,8 +180,17 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       }
       continue;
     }
-    law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force,
-                   work == PairWork::tangent ? s.stiffness : nullptr});
+    law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr,
+                   work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+    if (screened) {
+      if (pass.screen->over_share) pair_energy_shares(law_, n, g.length, g.omega, s.stiffness);
+      for (int l = 0; l < n; ++l) {
+        double value = s.energy[l];
+        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * (pass.by_theta[p] + pass.by_theta[far_point(l)]);
+        if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / s.stiffness[l] : 0.0;
+        if (g.far_volume[l] > 0) highest = std::max(highest, value);
+      }
+    }
     for (int l = 0; l < n && energies; ++l) stored += s.energy[l] * g.far_volume[l];
     if constexpr (work == PairWork::energy) continue;
     for (int l = 0; l < n; l += pack_width) {
@@ -205,6 +218,8 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (half) force_[far_point(l)] -= t;
     }
   }
+  if (screened && highest > pass.screen->limit + pass.screen->density[p])
+    std::atomic_ref(pass.screen->near[p / padding]).store(1, std::memory_order_relaxed);
   if (work == PairWork::force && fails_) {
     alignas(64) double lanes[pack_width];
     excess.store(lanes);

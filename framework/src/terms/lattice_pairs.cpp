@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <vector>
 
 #include "families/lattice_families.hpp"
+#include "terms/energy_shares.hpp"
 #include "terms/pair_loop.hpp"
 
 namespace perikit {
@@ -26,6 +28,13 @@ class LatticePairs final : public PairLoop {
       length_.insert(length_.end(), chunk_points, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]));
       omega_.insert(omega_.end(), chunk_points, families_.slots.omega[s]);
     }
+    std::vector<std::uint16_t> all(families_.slots.size());
+    std::iota(all.begin(), all.end(), std::uint16_t{0});
+    FamilyArrays family;
+    AlignedVector<double> share;
+    families_.load(all, family);
+    energy_shares(parts.formulation, D, family, share);
+    for (std::size_t s = 0; s < all.size(); ++s) inverse_share_.push_back(share[s] > 0 ? 1 / share[s] : 0.0);
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
   }
@@ -33,6 +42,8 @@ class LatticePairs final : public PairLoop {
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
   bool owns(std::size_t b) const noexcept override { return families_.tiles.owns(b); }
   std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
+
+  bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return families_.tiles.marked(b, marks); }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
@@ -70,7 +81,8 @@ class LatticePairs final : public PairLoop {
   bool dilatation_;
   const LatticeFamilies& families_;
   double squared_volume_;
-  AlignedVector<double> length_, omega_;       ///< by slot, one value a lane
+  AlignedVector<double> length_, omega_;  ///< by slot, one value a lane
+  std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
 
 template <int D>
@@ -83,7 +95,9 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   const bool weakened = !pattern.integrity.empty();   // some b lies between 0 and 1: it weighs all that its bond does
   const std::int64_t p = chunk.first;
   const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
-  const bool energies = work == PairWork::energy || (work == PairWork::force && pass.energies);
+  const bool screened = work == PairWork::force && pass.screen,
+             energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
+  Pack highest[packs];  // energy of a bond, over its share where that is asked for
   const bool uniform = fields_.modulus.size() == 0;
   alignas(64) PairScratch s;
   if constexpr (!sums) {
@@ -174,6 +188,13 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
           const int l = v * pack_width, lane = k * chunk_points + l;
           const auto bits = static_cast<std::uint8_t>(mask >> l);
           const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
+          if (screened) {
+            Pack value = Pack::load(s.energy + lane);
+            if (pass.by_theta)
+              value += Pack(omega_[at * chunk_points] * length_[at * chunk_points]) * Pack::load(s.e + lane) *
+                       (Pack::load(pass.by_theta + p + l) + Pack::load(pass.by_theta + far + l));
+            highest[v] = max(highest[v], keep(bits, value * Pack(pass.screen->over_share ? inverse_share_[at] : 1.0)));
+          }
           if (energies) stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
           if constexpr (work == PairWork::energy) continue;
           Pack t[D], T = Pack::load(s.force + lane);
@@ -206,6 +227,13 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         }
       }
     }
+  }
+  if (screened) {
+    bool near = false;
+    for (int l = 0; l < chunk_points; ++l)
+      near |=
+          highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)];
+    if (near) pass.screen->near[static_cast<std::size_t>(p) / padding] = 1;
   }
   int bad = -1;
   for (int l = chunk_points - 1; l >= 0; --l)

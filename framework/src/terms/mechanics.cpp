@@ -21,8 +21,8 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
   space_->shift_gradients(parts_.shift);
 }
 
-BatchWork Mechanics::work(Work kind, bool energy) const noexcept {
-  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get()};
+BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen};
 }
 
 /// Each block is one rank's.
@@ -32,7 +32,7 @@ void Mechanics::add_owned(const std::vector<double>& energies, ExactSum& sum) co
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
-  const BatchWork work = this->work(Work::force, energy != nullptr);
+  const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
   std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
@@ -59,6 +59,18 @@ void Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& e
   Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
   space_->run(pass);
   add_owned(energies, energy);
+}
+
+void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {
+  const BatchWork work = this->work(Work::force, false);
+  Pass pass{work, u, {}, force, nullptr, nullptr, -1, {}, nullptr, nullptr, marks.data()};
+  space_->run(pass);
+}
+
+void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+  const BatchWork work = this->work(Work::sample, false);
+  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), nullptr, &samples};
+  space_->run(pass);
 }
 
 std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {

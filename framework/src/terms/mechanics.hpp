@@ -18,8 +18,11 @@ class Mechanics final : public Term {
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
+  void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
+  void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override { space_->bonds_changed(points); }
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
+  void screen(BondScreen* screen) override { screen_ = screen; }
   void report(ModelReport& report) const override;
   QuietCounts quiet_counts() const noexcept override { return space_->quiet_counts(); }
 
@@ -30,12 +33,13 @@ class Mechanics final : public Term {
   void history_restored() { space_->history_restored(); }
 
  private:
-  BatchWork work(Work kind, bool energy) const noexcept;
+  BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   void add_owned(const std::vector<double>& energies, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
+  BondScreen* screen_ = nullptr;
   std::shared_ptr<const CloudConsistency> consistency_;
 };
 

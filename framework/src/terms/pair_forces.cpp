@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "families/bond_finder.hpp"
 #include "perikit/core/dimension.hpp"
 #include "terms/family_point.hpp"
 #include "terms/pair_assembly.hpp"
@@ -136,8 +137,10 @@ void PairForces<D>::bonds_changed(std::span<const std::int32_t> points) {
 
 template <int D>
 const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
+  if (!damage.by_stretch()) return nullptr;
   double least = std::numeric_limits<double>::max();
   for (const std::int32_t p : body_.internal()) least = std::min(least, damage.onset.data()[p]);
+  for (const InterfaceDamage& i : damage.interfaces) least = std::min(least, i.limits.onset);
   return loop_->watch(least);
 }
 
@@ -149,6 +152,57 @@ void PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSu
   for (std::size_t p = 0; p < body_.stride(); ++p)
     if (marks[p / padding] && body_.alive(p) && body_.owns(p))
       energy.add(body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]));
+}
+
+template <int D>
+void PairForces<D>::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) {
+  if (density_.size() == 0) density_ = body_.make_field(2);
+  if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), near.data());
+  PairPass pass{PairWork::force, u, {}, q_, {}, force};
+  pass.nearby = marks.data();
+  loop_->run(pass);
+}
+
+/// Half of b V_i V_j w, and what the bond adds to V_i phi: that is shared as the bonds make up theta, phi_i/theta_i d theta_i.
+template <int D>
+void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
+  if (density_.size() == 0) density_ = body_.make_field(2);
+  double* const phi = density_.component(1);
+  if (formulation_.dilatation) dilatation(u, {}, nullptr, phi, marks.data());
+  const std::size_t groups = body_.stride() / padding;
+  parallel_for(groups, [&](std::size_t g) {
+    if (!marks[g]) return;
+    FamilyArrays family;
+    AlignedVector<double> extension, modulus, omega, energy;
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body_.alive(p)) continue;
+      families_.load(p, BondsOf::intact, family);
+      for (auto* array : {&extension, &modulus, &omega, &energy}) array->assign(family.size, 0.0);
+      const auto own = static_cast<std::int32_t>(p);
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        omega[k] = family.whole_omega(k);
+        extension[k] = bond_stretch(body_, u, BondId::of(own, family.far[k])) * family.length[k];
+        modulus[k] =
+            fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
+        if (fields_.correction.size() == 0) continue;
+        double factor = 0;
+        for (int a = 0; a < D; ++a) {
+          const double cosine = family.xi[a][k] / family.length[k];
+          factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
+        }
+        modulus[k] *= factor;
+      }
+      law_.bond_law(
+          {family.bonds, family.length.data(), omega.data(), extension.data(), modulus.data(), energy.data(), nullptr, nullptr});
+      const double theta = formulation_.dilatation ? scale_.data()[p] * theta_.data()[p] : 0.0;
+      const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const double w = 0.5 * energy[k] + by_theta * omega[k] * family.length[k] * extension[k];
+        samples.add({own, family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w, {}});
+      }
+    }
+  });
 }
 
 template <int D>
@@ -187,6 +241,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, Exact
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
+  if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
   if (rates) {
     if (rate_.size() == 0) rate_ = body_.make_field(1);
     loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr});
@@ -201,12 +256,13 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, Exact
     alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
-    formulation_.dilatation->evaluate(
-        {n, theta, dilatation_modulus_.data() + first, energy || density ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
+                                       energy || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
+      if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
       if (energy && body_.alive(p) && body_.owns(p))
         energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
@@ -223,7 +279,10 @@ std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactS
     const std::int64_t bad = dilatation(u, {}, energy, nullptr);
     if (bad >= 0) return bad;
   }
-  const std::int64_t bad = loop_->run({PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr});
+  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr};
+  pass.screen = screen_;
+  if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
+  const std::int64_t bad = loop_->run(pass);
   for (std::size_t b = 0; b < bonds.size(); ++b)
     if (loop_->owns(b)) energy->add(bonds[b]);
   return bad;
@@ -259,7 +318,9 @@ template <int D>
 void PairForces<D>::report(ModelReport& report) const {
   report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
   report.bytes += loop_->bytes();
-  for (const Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_}) report.bytes += field->bytes();
+  for (const Field* field :
+       {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
+    report.bytes += field->bytes();
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
   report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));

@@ -28,8 +28,11 @@ class PairForces final : public Term {
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   /// Half of each bond of the marked groups, and their dilatation.
   void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
+  void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
+  void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage& damage) override;
+  void screen(BondScreen* screen) override { screen_ = screen; }
   void report(ModelReport& report) const override;
   QuietCounts quiet_counts() const noexcept override { return loop_->quiet_counts(); }
 
@@ -55,7 +58,9 @@ class PairForces final : public Term {
   Field scale_;                  ///< d/m_i; 0 without bonds
   Field dilatation_modulus_;     ///< k_i
   Field theta_, q_, rate_;
-  Field density_;                ///< work field of energy_of
+  Field by_theta_;  ///< phi/theta d/m, where bonds are screened
+  BondScreen* screen_ = nullptr;
+  Field density_;  ///< work field of energy_of
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
 };

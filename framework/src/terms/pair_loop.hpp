@@ -12,6 +12,7 @@
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
+#include "operators/bond_screen.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/operators/laws.hpp"
@@ -27,8 +28,12 @@ struct PairPass {
   ConstFieldView u, w;
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
-  double* energies = nullptr;     ///< by block
-  const std::uint8_t* only = nullptr;   ///< by group of eight points: others are left alone (dilatation and energy)
+  double* energies = nullptr;          ///< by block
+  const std::uint8_t* only = nullptr;  ///< by group of eight points: others are left alone (dilatation and energy)
+  /// Forces of the bonds alone that belong to the blocks of these groups; dilatations are there.
+  const std::uint8_t* nearby = nullptr;
+  const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
+  BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
 };
 
 /// Point quantities that bonds need.
@@ -69,9 +74,13 @@ class PairLoop {
   template <class Moves>
   void look(const PairPass& pass, const Moves& moves) {
     reach_ = pass.q.data ? 2 : 1;
-    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation)) quiet_.look(reach_, moves);
-    else quiet_.wake();
+    if (!pass.only && !pass.nearby && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
+      quiet_.look(reach_, moves);
+    else
+      quiet_.wake();
   }
+  /// Whether a group of block b is marked.
+  virtual bool holds(std::size_t b, const std::uint8_t* marks) const noexcept = 0;
   /// Each bond once, for both ends.
   bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
   /// block(work, b) for each block that is awake, `work` being pass.work as a constant; coloured where far ends are written.
@@ -79,7 +88,7 @@ class PairLoop {
   void each_block(const PairPass& pass, const Colouring& colouring, const Block& block) const {
     const auto sweep = [&]<PairWork work>(std::integral_constant<PairWork, work> constant) {
       auto body = [&](std::size_t b) {
-        if (quiet_.awake(b, reach_)) block(constant, b);
+        if (pass.nearby ? holds(b, pass.nearby) : quiet_.awake(b, reach_)) block(constant, b);
       };
       if (at_once(pass)) colouring.for_each(body);
       else parallel_for(blocks(), body);

@@ -8,6 +8,7 @@
 #include "assembly/assembly.hpp"
 #include "families/families.hpp"
 #include "perikit/core/exact_sum.hpp"
+#include "operators/bond_samples.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
 #include "perikit/operators/samples.hpp"
@@ -32,10 +33,18 @@ class Term {
   // Where bonds fail.
   /// energy += E of what those points of the marked groups own that this rank owns [J].
   virtual void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) = 0;
+  /// force += the forces of all evaluation points that belong to the points of the marked groups, and of any others: the same
+  /// ones whichever bonds are left. `near`: those groups and everything in their families. An inadmissible point adds nothing.
+  virtual void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) = 0;
+  /// What the evaluation points of the points of the marked groups hold; point gradients are needed in the groups of `near`.
+  virtual void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) = 0;
   /// What follows from the bonds of these points is to be computed anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
   virtual const NearestFailure* watch(const BodyDamage& damage) = 0;
+
+  /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on.
+  virtual void screen(BondScreen* screen) = 0;
 
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;

@@ -10,6 +10,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/terms/terms.hpp"
 #include "spaces/consistency.hpp"
+#include "terms/bond_criterion.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
 #include "terms/zero_energy_penalty.hpp"
@@ -24,6 +25,22 @@ void clear(double* values, std::size_t size) {
   parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
 }
 
+/// Formulations whose bonds create energy as they fail (framework/docs/fracture.md, "Every kinematics and kernel").
+void warn_of_energy(const TermParts& parts, ModelReport& report) {
+  const Formulation& f = parts.formulation;
+  const bool by_bond = f.weighted && f.parts(parts.families->body().dimension()) == 0;
+  const char* const what = f.point && !parts.stabilization ? "one gradient per point without a stabilization"
+                           : f.bond && f.far_share == 0    ? "bond gradients that rest on the gradient of one end alone"
+                           : by_bond && f.selective()      ? "a selective map over weighted gradients of bonds"
+                           : f.weighted && !by_bond        ? "gradients of parts of families"
+                                                           : nullptr;
+  if (!what) return;
+  report.warnings.push_back(
+      fmt::format("{}: updates of bonds that fail create energy; which kinematics do not is measured in fracture.md, \"Every "
+                  "kinematics and kernel\"",
+                  what));
+}
+
 }  // namespace
 
 /// One assembly for each term, over common block rows.
@@ -36,6 +53,7 @@ struct Terms::Assemblies {
 
 struct Terms::Failing {
   Fracture fracture;
+  Field force;  ///< work field
 };
 
 Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
@@ -44,7 +62,8 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   if (formulation.pairs) {
     terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share}));
   } else {
-    auto mechanics = std::make_unique<Mechanics>(SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share});
+    auto mechanics = std::make_unique<Mechanics>(
+        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr});
     mechanics_ = mechanics.get();
     if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
@@ -56,7 +75,19 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     const NearestFailure* of_term = term->watch(*parts_.damage);
     if (of_term) known = of_term;
   }
-  failing_ = std::make_unique<Failing>(Failing{Fracture(*parts_.families, *parts_.damage, parts_.skip, known)});
+  Families& all = *parts_.families;
+  all.let_fail();
+  std::unique_ptr<BondFinder> finder;
+  if (parts_.damage->by_stretch())
+    finder = all.make_monitor(*parts_.damage, parts_.skip, known);
+  else {
+    auto criterion = std::make_unique<BondCriterion>(all, formulation, parts_.damage, terms_, parts_.skip);
+    // Consistent weights are not those of the families, which the screen knows.
+    criterion_ = parts_.skip && !parts_.consistency && criterion->screen() ? criterion.get() : nullptr;
+    if (criterion_) terms_.front()->screen(criterion_->screen());
+    finder = std::move(criterion);
+  }
+  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
 }
 
 Terms::~Terms() = default;
@@ -75,9 +106,11 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
   ExactSum sum;
+  if (criterion_) criterion_->begin_forces(u);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
     bad = (*term)->add_forces(u, force, energy ? &sum : nullptr);
+  if (criterion_ && bad < 0) criterion_->end_forces();
   if (energy) *energy = total_over_ranks(sum);
   return status(bad);
 }
@@ -156,14 +189,32 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
   for (const auto& term : terms_) term->bonds_changed(points);
 }
 
-BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const Motion& motion) {
+BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
+  const Families& families = *parts_.families;
   const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
     ExactSum sum;
     for (const auto& term : terms_) term->energy_of(at, marks, sum);
     return total_over_ranks(sum);
   };
-  return failing_->fracture.update(u, time_step, motion, energy, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
+  const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
+    Field& own = failing_->force;
+    if (own.size() == 0) own = families.body().make_field(force.components);
+    clear(own.data(), own.size());
+    GroupMarks near(marks.size(), 0);
+    std::vector<std::int32_t> points;
+    for (std::size_t p = 0; p < families.body().stride(); ++p)
+      if (marks[p / padding] && families.body().alive(p)) points.push_back(static_cast<std::int32_t>(p));
+    families.mark(points, near);
+    for (const auto& term : terms_) term->add_forces_near(at, marks, near, own);
+    for (std::size_t k = 0; k < force.size(); ++k) force.data[k] += factor * own.data()[k];
+  };
+  return failing_->fracture.update(u, time_step, begin, reaction,
+                                   {energy, forces, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
+}
+
+std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
+  return BondCriterion(*parts_.families, parts_.formulation, nullptr, terms_, parts_.skip).energies(u);
 }
 
 std::vector<BondChange> Terms::changed_bonds() const {
@@ -198,7 +249,9 @@ ModelReport Terms::report() const {
   }
   if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
   if (!conservative())
-    report.warnings.push_back("local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+    report.warnings.push_back(
+        "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+  if (parts_.damage) warn_of_energy(parts_, report);
   for (const auto& term : terms_) term->report(report);
   return report;
 }

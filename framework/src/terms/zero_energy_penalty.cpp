@@ -20,6 +20,17 @@ std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samp
   return -1;
 }
 
+/// The penalty of a point belongs to its bonds as the rest of its energy does. It is no stress.
+void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
+  const Body& body = parts_.families.body();
+  Field density = body.make_field(1);
+  add_density(u, density.data());
+  for (const std::int32_t p : body.internal()) {
+    const auto at = static_cast<std::size_t>(p);
+    if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at), {}});
+  }
+}
+
 std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) const {
   return with_dimension(rows.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
 }

@@ -17,9 +17,15 @@ class ZeroEnergyPenalty : public Term {
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
+  /// Of all points: its loops have no parts.
+  void add_forces_near(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force) final {
+    apply(u, 1.0, force, nullptr);
+  }
+  void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
   int steps() const noexcept final { return 2; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
   const NearestFailure* watch(const BodyDamage&) final { return nullptr; }
+  void screen(BondScreen*) final {}  // where there is a penalty, bonds are not screened
   void report(ModelReport& report) const final;
   QuietCounts quiet_counts() const noexcept final { return {}; }  // counted with the gradients
 

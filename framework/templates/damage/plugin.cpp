@@ -1,14 +1,15 @@
+#include "perikit/sdk/plugin.hpp"
+
 #include <algorithm>
 #include <memory>
-
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 
 namespace {
 
 /// YOUR PHYSICS: the integrity b of a bond as a function of its stretch, 1 up to the onset, 0 beyond failure, never rising.
-/// The engine keeps the least b of every bond, in both directions.
+/// The engine keeps the least b of every bond, in both directions. A criterion by energy or stress says so in its traits and
+/// makes its value of them in `measure`, which is compared with the limits in place of the stretch (perikit/model/damage.hpp).
 class PartName final : public Damage {
  public:
   PartName(double onset, double failure) : limits_{onset, failure} {}
@@ -16,19 +17,19 @@ class PartName final : public Damage {
   /// bits = true where b is only ever 1 or 0: a bond then needs one bit, and lattices keep their fast kernels.
   DamageTraits traits() const noexcept override { return {.bits = false}; }
 
-  /// May depend on the material and the family of the point: x.moduli, x.bulk(), x.horizon, x.mean_length.
-  StretchLimits limits(const DamagePoint&) const override { return limits_; }
+  /// May depend on the material and the family of the point: x.moduli, x.bulk(), x.horizon, x.mean_length, x.crossing.
+  DamageLimits limits(const DamagePoint&) const override { return limits_; }
 
   /// Default: a straight line from 1 to 0.
   void integrity(const IntegrityBatch& b) const noexcept override {
     for (int k = 0; k < b.n; ++k) {
-      const double s = b.stretch[k], share = (b.failure[k] - s) / (b.failure[k] - b.onset[k]);
+      const double s = b.value[k], share = (b.failure[k] - s) / (b.failure[k] - b.onset[k]);
       b.integrity[k] = s <= b.onset[k] ? 1.0 : std::clamp(share, 0.0, 1.0);
     }
   }
 
  private:
-  StretchLimits limits_;
+  DamageLimits limits_;
 };
 
 ParameterTable parameters() {

@@ -30,7 +30,7 @@ class CriticalStretch final : public Damage {
 
   DamageTraits traits() const noexcept override { return {.bits = true}; }
 
-  StretchLimits limits(const DamagePoint& x) const override {
+  DamageLimits limits(const DamagePoint& x) const override {
     if (energy_release_rate_ <= 0) return {stretch_, stretch_};
     // Bonds whose energy grows with their length (bond_based) are those of omega = xi: 4/5, 3/4, 2/3 of the horizon.
     const double d = dimension(x.space), mean_length = consistent_ ? x.mean_length : (d + 1) / (d + 2) * x.horizon;
@@ -45,7 +45,7 @@ class CriticalStretch final : public Damage {
 
   void integrity(const IntegrityBatch& b) const noexcept override {
     for (int k = 0; k < b.n; k += pack_width) {
-      select(Pack::load(b.stretch + k) > Pack::load(b.failure + k), Pack(0.0), Pack(1.0)).store(b.integrity + k);
+      select(Pack::load(b.value + k) > Pack::load(b.failure + k), Pack(0.0), Pack(1.0)).store(b.integrity + k);
     }
   }
 
@@ -55,15 +55,19 @@ class CriticalStretch final : public Damage {
 };
 
 PartDescription description() {
-  PartDescription part{.name = "critical_stretch",
-                       .summary = "a bond breaks for good once it is stretched beyond a limit",
-                       .parameters = {},
-                       .examples = {"stretch = 0.1", "energy_release_rate = 0.05", "energy_release_rate = 0.05\nconsistent = true"},
-                       .equations = "b = 0 once s > s_c,  s = (|y| - |xi|)/|xi|\n"
-                                    "s_c = sqrt(5 Gc/(9 K delta)) (3D),  sqrt(pi Gc/(3 k' delta)) (2D),  sqrt(3 Gc/(E delta)) (1D)\n"
-                                    "consistent: sqrt(4 Gc/(9 K <xi>)), sqrt(pi Gc/(4 k' <xi>)), sqrt(2 Gc/(E <xi>))",
-                       .source = "Silling, Askari, Computers & Structures 83 (2005) 1526; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 5.6-5.8",
-                       .limits = "bonds in compression never break; the stretch of a bond between two materials is the mean of theirs"};
+  PartDescription part{
+      .name = "critical_stretch",
+      .summary = "a bond breaks for good once it is stretched beyond a limit",
+      .parameters = {},
+      .examples = {"stretch = 0.1", "energy_release_rate = 0.05", "energy_release_rate = 0.05\nconsistent = true"},
+      .equations =
+          "b = 0 once s > s_c,  s = (|y| - |xi|)/|xi|\n"
+          "s_c = sqrt(5 Gc/(9 K delta)) (3D),  sqrt(pi Gc/(3 k' delta)) (2D),  sqrt(3 Gc/(E delta)) (1D)\n"
+          "consistent: sqrt(4 Gc/(9 K <xi>)), sqrt(pi Gc/(4 k' <xi>)), sqrt(2 Gc/(E <xi>))",
+      .source =
+          "Silling, Askari, Computers & Structures 83 (2005) 1526; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. "
+          "5.6-5.8",
+      .limits = "bonds in compression never break; a bond between two materials has the smaller limit of theirs"};
   part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").positive();
   part.parameters.number("stretch", "-", "Critical stretch s_c itself.").positive();
   part.parameters.boolean("consistent", "With energy_release_rate: for bonds whose energy is shared out by the influence function (correspondence models).")

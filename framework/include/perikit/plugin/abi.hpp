@@ -11,9 +11,9 @@
 #include "perikit/plugin/headers_id.hpp"
 #include "perikit/plugin/part.hpp"
 
-/// Raised whenever a released public class changes its layout or its virtual functions. Between releases the hash in the build id keeps
-/// libraries of other headers out.
-#define PERIKIT_ABI_VERSION 3
+/// Raised whenever a released public class changes its layout or its virtual functions. Between releases the hash in the build id
+/// keeps libraries of other headers out.
+#define PERIKIT_ABI_VERSION 4
 
 #define PERIKIT_STRINGIFY_(x) #x
 #define PERIKIT_STRINGIFY(x) PERIKIT_STRINGIFY_(x)

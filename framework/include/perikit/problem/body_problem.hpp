@@ -52,7 +52,7 @@ class BodyProblem final : public Problem {
   /// Of the present state.
   EvaluationStatus sample(PointSamples& samples);
   bool constant_stiffness() const noexcept override;
-  bool advance(double time_step, ConstFieldView velocity = {}) override;
+  bool advance(double time_step, FieldView velocity = {}) override;
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
@@ -98,6 +98,9 @@ class BodyProblem final : public Problem {
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
   template <class Fill>
   void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
+
+  /// What bonds that failed inside of the last step mean for forces, velocity and work.
+  void react(BondReaction& reaction, FieldView velocity);
 
   Field seen_, seen_direction_;
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images

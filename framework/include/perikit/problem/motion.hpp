@@ -13,10 +13,8 @@ double kinetic_energy(const Problem& problem, ConstFieldView velocity);
 Field accelerations(Problem& problem, double t);
 /// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs.
 Field reactions(Problem& problem, bool dynamic, double t);
-/// end <- the displacement at the middle of the next step of an explicit scheme, whose forces are known. velocity: of the last
-/// half step.
-void middle_of_next_step(Problem& problem, double time_step, ConstFieldView velocity, FieldView end);
-/// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its middle.
+/// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its
+/// middle.
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u);
 
 }  // namespace perikit

@@ -67,10 +67,11 @@ class Problem {
   virtual bool constant_stiffness() const noexcept = 0;
 
   /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
-  /// velocity: of explicit schemes, of the last half step. Their forces of this step come from the bonds as they were, so that
-  /// bonds that fail now act for another half step, and what they dissipate is taken there. Quasi-static runs call it at every
-  /// equilibrium: as long as bonds change, the step is not over.
-  virtual bool advance(double time_step, ConstFieldView velocity = {}) = 0;
+  /// velocity: of explicit schemes, of the half step that led here. Bonds that are found beyond their limit then failed inside of
+  /// the step: the internal forces, the energies and this velocity become what they are with bonds that acted until then. To be
+  /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium:
+  /// as long as bonds change, the step is not over.
+  virtual bool advance(double time_step, FieldView velocity = {}) = 0;
   /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
   /// Bonds of `bonds`, not empty.

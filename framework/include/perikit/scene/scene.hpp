@@ -54,7 +54,14 @@ struct RegionDescription {
   SourcePosition position;
 };
 
-struct CrackDescription {                    ///< 2 vertices: segment; more: polygon
+/// Bonds between the regions of two sets; "rest": what belongs to no region.
+struct InterfaceDescription {
+  std::array<std::string, 2> between;
+  std::shared_ptr<const PartValues> damage;
+  SourcePosition position;
+};
+
+struct CrackDescription {  ///< 2 vertices: segment; more: polygon
   std::vector<std::array<double, 3>> vertices;
   SourcePosition position;
 };
@@ -132,6 +139,7 @@ struct Scene {
   std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
   std::shared_ptr<const PartValues> stabilization, damage;   ///< null where the scene has none
   std::vector<RegionDescription> regions;
+  std::vector<InterfaceDescription> interfaces;
   std::vector<CrackDescription> cracks;
   std::vector<std::string> no_fail;          ///< [damage] no_fail
   std::vector<std::optional<Expression>> initial_displacement, initial_velocity;   ///< empty or `dimension` long

@@ -19,6 +19,7 @@
 
 namespace perikit {
 
+class BondCriterion;
 class Families;
 class Mechanics;
 struct CloudConsistency;
@@ -68,9 +69,12 @@ class Terms {
   void history_restored();
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
-  /// Lowers the integrity of bonds that u stretches too far, and recomputes what depends on them. To be called after every step, with its
-  /// length [s] (0 in quasi-static runs).
-  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const Motion& motion = {});
+  /// Lowers the integrity of bonds that are beyond their limit at u, and recomputes what depends on them. To be called after
+  /// every step, with its length [s] (0 in quasi-static runs). Where `begin` is given, bonds fail inside the step, and *reaction
+  /// (fields of u, zero before) is what that means for it.
+  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepBegin& begin = {}, BondReaction* reaction = nullptr);
+  /// The shares of all bonds in the energy at u: they add up to it. Ascending. Not where laws have a history.
+  std::vector<BondEnergy> bond_energies(ConstFieldView u);
   /// Every bond that is not as it was at the set-up: run state, for checkpoints.
   std::vector<BondChange> changed_bonds() const;
   void restore_bonds(std::span<const BondChange> changes);
@@ -85,9 +89,10 @@ class Terms {
 
   TermParts parts_;
   std::vector<std::unique_ptr<Term>> terms_;
-  Mechanics* mechanics_ = nullptr;           ///< one of them, but for pair laws
-  std::unique_ptr<Assemblies> assemblies_;   ///< made when asked for
-  std::unique_ptr<Failing> failing_;         ///< null without [damage]
+  Mechanics* mechanics_ = nullptr;          ///< one of them, but for pair laws
+  std::unique_ptr<Assemblies> assemblies_;  ///< made when asked for
+  std::unique_ptr<Failing> failing_;        ///< null without [damage]
+  BondCriterion* criterion_ = nullptr;      ///< of failing_, where evaluations of forces tell it which bonds need a look
 };
 
 }  // namespace perikit

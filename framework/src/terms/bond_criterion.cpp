@@ -1,0 +1,277 @@
+#include "terms/bond_criterion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "perikit/core/parallel.hpp"
+#include "terms/energy_shares.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Directed bonds that are sampled at a time.
+constexpr std::size_t most_at_once = std::size_t{1} << 19;
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+BondCriterion::BondCriterion(const Families& families, const Formulation& formulation, const BodyDamage* damage, TermsOf terms,
+                             bool skip)
+    : families_(families),
+      body_(families.body()),
+      formulation_(formulation),
+      damage_(damage),
+      terms_(terms),
+      skip_(skip),
+      traits_(damage ? damage->law->traits() : DamageTraits{.energy = true}),
+      by_point_(!formulation.pairs && formulation.parts(families.body().dimension()) > 0),
+      samples_(body_.space(), traits_.stress) {
+  const std::size_t count = body_.stride() / padding;
+  for (std::size_t g = 0; g < count; ++g) {
+    bool any = false;
+    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l);
+    if (any) groups_.push_back(static_cast<std::int32_t>(g));
+  }
+  for (GroupMarks* marks : {&own_, &near_, &wide_}) marks->assign(count, 0);
+  if (damage && traits_.bound != ValueBound::none) set_screen();
+}
+
+/// A bond holds psi_ij/N_i + psi_ji/N_j over its share, N the normaliser of its share, so that one of them is above half of the
+/// limit where it fails.
+void BondCriterion::set_screen() {
+  const BondWeight kind = by_point_ ? BondWeight::kernel : formulation_.weight;
+  const Field& onset = damage_->onset;
+  FamilyArrays family;
+  AlignedVector<double> share;
+  screen_.limit = infinite;
+  for (const std::int32_t p : body_.owned()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
+  for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.limits.onset);
+  screen_.over_share = traits_.bound == ValueBound::energy_over_share;
+  screen_.near.assign(body_.stride() / padding, 0);
+  screen_.density.assign(body_.stride(), infinite);
+  if (formulation_.pairs) {
+    for (const std::int32_t p : body_.owned())
+      if (onset.data()[p] < infinite) screen_.density[static_cast<std::size_t>(p)] = 0;
+    return;
+  }
+  double most = 1;
+  if (!screen_.over_share) {
+    most = 0;
+    families_.each_class([&](std::span<const std::int32_t> points) {
+      families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
+      energy_shares(formulation_, body_.dimension(), family, share);
+      for (std::size_t k = 0; k < family.far.size(); ++k) most = std::max(most, share[k]);
+    });
+  }
+  const auto own = [&](std::int32_t p) {
+    const auto at = static_cast<std::size_t>(p);
+    return 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / most;
+  };
+  for (const std::int32_t p : body_.owned()) {
+    const auto at = static_cast<std::size_t>(p);
+    if (onset.data()[at] == infinite) continue;
+    screen_.density[at] = own(p);
+    if (by_point_) continue;
+    families_.load(at, BondsOf::uncut, family);
+    for (const std::int32_t far : family.far) screen_.density[at] = std::min(screen_.density[at], own(far));
+  }
+}
+
+BondScreen* BondCriterion::screen() noexcept {
+  return screen_.near.empty() || terms_.size() != 1 ? nullptr : &screen_;
+}
+
+void BondCriterion::begin_forces(ConstFieldView u) {
+  screen_.known = false;
+  std::fill(screen_.near.begin(), screen_.near.end(), std::uint8_t{0});
+  screen_.u.assign(u.data, u.data + u.size());
+}
+
+/// Groups with bonds that may fail at u.
+std::vector<std::int32_t> BondCriterion::near_failure(ConstFieldView u) {
+  if (screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin())) return marked(screen_.near);
+  if (!by_point_ || screen_.near.empty()) return groups_;
+  // The energies of all points are no more than a look at them.
+  sample(groups_, u);
+  GroupMarks near(screen_.near.size(), 0);
+  for (const BondSamples::Entry& entry : samples_.entries()) {
+    const auto p = static_cast<std::size_t>(entry.owner);
+    const double left = body_.volume(p) * (1 - families_.damage(p));
+    if (left > 0 && entry.energy > left * screen_.density[p]) near[p / padding] = 1;
+  }
+  return marked(near);
+}
+
+std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
+  std::vector<std::int32_t> groups;
+  for (const std::int32_t g : groups_)
+    if (marks[static_cast<std::size_t>(g)]) groups.push_back(g);
+  return groups;
+}
+
+/// What the evaluation points of these groups hold, and those of everything in their families.
+void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
+  const auto mark = [&](const GroupMarks& of, GroupMarks& marks) {
+    std::vector<std::int32_t> points;
+    for (std::size_t p = 0; p < body_.stride(); ++p)
+      if (of[p / padding] && body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+    std::fill(marks.begin(), marks.end(), std::uint8_t{0});
+    families_.mark(points, marks);
+  };
+  std::fill(own_.begin(), own_.end(), std::uint8_t{0});
+  for (const std::int32_t g : groups) own_[static_cast<std::size_t>(g)] = 1;
+  mark(own_, near_);
+  mark(near_, wide_);
+  samples_.clear(own_);
+  for (const auto& term : terms_) term->add_bonds(u, near_, wide_, samples_);
+  samples_.merge();
+}
+
+template <class Visit>
+void BondCriterion::by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit) {
+  while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
+  const std::size_t bonds_each = std::max<std::size_t>(1, families_.bonds() / std::max<std::size_t>(1, groups_.size()));
+  const std::size_t piece = by_point_ ? groups.size() : std::max<std::size_t>(1, most_at_once / bonds_each);
+  for (std::size_t first = 0; first < groups.size(); first += piece) {
+    const auto of_piece = groups.subspan(first, std::min(piece, groups.size() - first));
+    sample(of_piece, u);
+    visit(of_piece);
+  }
+  checked_ += groups.size();
+}
+
+/// w_ij: see BondStates::energy.
+double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double whole_omega) const noexcept {
+  const double volumes = body_.volume(static_cast<std::size_t>(p)) * body_.volume(static_cast<std::size_t>(far));
+  const double b = families_.integrity({std::min(p, far), std::max(p, far)});
+  double energy = 0;
+  for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
+    if (const BondSamples::Entry* of_bond = samples_.find(owner, other)) energy += of_bond->energy / (b * volumes);
+    const BondSamples::Entry* of_point = samples_.find(owner, -1);
+    const auto i = static_cast<std::size_t>(owner);
+    const double left = (1 - families_.damage(i)) * families_.normaliser(i, BondWeight::kernel);
+    if (of_point && left > 0) energy += of_point->energy * whole_omega / (left * body_.volume(i));
+  }
+  return energy;
+}
+
+void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const std::int32_t> named, Bonds& m) const {
+  families_.load(static_cast<std::size_t>(p), BondsOf::intact, m.family);
+  m.place.clear();
+  for (std::size_t k = 0; k < m.family.far.size(); ++k) {
+    const std::int32_t far = m.family.far[k];
+    // A bond is looked at once: at its lower end, or at the one whose group is looked at.
+    const bool here = named.empty() ? p < far || !own_[static_cast<std::size_t>(far) / padding]
+                                    : std::binary_search(named.begin(), named.end(), far);
+    if (here) m.place.push_back(k);
+  }
+  const std::size_t n = m.place.size(), size = padded(n);
+  for (auto* array : {&m.length, &m.stretch, &m.share, &m.energy, &m.value, &m.onset, &m.failure, &m.integrity})
+    array->assign(size, 1.0);
+  m.stress.assign(traits_.stress ? 6 * size : 0, 0.0);
+  energy_shares(formulation_, body_.dimension(), m.family, m.all_shares);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::int32_t far = m.family.far[m.place[k]];
+    m.length[k] = m.family.length[m.place[k]];
+    m.stretch[k] = bond_stretch(body_, u, BondId::of(p, far));
+    m.share[k] = m.all_shares[m.place[k]];
+    if (traits_.energy) m.energy[k] = energy_of(p, far, m.family.whole_omega(m.place[k]));
+    if (traits_.stress) {
+      double weight = 0, stress[6] = {};
+      for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
+        const BondSamples::Entry* entry = samples_.find(owner, by_point_ ? -1 : other);
+        if (!entry || entry->weight <= 0) continue;
+        // Of points the mean, of bonds the mean by weight.
+        const double factor = by_point_ ? 1 / entry->weight : 1.0;
+        weight += factor * entry->weight;
+        for (std::size_t c = 0; c < 6; ++c) stress[c] += factor * entry->stress[c];
+      }
+      for (std::size_t c = 0; c < 6 && weight > 0; ++c) m.stress[c * size + k] = stress[c] / weight;
+    }
+  }
+  if (!damage_) return;
+  for (std::size_t k = 0; k < n; ++k) {
+    const DamageLimits limits = damage_->limits(static_cast<std::size_t>(p), static_cast<std::size_t>(m.family.far[m.place[k]]));
+    m.onset[k] = limits.onset;
+    m.failure[k] = limits.failure;
+  }
+  if (n == 0) return;
+  damage_->law->measure({static_cast<int>(n), m.length.data(), m.stretch.data(), m.share.data(),
+                         traits_.energy ? m.energy.data() : nullptr, traits_.stress ? m.stress.data() : nullptr, size,
+                         m.value.data()});
+}
+
+template <class Visit>
+void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit) {
+  Bonds& m = *memory_[static_cast<std::size_t>(thread_index())];
+  for (std::size_t l = 0; l < padding; ++l) {
+    const std::size_t p = static_cast<std::size_t>(group) * padding + l;
+    if (!body_.alive(p)) continue;
+    load(static_cast<std::int32_t>(p), u, {}, m);
+    if (!m.place.empty()) visit(static_cast<std::int32_t>(p), m);
+  }
+}
+
+std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
+  std::vector<BondChange> all;
+  const std::vector<std::int32_t> near = skip_ ? near_failure(u) : groups_;
+  by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
+    std::vector<std::vector<BondChange>> found(groups.size());
+    parallel_for(groups.size(), [&](std::size_t g) {
+      bonds_of(groups[g], u, [&](std::int32_t p, Bonds& m) {
+        damage_->law->integrity(
+            {static_cast<int>(m.place.size()), m.value.data(), m.onset.data(), m.failure.data(), m.integrity.data()});
+        for (std::size_t k = 0; k < m.place.size(); ++k)
+          if (m.integrity[k] < m.family.b(m.place[k]))
+            found[g].push_back({BondId::of(p, m.family.far[m.place[k]]), m.integrity[k]});
+      });
+    });
+    for (const auto& of_group : found) all.insert(all.end(), of_group.begin(), of_group.end());
+  });
+  // Where a bond lies in two pieces it was found in both.
+  std::sort(all.begin(), all.end(), [](const BondChange& a, const BondChange& b) { return a.bond < b.bond; });
+  all.erase(std::unique(all.begin(), all.end(), [](const BondChange& a, const BondChange& b) { return a.bond == b.bond; }),
+            all.end());
+  return all;
+}
+
+void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+  while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
+  std::vector<std::int32_t> groups;
+  for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
+  std::sort(groups.begin(), groups.end());
+  groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+  sample(groups, u);
+  Bonds& m = *memory_[0];
+  for (std::size_t k = 0; k < bonds.size(); ++k) {
+    const std::int32_t far[] = {bonds[k].far};
+    load(bonds[k].point, u, far, m);
+    values[k] = m.place.empty() ? 0.0 : m.value[0];
+  }
+}
+
+std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
+  std::vector<BondEnergy> all;
+  by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
+    std::vector<std::vector<BondEnergy>> found(groups.size());
+    parallel_for(groups.size(), [&](std::size_t g) {
+      bonds_of(groups[g], u, [&](std::int32_t p, Bonds& m) {
+        for (std::size_t k = 0; k < m.place.size(); ++k) {
+          const std::int32_t far = m.family.far[m.place[k]];
+          found[g].push_back(
+              {BondId::of(p, far), m.energy[k] * m.family.b(m.place[k]) * body_.volume(static_cast<std::size_t>(p)) *
+                                       body_.volume(static_cast<std::size_t>(far))});
+        }
+      });
+    });
+    for (const auto& of_group : found) all.insert(all.end(), of_group.begin(), of_group.end());
+  });
+  std::sort(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond < b.bond; });
+  all.erase(std::unique(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond == b.bond; }),
+            all.end());
+  return all;
+}
+
+}  // namespace perikit

@@ -1,0 +1,79 @@
+#pragma once
+/// Finds the bonds that fail by more than their stretch: by their energy or their stress, which the terms are asked for.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "families/bond_finder.hpp"
+#include "families/families.hpp"
+#include "operators/bond_samples.hpp"
+#include "operators/bond_screen.hpp"
+#include "perikit/model/formulation.hpp"
+#include "terms/term.hpp"
+
+namespace perikit {
+
+class BondCriterion final : public BondFinder {
+ public:
+  using TermsOf = std::span<const std::unique_ptr<Term>>;
+  /// All must outlive this. damage: null for energies alone. skip = false: every bond in every step.
+  BondCriterion(const Families& families, const Formulation& formulation, const BodyDamage* damage, TermsOf terms, bool skip);
+
+  std::vector<BondChange> find(ConstFieldView u) override;
+  void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) override;
+  void forget() noexcept override {}
+  std::size_t groups() const noexcept override { return groups_.size(); }
+  std::size_t checked() const noexcept override { return checked_; }
+  std::size_t bytes() const noexcept override {
+    return samples_.bytes() + 4 * own_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
+  }
+  /// For evaluations of forces to mark the groups that need a look; null where they cannot.
+  BondScreen* screen() noexcept;
+  /// Before and after an evaluation of forces at u where they do.
+  void begin_forces(ConstFieldView u);
+  void end_forces() noexcept { screen_.known = true; }
+  /// Of all bonds, ascending.
+  std::vector<BondEnergy> energies(ConstFieldView u);
+
+ private:
+  /// Arrays over the bonds of one point: those with a larger index, and those whose far ends are not looked at. Memory of one
+  /// thread.
+  struct Bonds {
+    FamilyArrays family;
+    std::vector<std::size_t> place;  ///< in the family
+    AlignedVector<double> length, stretch, share, energy, stress, value, onset, failure, integrity;
+    AlignedVector<double> all_shares;
+  };
+
+  void set_screen();
+  std::vector<std::int32_t> near_failure(ConstFieldView u);
+  std::vector<std::int32_t> marked(const GroupMarks& marks) const;
+  /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
+  template <class Visit>
+  void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
+  void sample(std::span<const std::int32_t> groups, ConstFieldView u);
+  /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).
+  template <class Visit>
+  void bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit);
+  /// The bonds of p with their states and values; `named`: these far ends alone.
+  void load(std::int32_t p, ConstFieldView u, std::span<const std::int32_t> named, Bonds& bonds) const;
+  double energy_of(std::int32_t p, std::int32_t far, double whole_omega) const noexcept;
+
+  const Families& families_;
+  const Body& body_;
+  const Formulation& formulation_;
+  const BodyDamage* damage_;
+  TermsOf terms_;
+  bool skip_;
+  DamageTraits traits_;
+  bool by_point_;  ///< evaluation points belong to points
+  BondSamples samples_;
+  std::vector<std::int32_t> groups_;  ///< with live points
+  GroupMarks own_, near_, wide_;
+  std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
+  BondScreen screen_;
+  std::size_t checked_ = 0;
+};
+
+}  // namespace perikit

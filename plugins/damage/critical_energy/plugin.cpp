@@ -1,0 +1,72 @@
+#include "perikit/sdk/plugin.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "perikit/core/simd.hpp"
+
+using namespace perikit;
+
+namespace {
+
+/// The energy of a bond, of bonds in extension alone, against the one at which the bonds that cross a unit of area hold Gc.
+class CriticalEnergy final : public Damage {
+ public:
+  CriticalEnergy(double energy_release_rate, bool shared) : energy_release_rate_(energy_release_rate), shared_(shared) {}
+
+  DamageTraits traits() const noexcept override {
+    return {.bits = true, .energy = true, .bound = shared_ ? ValueBound::energy_over_share : ValueBound::energy};
+  }
+
+  DamageLimits limits(const DamagePoint& x) const override {
+    const double limit = energy_release_rate_ / (shared_ ? x.crossing_shares : x.crossing);
+    if (!(limit > 0) || !std::isfinite(limit))
+      throw std::domain_error(
+          fmt::format("found energy_release_rate = {}, which gives bonds a critical energy of {} with this family and "
+                      "influence function; allowed: one that gives a finite energy > 0",
+                      energy_release_rate_, limit));
+    return {limit, limit};
+  }
+
+  void measure(const BondStates& b) const noexcept override {
+    for (int k = 0; k < b.n; ++k) b.value[k] = b.stretch[k] > 0 ? b.energy[k] / (shared_ ? b.share[k] : 1.0) : 0.0;
+  }
+
+  void integrity(const IntegrityBatch& b) const noexcept override {
+    for (int k = 0; k < b.n; ++k) b.integrity[k] = b.value[k] > b.failure[k] ? 0.0 : 1.0;
+  }
+
+ private:
+  double energy_release_rate_;
+  bool shared_;
+};
+
+PartDescription description() {
+  PartDescription part{
+      .name = "critical_energy",
+      .summary = "a bond breaks for good once it holds more energy than its part of Gc",
+      .parameters = {},
+      .examples = {"energy_release_rate = 0.05", "energy_release_rate = 0.05\nlimit = \"equal\""},
+      .equations =
+          "b = 0 once w_ij > w_c(xi) and s > 0,  w_ij the energy of the bond over V_i V_j\n"
+          "shared: w_c = Gc omega(xi)/(sum omega xi.n V_j over the bonds with xi.n > 0)\n"
+          "equal:  w_c = Gc/(sum xi.n V_j over these) -> 4 Gc/(pi delta^4) (3D), 3 Gc/(2 h delta^3) (2D)",
+      .source = "Foster, Silling, Chen, International Journal for Multiscale Computational Engineering 9 (2011) 675",
+      .limits = "bonds that are shorter than at rest never break; not with held faces, symmetry or periodic sides"};
+  part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").require().positive();
+  part.parameters
+      .choice("limit", {"shared", "equal"},
+              "Critical energies of near and far bonds: in proportion to what they hold in a homogeneous expansion, or equal.")
+      .by_default("\"shared\"");
+  return part;
+}
+
+}  // namespace
+
+PERIKIT_PLUGIN(registrar) {
+  registrar.damage(description(), [](const ParameterValues& values, const PartFactory&) {
+    return std::make_unique<CriticalEnergy>(values.number("energy_release_rate"), values.text("limit") == "shared");
+  });
+}

@@ -1,0 +1,137 @@
+/// What bonds hold: the shares of all bonds add up to the stored energy, and criteria by energy and stress let those fail that
+/// hold too much.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "tests/contract/integrator_fixture.hpp"
+#include "tests/contract/reference_body.hpp"
+
+using namespace perikit;
+using namespace perikit::contract;
+
+namespace {
+
+const char* const limit = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.6\n";
+
+/// Deforms the body with noise so that every direction grows; its energy.
+double respond(BodyProblem& problem, std::uint64_t seed) {
+  const Body& body = problem.body();
+  const FieldView u = problem.state().displacement();
+  deform(body, u, seed, 0.02);
+  for (const std::int32_t p : body.internal()) {
+    const Point x = body.position(static_cast<std::size_t>(p));
+    for (int c = 0; c < u.components; ++c) u.component(c)[p] += 0.2 * x[static_cast<std::size_t>(c)];
+  }
+  Field force = problem.make_field();
+  double energy = 0;
+  const EvaluationStatus status = problem.evaluate_forces(u, force, &energy);
+  REQUIRE_MESSAGE(status.ok(), status.description);
+  return energy;
+}
+
+/// Whether forces are -dE/du, so that bonds may fail; scenes with the others are refused.
+bool suits(const Example& example, int dimension) {
+  if (formulation_of(example).force_state == ForceState::variational) return true;
+  CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))),
+                       doctest::Contains("damage: found with"), InputError);
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: bonds share the stored energy, and those that hold the most of it fail by it, screened or not") {
+  for (const Example& example : kinematics_examples())
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d) || formulation_of(example).force_state == ForceState::local) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const auto plain = build(scene_text(options, kinematics_table(example)));
+        const double whole = respond(plain->problem(), 23);
+        const Body& body = plain->problem().body();
+        const std::vector<BondEnergy> shares = plain->problem().terms().bond_energies(plain->problem().state().displacement());
+        double sum = 0;
+        std::vector<double> densities;
+        const auto density = [&](const BondEnergy& b) {
+          return b.energy /
+                 (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far)));
+        };
+        for (std::size_t k = 0; k < shares.size(); ++k) {
+          if (k > 0) REQUIRE(shares[k - 1].bond < shares[k].bond);
+          sum += shares[k].energy;
+          densities.push_back(density(shares[k]));
+        }
+        CHECK(std::abs(sum - whole) <= 1e-12 * whole);
+        std::sort(densities.begin(), densities.end());
+        // Bonds that cross a unit of area, about.
+        const double crossing = d == 3   ? 0.785 * std::pow(body.horizon(), 4)
+                                : d == 2 ? 0.667 * body.section() * std::pow(body.horizon(), 3)
+                                         : 0.5 * body.section() * std::pow(body.horizon(), 2);
+        options.conditions = fmt::format(
+            "[damage]\ntype = \"critical_energy\"\nlimit = \"equal\"\nno_fail = [\"part\"]\nenergy_release_rate = {:.17g}\n",
+            crossing * densities[densities.size() * 9 / 10]);
+        const std::string text = scene_text(options, kinematics_table(example));
+        options.skip = false;
+        const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics_table(example)));
+        respond(screened->problem(), 23);
+        const FieldView u = screened->problem().state().displacement();
+        const BondUpdate update = screened->problem().terms().update_bonds(u);
+        CHECK(update.changed > 0);
+        CHECK(update.changed < shares.size());
+        std::set<std::pair<std::int32_t, std::int32_t>> failed;
+        for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
+        for (auto* other : {unscreened.get(), slow.get()}) {
+          CHECK(other->problem().terms().update_bonds(u).changed == update.changed);
+          for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
+        }
+        if (screened->problem().terms().has_gradients()) continue;  // fragments lose all of their bonds
+        const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
+        double least = INFINITY, most = 0;
+        for (const BondEnergy& b : shares) {
+          const bool gone = failed.contains({b.bond.point, b.bond.far});
+          if (safe.contains(b.bond.point) || safe.contains(b.bond.far))
+            CHECK(!gone);
+          else if (gone)
+            least = std::min(least, density(b));
+          else
+            most = std::max(most, density(b));
+        }
+        CHECK(most < least);
+      }
+}
+
+TEST_CASE("kinematics: bonds fail by the largest principal stress, that of the material in an affine motion") {
+  for (const Example& example : kinematics_examples())
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d) || formulation_of(example).pairs || formulation_of(example).force_state == ForceState::local)
+          continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const auto stretch = [](BodyProblem& of) {
+          set_field(of.body(), of.state().displacement(), [](const Point& x) {
+            return Point{0.03 * x[0], 0.01 * x[1], 0.02 * x[2]};
+          });
+        };
+        const auto plain = build(scene_text(options, kinematics_table(example)));
+        stretch(plain->problem());
+        PointSamples samples;
+        plain->problem().sample(samples);
+        const std::int32_t p = plain->problem().body().internal().front();
+        const double most = samples.cauchy.component(0)[p];
+        for (const double share : {1 + 1e-9, 1 - 1e-9}) {
+          options.conditions = fmt::format("[damage]\ntype = \"max_stress\"\nstrength = {:.17g}\n", share * most);
+          const auto simulation = build(scene_text(options, kinematics_table(example)));
+          stretch(simulation->problem());
+          const std::size_t bonds =
+              simulation->problem().terms().bond_energies(simulation->problem().state().displacement()).size();
+          const BondUpdate update = simulation->problem().terms().update_bonds(simulation->problem().state().displacement());
+          CHECK(update.changed == (share > 1 ? 0 : bonds));
+        }
+      }
+}
