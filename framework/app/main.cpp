@@ -52,8 +52,7 @@ void end_at_once(int status, void*) {
 /// what one of them meets alone, it tells after a while.
 int end(Communicator* ranks, int rank, int status, const std::string& message) {
   if (ranks && rank > 0 && sleep(4) > 0) std::_Exit(status);  // a signal: rank 0 has told it, and ends the others
-  if (ranks || rank == 0) tell(message + "
-");
+  if (ranks || rank == 0) tell(message + "\n");
   std::fflush(nullptr);
   if (ranks) ranks->abort(status);
   return status;
