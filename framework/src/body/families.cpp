@@ -136,10 +136,11 @@ std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_
   return reached;
 }
 
-std::vector<std::vector<std::int32_t>> block_reach(std::span<const double> rows, std::size_t points, int dimension,
-                                                   double horizon, std::size_t block_points) {
-  const CellList cells(rows, points, dimension, horizon);
-  const double limit = horizon * (1 + 1e-10);
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points) {
+  const std::span<const double> rows = body.rows();
+  const std::size_t points = body.points();
+  const CellList cells(rows, points, body.dimension(), body.horizon());
+  const double limit = body.horizon() * (1 + 1e-10);
   std::vector<std::vector<std::int32_t>> touches((points + block_points - 1) / block_points);
   parallel_for(touches.size(), [&](std::size_t b) {
     std::vector<std::int32_t>& units = touches[b];
@@ -148,7 +149,8 @@ std::vector<std::vector<std::int32_t>> block_reach(std::span<const double> rows,
       cells.around(&rows[4 * p], [&](std::int32_t q) {
         const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / block_points);
         if (unit == units.back() || std::ranges::find(units, unit) != units.end()) return;
-        if (squared_distance(rows, p, static_cast<std::size_t>(q)) <= limit * limit) units.push_back(unit);
+        if (squared_distance(rows, p, static_cast<std::size_t>(q)) > limit * limit) return;
+        if (!body.cut(body.position(p), body.position(static_cast<std::size_t>(q)))) units.push_back(unit);
       });
     std::sort(units.begin(), units.end());
   });

@@ -174,7 +174,7 @@ void Partition::keep_families(const Reach& reach) {
   fill_blocks();
   mark(Role::far);
   for (const std::size_t block : cloud_blocks) {
-    const auto touches = block_reach(whole_.rows(), points, whole_.dimension(), whole_.horizon(), block);
+    const auto touches = block_reach(whole_, block);
     const std::vector<std::int32_t> colours = block_colours(touches, touches.size());
     for (std::size_t b = 0; b < colours.size(); ++b)
       if (reached[b * block]) part_.colours[block].push_back(colours[b]);

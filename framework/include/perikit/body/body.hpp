@@ -170,9 +170,8 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
 std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
                                         std::vector<std::uint8_t> from);
 
-/// Blocks of so many points, and which of them hold points of their families.
-std::vector<std::vector<std::int32_t>> block_reach(std::span<const double> rows, std::size_t points, int dimension,
-                                                   double horizon, std::size_t block_points);
+/// Blocks of so many points of a cloud, and which of them hold points of their families, but for bonds that cracks cut.
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points);
 
 /// The first colour of which no earlier block touches one of the same units, block by block.
 std::vector<std::int32_t> block_colours(const std::vector<std::vector<std::int32_t>>& touches, std::size_t units);
