@@ -13,7 +13,12 @@ namespace perikit {
 
 namespace {
 
-/// K += w xi (x) xi. One piece of machine code for all who sum: mended families are bitwise what they were.
+// One piece of machine code for all who sum: mended families are bitwise what they were. A product that is added where it was
+// made may be rounded once or twice.
+
+[[gnu::noinline]] void add_weight(double w, double& sum) noexcept { sum += w; }
+
+/// K += w xi (x) xi
 template <int D>
 [[gnu::noinline]] void add_shape(double w, const Row& xi, double* K) noexcept {
   for (int a = 0; a < D; ++a)
@@ -68,14 +73,14 @@ void CloudFamilies::measure() {
       for (std::size_t k = 0; k < family.size(); ++k) {
         const std::int32_t j = family[k];
         const double w = omega[k] * position[j][3];
-        influences_[p] += w;
+        add_weight(w, influences_[p]);
         volumes_[p] += position[j][3];
         if (near_crack && body_.cut(x, body_.position(static_cast<std::size_t>(j)))) {
           family[k] = ~j;   // marked, until the lists are compacted
           ++cut;
           continue;
         }
-        intact += w;
+        add_weight(w, intact);
         if (needs_.shapes) add_shape<D>(w, position[j] - position[p], K);
       }
       const double share = influences_[p] > 0 ? intact / influences_[p] : 0.0;
@@ -118,7 +123,7 @@ void CloudFamilies::make_room() {
   const Row* position = positions(body_);
   for (std::size_t p = 0; p < n; ++p)
     for (std::int64_t k = lists_.first[p]; k < lists_.first[p + 1]; ++k)
-      intact_[p] += omega(static_cast<std::size_t>(k)) * position[lists_.neighbour[static_cast<std::size_t>(k)]][3];
+      add_weight(omega(static_cast<std::size_t>(k)) * position[lists_.neighbour[static_cast<std::size_t>(k)]][3], intact_[p]);
   if (needs_.shapes) return;
   influences_ = intact_;
   for (const CutBond& cut : cuts_) influences_[static_cast<std::size_t>(cut.point)] += cut.omega * position[cut.far][3];
@@ -133,7 +138,7 @@ void CloudFamilies::renew(std::size_t p) {
     const Row far = position[lists_.neighbour[k]], xi = far - position[p];
     const double w = integrity_[k] * whole_omega(k) * far[3];
     if (!omega_.empty()) omega_[k] = integrity_[k] * whole_[k];
-    intact += w;
+    add_weight(w, intact);
     if (!needs_.shapes) continue;
     add_shape<D>(w, xi, K);
     add_shape<D>(whole_omega(k) * far[3], xi, uncut);

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 
-#include "operators/batch.hpp"
 #include "operators/bond_samples.hpp"
 #include "perikit/core/simd.hpp"
 

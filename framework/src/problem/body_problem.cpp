@@ -8,7 +8,6 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "perikit/problem/body_problem.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"

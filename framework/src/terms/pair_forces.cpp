@@ -163,6 +163,51 @@ void PairForces<D>::add_forces_near(ConstFieldView u, const GroupMarks& marks, c
   loop_->run(pass);
 }
 
+template <int D>
+void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
+  FamilyArrays& family = bonds.family;
+  families_.load(p, BondsOf::intact, family);
+  for (auto* array : {&bonds.extension, &bonds.modulus, &bonds.omega, &bonds.energy, &bonds.force}) array->assign(family.size, 0.0);
+  for (std::size_t k = 0; k < family.far.size(); ++k) {
+    const auto far = static_cast<std::size_t>(family.far[k]);
+    bonds.omega[k] = family.whole_omega(k);
+    bonds.extension[k] = bond_stretch(body_, u, BondId::of(static_cast<std::int32_t>(p), family.far[k])) * family.length[k];
+    double& modulus = bonds.modulus[k];
+    modulus = fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
+    if (fields_.correction.size() == 0) continue;
+    double factor = 0;
+    for (int a = 0; a < D; ++a) {
+      const double cosine = family.xi[a][k] / family.length[k];
+      factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
+    }
+    modulus *= factor;
+  }
+  law_.bond_law({family.bonds, family.length.data(), bonds.omega.data(), bonds.extension.data(), bonds.modulus.data(),
+                 bonds.energy.data(), bonds.force.data(), nullptr});
+}
+
+template <int D>
+void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
+  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+    Bonds bonds;
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body_.alive(p)) continue;
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
+      const double q = formulation_.dilatation ? q_.data()[p] : 0.0;
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * q,
+                     factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
+        for (int a = 0; a < D; ++a) {
+          const double y = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
+          for (int e = 0; e < D; ++e) P.component(a * D + e)[p] += factor * y * family.xi[e][k];
+        }
+      }
+    }
+  });
+}
+
 /// Half of b V_i V_j w, and what the bond adds to V_i phi: that is shared as the bonds make up theta, phi_i/theta_i d theta_i.
 template <int D>
 void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
@@ -172,33 +217,16 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
   const std::size_t groups = body_.stride() / padding;
   parallel_for(groups, [&](std::size_t g) {
     if (!marks[g]) return;
-    FamilyArrays family;
-    AlignedVector<double> extension, modulus, omega, energy;
+    Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
       if (!body_.alive(p)) continue;
-      families_.load(p, BondsOf::intact, family);
-      for (auto* array : {&extension, &modulus, &omega, &energy}) array->assign(family.size, 0.0);
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
       const auto own = static_cast<std::int32_t>(p);
-      for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const auto far = static_cast<std::size_t>(family.far[k]);
-        omega[k] = family.whole_omega(k);
-        extension[k] = bond_stretch(body_, u, BondId::of(own, family.far[k])) * family.length[k];
-        modulus[k] =
-            fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
-        if (fields_.correction.size() == 0) continue;
-        double factor = 0;
-        for (int a = 0; a < D; ++a) {
-          const double cosine = family.xi[a][k] / family.length[k];
-          factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
-        }
-        modulus[k] *= factor;
-      }
-      law_.bond_law(
-          {family.bonds, family.length.data(), omega.data(), extension.data(), modulus.data(), energy.data(), nullptr, nullptr});
       const double theta = formulation_.dilatation ? scale_.data()[p] * theta_.data()[p] : 0.0;
       const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const double w = 0.5 * energy[k] + by_theta * omega[k] * family.length[k] * extension[k];
+        const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * bonds.extension[k];
         samples.add({own, family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w, {}});
       }
     }
@@ -308,6 +336,10 @@ std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples)
   if (formulation_.dilatation) {
     const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
     if (bad >= 0) return bad;
+  }
+  if (samples.virial) {
+    samples.P = body_.make_field(D * D);
+    add_virial(u, samples.P);
   }
   const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
   for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];

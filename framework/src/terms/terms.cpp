@@ -123,7 +123,7 @@ EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw
 }
 
 EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
-  samples = {};
+  samples = {.virial = samples.virial};
   samples.strain_energy_density = parts_.families->body().make_field(1);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
