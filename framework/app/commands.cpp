@@ -14,6 +14,7 @@
 #include "describe.hpp"
 #include "new_project.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -41,6 +42,23 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// What the set-up is at, on a terminal; gone when it is over, whatever its end.
+class SetUpLine {
+ public:
+  explicit SetUpLine(bool shown) : shown_(shown) {}
+  SetUpLine(const SetUpLine&) = delete;
+  SetUpLine& operator=(const SetUpLine&) = delete;
+  ~SetUpLine() {
+    if (shown_) tell("\r\033[K");
+  }
+  void write(const std::string& step) const {
+    if (shown_) tell(fmt::format("\r\033[Kset-up: {}", step));
+  }
+
+ private:
+  bool shown_;
+};
+
 /// Adds a line to run.log; a full disk must not hide why the run ended.
 void log_end(RunRecorder& recorder, const std::string& line) {
   try {
@@ -57,7 +75,10 @@ void run(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   const auto start = std::chrono::steady_clock::now();
-  Simulation simulation(scene, *registry);
+  const bool show = !options.quiet && communicator().rank() == 0 && isatty(STDERR_FILENO);
+  auto line = std::make_unique<SetUpLine>(show);
+  Simulation simulation(scene, *registry, [&](const std::string& step) { line->write(step); });
+  line.reset();
   const double set_up = seconds_since(start);
   const bool first = communicator().rank() == 0;     // which alone speaks
   const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place

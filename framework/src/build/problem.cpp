@@ -151,31 +151,39 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
 
 }  // namespace
 
-std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator) {
+std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
+                                           WorkSteps& steps) {
   const bool quasi_static = integrator.quasi_static;
   ProblemParts parts;
   TermParts of_terms{
       .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
   refuse_on_ranks(scene, of_terms.formulation, integrator);
+  steps.begin("points");
   Beyond beyond = place_points(scene, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
   const bool others = partition || parts.images;  // points that store nothing
   refuse_stress(scene, body, of_terms.formulation);
+  steps.begin("laws");
   parts.laws = build_laws(scene, factory, body, others);
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
+  steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
+  if (scene.damage) steps.begin("limits of bonds");
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
   of_terms.damage = parts.fracture.damage();
+  steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
+  steps.begin("evaluation points");
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
   if (others) parts.materials.push_back(scene.material->type);
 
+  steps.begin("boundaries and loads");
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);

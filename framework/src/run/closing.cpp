@@ -33,6 +33,7 @@ std::string RunRecorder::closing(double set_up) const {
   std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
   text += fmt::format("time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, steps_time,
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
+  if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
   if (steps > 0) {
     text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
                         steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);

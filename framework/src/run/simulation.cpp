@@ -12,11 +12,12 @@
 
 namespace perikit {
 
-Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(scene) {
+Simulation::Simulation(const Scene& scene, const PartFactory& factory, WorkSteps::Show show)
+    : set_up_(std::move(show)), scene_(scene) {
   if (scene_.threads) set_thread_count(*scene_.threads);
   integrator_ = factory.integrator(*scene_.integrator);
   traits_ = integrator_->traits();
-  problem_ = build_problem(scene_, factory, traits_);
+  problem_ = build_problem(scene_, factory, traits_, set_up_);
   if (traits_.dynamic) problem_->masses().by_point();   // refuses missing densities
   if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
     throw InputError(
@@ -28,6 +29,7 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   carried_ = carry_from_earlier_run(scene_, *problem_);
   evaluate_conditions();
   watch_pieces();
+  set_up_.end();
 }
 
 void Simulation::watch_pieces() {

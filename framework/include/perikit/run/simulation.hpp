@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "perikit/core/work_steps.hpp"
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
@@ -20,9 +21,12 @@ namespace perikit {
 class Simulation {
  public:
   /// Builds body, model and integrator. Throws InputError for what only building can show (empty sets, missing densities).
-  Simulation(const Scene& scene, const PartFactory& factory);
+  /// show: told of each step of the work as it begins.
+  Simulation(const Scene& scene, const PartFactory& factory, WorkSteps::Show show = {});
 
   const Scene& scene() const noexcept { return scene_; }
+  /// What the set-up took.
+  const WorkSteps& set_up() const noexcept { return set_up_; }
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   bool dynamic() const noexcept { return traits_.dynamic; }
@@ -44,6 +48,7 @@ class Simulation {
   /// What the integrator intends, a line.
   std::string plan();
 
+  WorkSteps set_up_;
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
