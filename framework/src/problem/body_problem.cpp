@@ -307,8 +307,11 @@ struct BeforeState {
     stride = in.value<std::uint64_t>();
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
-    history.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
-    in.bytes(history.data(), history.size() * sizeof(double));
+    for (auto ranks = in.value<std::uint64_t>(); ranks > 0; --ranks) {  // see write_history
+      const auto count = std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double));
+      history.resize(history.size() + count);
+      in.bytes(history.data() + history.size() - count, count * sizeof(double));
+    }
   }
 };
 
@@ -320,6 +323,7 @@ BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot
 }
 
 void BodyProblem::carry(std::span<const std::byte> snapshot) {
+  if (ghosts_) throw InputError("several ranks cannot take them over");
   const BeforeState before(snapshot);
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
   if (before.stride != body().stride()) throw InputError("the earlier run had another body");
