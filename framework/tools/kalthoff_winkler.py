@@ -20,12 +20,14 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/kalthoff_winkler.toml"
-KINEMATICS = {
-    "bond_based": "bond_based",
-    "ordinary": "ordinary",
-    "baqp": "baqp",
-    "conventional, silling": '{type="conventional",stabilization={type="silling",coefficient=1.0}}',
+STRETCH = '{type="critical_stretch",energy_release_rate=22.2e3,consistent=true,no_fail=["struck"]}'
+KINEMATICS = {  # by name: settings
+    "bond_based": ["kinematics=bond_based"],
+    "ordinary": ["kinematics=ordinary"],
+    "baqp": ["kinematics=baqp"],
+    "conventional, silling": ['kinematics={type="conventional",stabilization={type="silling",coefficient=1.0}}', "damage=" + STRETCH],
 }
+KERNELS = {"bond_based": ["constant"]}  # which the influence function does not change
 
 
 def turned_lattice(file, spacing, degrees):
@@ -52,7 +54,7 @@ def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
         text = text[:begin] + '[body.points]\nfile = "%s"\n\n' % points.name + text[end:]
     scene = folder.with_suffix(".toml")
     scene.write_text(text)
-    settings = ["kinematics=" + kinematics, "family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
+    settings = kinematics + ["family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
                 "output.frames=50"] + ([] if degrees else ["body.lattice.spacing=%g" % spacing])
     command = [perikit, "run", str(scene), "-o", str(folder), "--force", "--quiet", "--threads", str(threads)]
     subprocess.run(command + [word for setting in settings for word in ("--set", setting)], check=False)
@@ -93,7 +95,7 @@ def main():
     print("| kinematics | kernel | " + " | ".join("horizon %g%s" % (round(r), ", turned by %d degrees" % d if d else "") for r, d in cases) + " |")
     print("|" + "---|" * (2 + len(cases)))
     for name, kinematics in KINEMATICS.items():
-        for kernel in ("constant", "gaussian", "cubic_spline"):
+        for kernel in KERNELS.get(name, ("constant", "gaussian", "cubic_spline")):
             cells = []
             for ratio, degrees in cases:
                 folder = options.out / ("%s_%s_%d_%d" % (name.replace(", ", "_"), kernel, round(ratio), degrees))

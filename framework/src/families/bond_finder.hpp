@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "families/family_arrays.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/families/bonds.hpp"
@@ -16,7 +17,8 @@ class BondFinder {
   virtual ~BondFinder() = default;
   /// Bonds whose integrity is lower at u than it is now, in a fixed order. To be called in every step.
   virtual std::vector<BondChange> find(ConstFieldView u) = 0;
-  /// values[k] <- what the criterion compares with the limits of bonds[k], which are as they are now.
+  /// values[k] <- what the criterion compares with the limits of bonds[k], which are as they are now. u: any displacement; with
+  /// the very field of the last `find`, unchanged since, they are known.
   virtual void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) = 0;
   /// Forgets what it knows of bonds that are far from failing: bonds were restored.
   virtual void forget() noexcept = 0;
@@ -28,5 +30,7 @@ class BondFinder {
 
 /// The stretch of a bond of a body at u.
 double bond_stretch(const Body& body, ConstFieldView u, BondId bond) noexcept;
+/// The same of bond k in the family of a point; equal bits from both ends.
+double bond_stretch(const FamilyArrays& family, std::size_t k, std::size_t point, ConstFieldView u) noexcept;
 
 }  // namespace perikit

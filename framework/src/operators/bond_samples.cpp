@@ -1,7 +1,9 @@
 #include "operators/bond_samples.hpp"
 
 #include <algorithm>
-#include <tuple>
+#include <limits>
+
+#include "perikit/core/parallel.hpp"
 
 namespace perikit {
 
@@ -31,29 +33,59 @@ void BondSamples::add(int n, const BatchScratch& s) {
 }
 
 void BondSamples::merge() {
-  for (const auto& entries : of_thread_) all_.insert(all_.end(), entries.begin(), entries.end());
-  // Evaluation points of one bond or point come from one thread, in an order that is always the same.
-  std::stable_sort(all_.begin(), all_.end(),
-                   [](const Entry& a, const Entry& b) { return std::tie(a.owner, a.far) < std::tie(b.owner, b.far); });
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < all_.size(); ++k) {
-    Entry& last = all_[kept > 0 ? kept - 1 : 0];
-    if (kept == 0 || last.owner != all_[k].owner || last.far != all_[k].far) {
-      all_[kept++] = all_[k];
-      continue;
+  // Sorted by owner in one sweep, and then the few entries of each by their far ends.
+  std::int32_t highest = -1;
+  any_whole_ = false;
+  lowest_ = std::numeric_limits<std::int32_t>::max();
+  for (const auto& entries : of_thread_)
+    for (const Entry& entry : entries) {
+      lowest_ = std::min(lowest_, entry.owner);
+      highest = std::max(highest, entry.owner);
+      any_whole_ |= entry.far < 0;
     }
-    last.weight += all_[k].weight;
-    last.energy += all_[k].energy;
-    for (int c = 0; c < 6; ++c) last.stress[c] += all_[k].stress[c];
+  first_.assign(static_cast<std::size_t>(std::max<std::int64_t>(0, std::int64_t{highest} - lowest_ + 1)) + 1, 0);
+  const std::size_t owners = first_.size() - 1;
+  const auto place = [&](const Entry& entry) { return static_cast<std::size_t>(entry.owner - lowest_); };
+  for (const auto& entries : of_thread_)
+    for (const Entry& entry : entries) ++first_[place(entry) + 1];
+  for (std::size_t o = 0; o < owners; ++o) first_[o + 1] += first_[o];
+  all_.resize(first_.back());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1), left(owners);
+  for (const auto& entries : of_thread_)
+    for (const Entry& entry : entries) all_[next[place(entry)]++] = entry;
+  parallel_for(owners, [&](std::size_t o) {
+    // Evaluation points of one bond or point come from one thread, in an order that is always the same.
+    Entry *const begin = all_.data() + first_[o], *const end = all_.data() + first_[o + 1], *kept = begin;
+    std::stable_sort(begin, end, [](const Entry& a, const Entry& b) { return a.far < b.far; });
+    for (const Entry* entry = begin; entry != end; ++entry) {
+      if (kept == begin || kept[-1].far != entry->far) {
+        *kept++ = *entry;
+        continue;
+      }
+      Entry& last = kept[-1];
+      last.weight += entry->weight;
+      last.energy += entry->energy;
+      for (int c = 0; c < 6; ++c) last.stress[c] += entry->stress[c];
+    }
+    left[o] = static_cast<std::size_t>(kept - begin);
+  });
+  std::size_t kept = 0;
+  for (std::size_t o = 0; o < owners; ++o) {
+    std::copy_n(all_.begin() + static_cast<std::ptrdiff_t>(first_[o]), left[o], all_.begin() + static_cast<std::ptrdiff_t>(kept));
+    first_[o] = kept;
+    kept += left[o];
   }
+  first_.back() = kept;
   all_.resize(kept);
 }
 
 const BondSamples::Entry* BondSamples::find(std::int32_t owner, std::int32_t far) const noexcept {
-  const auto at = std::lower_bound(
-      all_.begin(), all_.end(), std::pair(owner, far),
-      [](const Entry& e, const std::pair<std::int32_t, std::int32_t>& key) { return std::pair(e.owner, e.far) < key; });
-  return at != all_.end() && at->owner == owner && at->far == far ? &*at : nullptr;
+  const std::int64_t o = std::int64_t{owner} - lowest_;
+  if (o < 0 || o + 1 >= std::ssize(first_)) return nullptr;
+  const Entry *const begin = all_.data() + first_[static_cast<std::size_t>(o)],
+                     *const end = all_.data() + first_[static_cast<std::size_t>(o) + 1];
+  const Entry* const at = std::lower_bound(begin, end, far, [](const Entry& e, std::int32_t key) { return e.far < key; });
+  return at != end && at->far == far ? at : nullptr;
 }
 
 }  // namespace perikit

@@ -31,6 +31,8 @@ class BondSamples {
   void add(const Entry& entry);
   /// After the loops: in ascending order, each owner and far end once, whatever thread they came from.
   void merge();
+  /// Nothing belongs to points as a whole.
+  bool of_bonds_alone() const noexcept { return !any_whole_; }
   const Entry* find(std::int32_t owner, std::int32_t far) const noexcept;
   std::span<const Entry> entries() const noexcept { return all_; }
   std::size_t bytes() const noexcept { return all_.capacity() * sizeof(Entry); }
@@ -46,6 +48,9 @@ class BondSamples {
   std::span<const std::uint8_t> kept_;
   std::vector<std::vector<Entry>> of_thread_;
   std::vector<Entry> all_;
+  bool any_whole_ = false;
+  std::int32_t lowest_ = 0;          ///< owner
+  std::vector<std::size_t> first_;   ///< by owner less the lowest: its first entry, and the end of the last one's
 };
 
 }  // namespace perikit

@@ -142,13 +142,14 @@ void BondCriterion::by_pieces(std::span<const std::int32_t> groups, ConstFieldVi
   checked_ += groups.size();
 }
 
-/// w_ij: see BondStates::energy.
-double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double whole_omega) const noexcept {
+/// w_ij of a bond with integrity b: see BondStates::energy.
+double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double b, double whole_omega) const noexcept {
   const double volumes = body_.volume(static_cast<std::size_t>(p)) * body_.volume(static_cast<std::size_t>(far));
-  const double b = families_.integrity({std::min(p, far), std::max(p, far)});
   double energy = 0;
   for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
-    if (const BondSamples::Entry* of_bond = samples_.find(owner, other)) energy += of_bond->energy / (b * volumes);
+    if (!by_point_)
+      if (const BondSamples::Entry* of_bond = samples_.find(owner, other)) energy += of_bond->energy / (b * volumes);
+    if (samples_.of_bonds_alone()) continue;
     const BondSamples::Entry* of_point = samples_.find(owner, -1);
     const auto i = static_cast<std::size_t>(owner);
     const double left = (1 - families_.damage(i)) * families_.normaliser(i, BondWeight::kernel);
@@ -175,9 +176,9 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const std::
   for (std::size_t k = 0; k < n; ++k) {
     const std::int32_t far = m.family.far[m.place[k]];
     m.length[k] = m.family.length[m.place[k]];
-    m.stretch[k] = bond_stretch(body_, u, BondId::of(p, far));
+    m.stretch[k] = bond_stretch(m.family, m.place[k], static_cast<std::size_t>(p), u);
     m.share[k] = m.all_shares[m.place[k]];
-    if (traits_.energy) m.energy[k] = energy_of(p, far, m.family.whole_omega(m.place[k]));
+    if (traits_.energy) m.energy[k] = energy_of(p, far, m.family.b(m.place[k]), m.family.whole_omega(m.place[k]));
     if (traits_.stress) {
       double weight = 0, stress[6] = {};
       for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
@@ -216,28 +217,37 @@ void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit
 
 std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   std::vector<BondChange> all;
+  found_.clear();
+  found_at_ = u.data;
   const std::vector<std::int32_t> near = skip_ ? near_failure(u) : groups_;
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
-    std::vector<std::vector<BondChange>> found(groups.size());
+    std::vector<std::vector<Found>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
       bonds_of(groups[g], u, [&](std::int32_t p, Bonds& m) {
         damage_->law->integrity(
             {static_cast<int>(m.place.size()), m.value.data(), m.onset.data(), m.failure.data(), m.integrity.data()});
         for (std::size_t k = 0; k < m.place.size(); ++k)
           if (m.integrity[k] < m.family.b(m.place[k]))
-            found[g].push_back({BondId::of(p, m.family.far[m.place[k]]), m.integrity[k]});
+            found[g].push_back({{BondId::of(p, m.family.far[m.place[k]]), m.integrity[k]}, m.value[k]});
       });
     });
-    for (const auto& of_group : found) all.insert(all.end(), of_group.begin(), of_group.end());
+    for (const auto& of_group : found) found_.insert(found_.end(), of_group.begin(), of_group.end());
   });
   // Where a bond lies in two pieces it was found in both.
-  std::sort(all.begin(), all.end(), [](const BondChange& a, const BondChange& b) { return a.bond < b.bond; });
-  all.erase(std::unique(all.begin(), all.end(), [](const BondChange& a, const BondChange& b) { return a.bond == b.bond; }),
-            all.end());
+  const auto bond = [](const Found& f) { return f.change.bond; };
+  std::ranges::sort(found_, {}, bond);
+  const auto rest = std::ranges::unique(found_, {}, bond);
+  found_.erase(rest.begin(), rest.end());
+  for (const Found& f : found_) all.push_back(f.change);
   return all;
 }
 
 void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+  if (u.data == found_at_) {
+    for (std::size_t k = 0; k < bonds.size(); ++k)
+      values[k] = std::ranges::lower_bound(found_, bonds[k], {}, [](const Found& f) { return f.change.bond; })->value;
+    return;
+  }
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
   std::vector<std::int32_t> groups;
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));

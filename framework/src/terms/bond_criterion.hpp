@@ -58,7 +58,7 @@ class BondCriterion final : public BondFinder {
   void bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit);
   /// The bonds of p with their states and values; `named`: these far ends alone.
   void load(std::int32_t p, ConstFieldView u, std::span<const std::int32_t> named, Bonds& bonds) const;
-  double energy_of(std::int32_t p, std::int32_t far, double whole_omega) const noexcept;
+  double energy_of(std::int32_t p, std::int32_t far, double b, double whole_omega) const noexcept;
 
   const Families& families_;
   const Body& body_;
@@ -74,6 +74,12 @@ class BondCriterion final : public BondFinder {
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
   std::size_t checked_ = 0;
+  struct Found {
+    BondChange change;
+    double value;
+  };
+  std::vector<Found> found_;          ///< by the last `find`, ascending
+  const double* found_at_ = nullptr;  ///< its displacement
 };
 
 }  // namespace perikit

@@ -171,7 +171,7 @@ void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) co
   for (std::size_t k = 0; k < family.far.size(); ++k) {
     const auto far = static_cast<std::size_t>(family.far[k]);
     bonds.omega[k] = family.whole_omega(k);
-    bonds.extension[k] = bond_stretch(body_, u, BondId::of(static_cast<std::int32_t>(p), family.far[k])) * family.length[k];
+    bonds.extension[k] = bond_stretch(family, k, p, u) * family.length[k];
     double& modulus = bonds.modulus[k];
     modulus = fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
     if (fields_.correction.size() == 0) continue;
