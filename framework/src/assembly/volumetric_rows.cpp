@@ -14,27 +14,28 @@ namespace perikit {
 
 namespace {
 
+/// b of one bond, zero beyond the dimension, and a vector of the field at a point: one neighbour, one multiply-add.
+typedef float Entry __attribute__((vector_size(16)));
+typedef double Vector __attribute__((vector_size(32)));
+
+Vector widened(const Entry& b) noexcept { return __builtin_convertvector(b, Vector); }
+
 template <int D>
 class Rows final : public VolumetricRows {
   using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
   using T = Tensor<double, S>;
-  /// b_ij and b_ji of neighbour j of point i.
-  struct Entry {
-    float b[D];
-  };
-
  public:
   explicit Rows(const SpaceParts& parts)
       : parts_(parts),
         rows_(parts.families),
-        own_(D * rows_.size()),
+        own_(rows_.size()),
         row_(rows_.bonds()),
         column_(rows_.bonds()),
         H_(rows_.size()),
         share_(rows_.size()),
         logarithms_(rows_.body().make_field(1)),
         stiffness_(rows_.body().make_field(1)) {
-    memory_.prepare([] { return std::make_unique<Memory>(); });
+    for (const std::int32_t j : rows_.lists().neighbour) far_.push_back(static_cast<std::int32_t>(rows_.point(static_cast<std::size_t>(j))));
   }
 
   std::int64_t linearise(ConstFieldView u) override {
@@ -54,15 +55,15 @@ class Rows final : public VolumetricRows {
   }
 
   void rates(ConstFieldView w, FieldView q) const override {
+    mirror_.resize(rows_.body().stride());
+    over_batches([&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) mirror_[rows_.point(i)] = vector_at(w, rows_.point(i));
+    });
     over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t p = rows_.point(i);
-        double sum = 0;
-        for (int c = 0; c < D; ++c) sum += own_[D * i + static_cast<std::size_t>(c)] * w.component(c)[p];
-        each(i, row_, [&](const Entry& b, std::size_t far) {
-          for (int c = 0; c < D; ++c) sum += b.b[c] * w.component(c)[far];
-        });
-        q.data[p] = sum;
+        Vector sum = own_[i] * mirror_[rows_.point(i)];
+        each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * mirror_[far]; });
+        q.data[rows_.point(i)] = total(sum);
       }
     });
   }
@@ -71,29 +72,20 @@ class Rows final : public VolumetricRows {
     over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t p = rows_.point(i);
-        double sum[D];
-        for (int c = 0; c < D; ++c) sum[c] = own_[D * i + static_cast<std::size_t>(c)] * q.data[p];
-        each(i, column_, [&](const Entry& b, std::size_t far) {
-          for (int c = 0; c < D; ++c) sum[c] += b.b[c] * q.data[far];
-        });
+        Vector sum = own_[i] * q.data[p];
+        each(i, column_, [&](const Entry& b, std::size_t far) { sum += widened(b) * q.data[far]; });
         for (int c = 0; c < D; ++c) f.component(c)[p] = sum[c];
       }
     });
   }
 
-  void squares(ConstFieldView weight, FieldView q) const override {
+  void squares(ConstFieldView c, FieldView q) const override {
     over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t p = rows_.point(i);
-        double sum = 0;
-        for (int c = 0; c < D; ++c) {
-          const double own = own_[D * i + static_cast<std::size_t>(c)];
-          sum += own * own * weight.component(c)[p];
-        }
-        each(i, row_, [&](const Entry& b, std::size_t far) {
-          for (int c = 0; c < D; ++c) sum += double(b.b[c]) * b.b[c] * weight.component(c)[far];
-        });
-        q.data[p] = sum;
+        Vector sum = own_[i] * own_[i] * vector_at(c, p);
+        each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * widened(b) * vector_at(c, far); });
+        q.data[p] = total(sum);
       }
     });
   }
@@ -119,9 +111,15 @@ class Rows final : public VolumetricRows {
 
   template <class Visit>
   void each(std::size_t i, const std::vector<Entry>& entries, Visit&& visit) const {
-    const std::int32_t* const far = rows_.lists().neighbour.data();
-    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) visit(entries[k], rows_.point(static_cast<std::size_t>(far[k])));
+    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) visit(entries[k], static_cast<std::size_t>(far_[k]));
   }
+
+  static Vector vector_at(ConstFieldView w, std::size_t p) noexcept {
+    Vector x{};
+    for (int c = 0; c < D; ++c) x[c] = w.component(c)[p];
+    return x;
+  }
+  static double total(const Vector& x) noexcept { return (x[0] + x[1]) + x[2]; }
 
   /// b_ij = Fbar_i^-T g_ij; false where Jbar_i <= 0.
   bool make_row(std::size_t i, ConstFieldView u, Memory& m) {
@@ -144,15 +142,17 @@ class Rows final : public VolumetricRows {
     if (!(J > 0)) return false;
     logarithms_.data()[p] = std::log1p(j);
     const T inverse_transpose = 1 / J * cofactor(add_diagonal(H, 1.0));
-    double own[D] = {};
-    for (std::size_t k = 0; k < neighbours.size(); ++k)
+    own_[i] = Vector{};
+    for (std::size_t k = 0; k < neighbours.size(); ++k) {
+      Entry entry{};
       for (int c = 0; c < D; ++c) {
         double b = 0;
         for (int e = 0; e < D; ++e) b += inverse_transpose(c, e) * m.g[k * D + static_cast<std::size_t>(e)];
-        row_[first + k].b[c] = static_cast<float>(b);
-        own[c] -= row_[first + k].b[c];
+        entry[c] = static_cast<float>(b);
       }
-    std::copy_n(own, D, &own_[D * i]);
+      row_[first + k] = entry;
+      own_[i] -= widened(entry);
+    }
     return true;
   }
 
@@ -199,7 +199,9 @@ class Rows final : public VolumetricRows {
 
   SpaceParts parts_;
   BlockRows rows_;
-  AlignedVector<double> own_;         ///< b_ii
+  AlignedVector<Vector> own_;         ///< b_ii
+  std::vector<std::int32_t> far_;     ///< field index by bond
+  mutable AlignedVector<Vector> mirror_;
   std::vector<Entry> row_, column_;   ///< b_ij, b_ji by bond
   std::vector<T> H_;                  ///< Fbar - I at the state of the rows
   std::vector<double> share_;  ///< c of the selective map
