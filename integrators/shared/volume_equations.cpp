@@ -34,11 +34,13 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
     for (std::int64_t b = companion.row_first[r]; b < companion.row_first[r + 1]; ++b) {
       const auto block = static_cast<std::size_t>(b);
       if (static_cast<std::size_t>(companion.column[block]) != r) continue;
-      for (std::size_t a = 0; a < d; ++a)
-        inverse_D_.component(static_cast<int>(a))[companion.point[r]] = 1 / companion.values[(block * d + a) * d + a];
+      for (std::size_t a = 0; a < d; ++a) {
+        const auto p = static_cast<std::size_t>(companion.point[r]);
+        const double stiffness = companion.values[(block * d + a) * d + a];  // images have none
+        inverse_D_.component(static_cast<int>(a))[p] = stiffness > 0 && free.component(static_cast<int>(a))[p] != 0 ? 1 / stiffness : 0.0;
+      }
     }
   });
-  mask(free, inverse_D_);
   fill(1.0, force_);
   volumes_->squares(force_, row_norms_);
   volumes_->squares(inverse_D_, inverse_diagonal_);
