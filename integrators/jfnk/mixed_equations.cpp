@@ -60,8 +60,8 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
   note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
   if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;
   failure = !failure_.empty() ? failure_
-                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})", reached,
-                                            iterations, restart_);
+                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})",
+                                            reached, iterations, restart_);
   return false;
 }
 

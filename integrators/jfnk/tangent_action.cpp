@@ -7,13 +7,16 @@
 
 namespace perikit {
 
-TangentAction::TangentAction(Problem& problem, bool differences) : problem_(problem), differences_(differences), u_(problem.make_field()) {
+TangentAction::TangentAction(Problem& problem, bool differences)
+    : problem_(problem), differences_(differences), u_(problem.make_field()) {
   if (!differences) return;
   moved_ = problem.make_field();
   force_ = problem.make_field();
 }
 
-void TangentAction::move_to(ConstFieldView u) { copy(u, u_); }
+void TangentAction::move_to(ConstFieldView u) {
+  copy(u, u_);
+}
 
 bool TangentAction::apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
   if (differences_) return difference(equilibrium, w, Kw, failure);

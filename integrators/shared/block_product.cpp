@@ -11,8 +11,7 @@ void multiply(const BlockMatrix& K, ConstFieldView w, FieldView Kw) {
     double sum[3] = {};
     for (std::int64_t b = K.row_first[r]; b < K.row_first[r + 1]; ++b) {
       const double* block = &K.values[static_cast<std::size_t>(b * d * d)];
-      const auto p =
-          static_cast<std::size_t>(K.point[static_cast<std::size_t>(K.column[static_cast<std::size_t>(b)])]);
+      const auto p = static_cast<std::size_t>(K.point[static_cast<std::size_t>(K.column[static_cast<std::size_t>(b)])]);
       for (int a = 0; a < d; ++a)
         for (int c = 0; c < d; ++c) sum[a] += block[a * d + c] * w.component(c)[p];
     }

@@ -17,7 +17,8 @@ bool MixedSystem::multiply(const Product& K, FieldView x, FieldView y) {
   const FieldView p = pressure(x), force = displacement(y), volume = pressure(y);
   if (!K(displacement(x), force)) return false;
   volumes_.rates(displacement(x), rate_);
-  const ConstFieldView W = volumes_.stiffness(), inverse_W = volumes_.compliance(), size = volumes_.row_norms(), active = volumes_.active();
+  const ConstFieldView W = volumes_.stiffness(), inverse_W = volumes_.compliance(), size = volumes_.row_norms(),
+                       active = volumes_.active();
   over_blocks(p.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const double Bu = rate_.data()[k];
@@ -39,7 +40,8 @@ void MixedSystem::precondition(FieldView r, FieldView z) {
       for (std::size_t k = begin; k < end; ++k) body(k);
     });
   };
-  over_points([&](std::size_t k) { rate_.data()[k] = active.data[k] != 0 ? -inverse_W.data[k] / size.data[k] * volume.data[k] : 0.0; });
+  over_points(
+      [&](std::size_t k) { rate_.data()[k] = active.data[k] != 0 ? -inverse_W.data[k] / size.data[k] * volume.data[k] : 0.0; });
   volumes_.solve_schur(rate_, excess_);
   volumes_.forces(excess_, force_);
   combine(1, displacement(r), -1, force_, force_);

@@ -14,18 +14,20 @@ namespace perikit {
 ///   [ A   B^T  ] [u]   [r]
 ///   [ B  -W^-1 ] [p] = [0],     A w = K w - B^T W B w,
 ///
-/// for any B and W, so that the answer is that of the exact tangent. A Krylov method on it takes hardly more iterations where the bulk
-/// modulus grows; on K alone it takes the root of it times as many, even with the exact inverse of A. The preconditioner is the upper
-/// triangle with -S, S the Schur complement, in place of -W^-1, and one multigrid cycle of a companion in place of A^-1.
+/// for any B and W, so that the answer is that of the exact tangent. A Krylov method on it takes hardly more iterations where the
+/// bulk modulus grows; on K alone it takes the root of it times as many, even with the exact inverse of A. The preconditioner is
+/// the upper triangle with -S, S the Schur complement, in place of -W^-1, and one multigrid cycle of a companion in place of
+/// A^-1.
 ///
-/// Vectors have `dimension` components of u and one of p. The second row is multiplied by W_i |b_i|, which makes the residual as large
-/// as what its error in volumes is as a force: a small residual here is a small one of K u = r.
+/// Vectors have `dimension` components of u and one of p. The second row is multiplied by W_i |b_i|, which makes the residual as
+/// large as what its error in volumes is as a force: a small residual here is a small one of K u = r.
 class MixedSystem {
  public:
   /// Kw <- K w on free components, 0 elsewhere; false where that fails.
   using Product = std::function<bool(ConstFieldView w, FieldView Kw)>;
 
-  MixedSystem(Problem& problem, std::unique_ptr<VolumetricPart> volumes) : problem_(problem), volumes_(problem, std::move(volumes)) {}
+  MixedSystem(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
+      : problem_(problem), volumes_(problem, std::move(volumes)) {}
 
   Field make_vector() const { return problem_.body().make_field(problem_.dimension() + 1); }
   FieldView displacement(FieldView x) const { return {x.data, x.stride, x.components - 1}; }

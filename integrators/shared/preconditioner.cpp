@@ -178,7 +178,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 }
 
 bool mixed_pays(Problem& problem) {
-  constexpr double least_ratio = 50;
+  constexpr double least_ratio = 200;
   return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 

@@ -60,7 +60,7 @@ class Preconditioner {
 void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 
 /// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has the
-/// volumes that they need: the bulk modulus is at least 50 shear moduli somewhere, and the factorisation does not pay.
+/// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere, and the factorisation does not pay.
 bool mixed_pays(Problem& problem);
 
 /// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"

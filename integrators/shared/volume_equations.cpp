@@ -11,7 +11,7 @@ namespace perikit {
 
 namespace {
 
-constexpr double schur_accuracy = 0.1;       // of the two solves with L: a better one saves few iterations of the outer method
+constexpr double schur_accuracy = 0.1;  // of the two solves with L: a better one saves few iterations of the outer method
 constexpr double correction_accuracy = 0.05;
 constexpr int most_products = 200, most_corrections = 3;
 
@@ -19,7 +19,8 @@ constexpr int most_products = 200, most_corrections = 3;
 
 VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
     : problem_(problem), volumes_(std::move(volumes)) {
-  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &scaled_, &direction_, &product_, &first_, &second_})
+  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &scaled_, &direction_, &product_,
+                        &first_, &second_})
     *scalar = problem.body().make_field(1);
   for (Field* vector : {&inverse_D_, &force_, &action_}) *vector = problem.make_field();
 }
@@ -37,7 +38,8 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
       for (std::size_t a = 0; a < d; ++a) {
         const auto p = static_cast<std::size_t>(companion.point[r]);
         const double stiffness = companion.values[(block * d + a) * d + a];  // images have none
-        inverse_D_.component(static_cast<int>(a))[p] = stiffness > 0 && free.component(static_cast<int>(a))[p] != 0 ? 1 / stiffness : 0.0;
+        inverse_D_.component(static_cast<int>(a))[p] =
+            stiffness > 0 && free.component(static_cast<int>(a))[p] != 0 ? 1 / stiffness : 0.0;
       }
     }
   });

@@ -9,14 +9,15 @@
 
 namespace perikit {
 
-/// K = A + B^T W B at one state, B of VolumetricPart and W what of the stiffness of its points exceeds that of bulk moduli of `ordinary`
-/// shear moduli: A is the tangent of a compressible body. Points without such an excess have W = 0 and no pressure. With D the diagonal
-/// of a companion of A,
+/// K = A + B^T W B at one state, B of VolumetricPart and W what of the stiffness of its points exceeds that of bulk moduli of
+/// `ordinary` shear moduli: A is the tangent of a compressible body. Points without such an excess have W = 0 and no pressure.
+/// With D the diagonal of a companion of A,
 ///
 ///   L = B D^-1 B^T + W^-1
 ///
-/// is symmetric and positive definite, a product costs two passes over the bonds, and conjugate gradients solve it in 4 (bulk modulus
-/// of 100 shear moduli) to 30 (10^4) of them to a tenth: point gradients smooth, so that short waves of volume rest on W^-1 alone.
+/// is symmetric and positive definite, a product costs two passes over the bonds, and conjugate gradients solve it in 4 (bulk
+/// modulus of 100 shear moduli) to 30 (10^4) of them to a tenth: point gradients smooth, so that short waves of volume rest on
+/// W^-1 alone.
 class VolumeEquations {
  public:
   static constexpr double ordinary = 5.0 / 3;  ///< lambda = mu: springs can be so stiff against changes of volume and no more
@@ -41,9 +42,9 @@ class VolumeEquations {
   void solve_schur(ConstFieldView r, FieldView p);
 
   /// du += the least motion, in the norm of D, after which ln Jbar(u + du) is ln Jbar(u) + B du: the second-order correction of
-  /// sequential quadratic programming [Nocedal and Wright, 18.3]. What a full step errs in volumes, which is of second order, the bulk
-  /// modulus would turn into pressures far beyond the true ones. Stops where B^T W times the error is below `enough` [N], or the
-  /// error no longer falls. B is that of another state afterwards. Returns the norms of the error before and after.
+  /// sequential quadratic programming [Nocedal and Wright, 18.3]. What a full step errs in volumes, which is of second order, the
+  /// bulk modulus would turn into pressures far beyond the true ones. Stops where B^T W times the error is below `enough` [N], or
+  /// the error no longer falls. B is that of another state afterwards. Returns the norms of the error before and after.
   std::pair<double, double> correct(ConstFieldView u, double enough, FieldView du);
 
  private:

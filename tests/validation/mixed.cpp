@@ -20,13 +20,15 @@ std::string scene(int dimension, int cells, double ratio, const std::string& int
                   const std::string& more = "") {
   const bool solid = dimension == 3;
   return fmt::format(
-      "format = 1\n[body]\ndimension = {0}\n{1}[body.lattice]\nspacing = {2:.17g}\nlower = [{3}{4:.17g}]\nupper = [{5}1]\njitter = {6}\n"
+      "format = 1\n[body]\ndimension = {0}\n{1}[body.lattice]\nspacing = {2:.17g}\nlower = [{3}{4:.17g}]\nupper = [{5}1]\njitter "
+      "= {6}\n"
       "[sets]\nheld = \"{7} < 0\"\nend = \"{7} > 1 - {2:.17g}\"\n[family]\nhorizon_ratio = 2.015\ninfluence = \"cubic_spline\"\n"
       "[kinematics]\ntype = \"selective\"\nbase = \"baqp\"\n"
       "[material]\ntype = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = {8}\n"
       "[[boundary]]\nset = \"held\"\ndisplacement = [{9}]\n[[load]]\nset = \"end\"\nforce = [{10}]\n{11}[integrator]\n{12}\n",
-      dimension, solid ? "" : "plane = \"strain\"\n", 1.0 / cells, solid ? "0, 0, " : "0, ", -3.0 / cells, solid ? "1, 1, " : "1, ", jitter,
-      solid ? "z" : "y", ratio, solid ? "0, 0, 0" : "0, 0", solid ? "0.05, 0, 0.1" : "0.05, 0.1", more, integrator);
+      dimension, solid ? "" : "plane = \"strain\"\n", 1.0 / cells, solid ? "0, 0, " : "0, ", -3.0 / cells,
+      solid ? "1, 1, " : "1, ", jitter, solid ? "z" : "y", ratio, solid ? "0, 0, 0" : "0, 0",
+      solid ? "0.05, 0, 0.1" : "0.05, 0.1", more, integrator);
 }
 
 std::string jfnk(const std::string& preconditioner, double tolerance = 1e-8) {
@@ -51,7 +53,8 @@ double distance(Simulation& a, Simulation& b) {
   double most = 0;
   for (const std::int32_t p : a.problem().body().internal())
     for (int c = 0; c < a.problem().dimension(); ++c)
-      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] - b.problem().state().displacement().component(c)[p]));
+      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] -
+                                     b.problem().state().displacement().component(c)[p]));
   return most;
 }
 
@@ -90,7 +93,8 @@ TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D,
 
 TEST_CASE("bonds that fail: newton's solution and newton's bonds") {
   const std::string damage = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n";
-  const auto exact = make(scene(2, 9, 1000, newton, "0", damage)), found = make(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
+  const auto exact = make(scene(2, 9, 1000, newton, "0", damage)),
+             found = make(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
   run(*exact);
   run(*found);
   CHECK(!exact->problem().terms().changed_bonds().empty());
@@ -114,6 +118,7 @@ TEST_CASE("mixed is refused without point volumes, and by kinsol") {
   std::string plain = scene(3, 3, 5, jfnk("mixed"));
   plain.replace(plain.find("\"selective\"\nbase = \"baqp\""), std::strlen("\"selective\"\nbase = \"baqp\""), "\"baqp\"");
   Protocol protocol;
-  CHECK_THROWS_WITH(make(plain)->run(protocol), doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective"));
+  CHECK_THROWS_WITH(make(plain)->run(protocol),
+                    doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective"));
   CHECK_THROWS_WITH(make(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
 }

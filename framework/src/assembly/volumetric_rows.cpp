@@ -4,7 +4,6 @@
 #include <cmath>
 #include <type_traits>
 
-
 #include "assembly/assembly.hpp"
 #include "perikit/core/dimension.hpp"
 #include "perikit/core/tensor.hpp"
@@ -18,12 +17,15 @@ namespace {
 typedef float Entry __attribute__((vector_size(16)));
 typedef double Vector __attribute__((vector_size(32)));
 
-Vector widened(const Entry& b) noexcept { return __builtin_convertvector(b, Vector); }
+Vector widened(const Entry& b) noexcept {
+  return __builtin_convertvector(b, Vector);
+}
 
 template <int D>
 class Rows final : public VolumetricRows {
   using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
   using T = Tensor<double, S>;
+
  public:
   explicit Rows(const SpaceParts& parts)
       : parts_(parts),
@@ -35,7 +37,8 @@ class Rows final : public VolumetricRows {
         share_(rows_.size()),
         logarithms_(rows_.body().make_field(1)),
         stiffness_(rows_.body().make_field(1)) {
-    for (const std::int32_t j : rows_.lists().neighbour) far_.push_back(static_cast<std::int32_t>(rows_.point(static_cast<std::size_t>(j))));
+    for (const std::int32_t j : rows_.lists().neighbour)
+      far_.push_back(static_cast<std::int32_t>(rows_.point(static_cast<std::size_t>(j))));
   }
 
   std::int64_t linearise(ConstFieldView u) override {
@@ -156,8 +159,8 @@ class Rows final : public VolumetricRows {
     return true;
   }
 
-  /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. What a torn family shares in
-  /// the volumes of its evaluation points is c (maps/selective_map.hpp).
+  /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. What a torn family
+  /// shares in the volumes of its evaluation points is c (maps/selective_map.hpp).
   std::int64_t find_stiffness(std::size_t begin, std::size_t end, Memory& m) {
     const int n = static_cast<int>(end - begin);
     for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
@@ -178,7 +181,8 @@ class Rows final : public VolumetricRows {
     for (int l = 0; l < n; ++l) {
       const std::size_t i = begin + static_cast<std::size_t>(l), p = rows_.point(i);
       double sum = 0;
-      for (int c = 0; c < S::components; ++c) sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
+      for (int c = 0; c < S::components; ++c)
+        sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
       const double weight = rows_.volume(i) * (1 - parts_.families.damage(p));
       stiffness_.data()[p] = weight * share_[i] * share_[i] * std::max(0.0, sum / 9);
     }
@@ -195,16 +199,14 @@ class Rows final : public VolumetricRows {
     }
   }
 
-
-
   SpaceParts parts_;
   BlockRows rows_;
-  AlignedVector<Vector> own_;         ///< b_ii
-  std::vector<std::int32_t> far_;     ///< field index by bond
+  AlignedVector<Vector> own_;      ///< b_ii
+  std::vector<std::int32_t> far_;  ///< field index by bond
   mutable AlignedVector<Vector> mirror_;
-  std::vector<Entry> row_, column_;   ///< b_ij, b_ji by bond
-  std::vector<T> H_;                  ///< Fbar - I at the state of the rows
-  std::vector<double> share_;  ///< c of the selective map
+  std::vector<Entry> row_, column_;  ///< b_ij, b_ji by bond
+  std::vector<T> H_;                 ///< Fbar - I at the state of the rows
+  std::vector<double> share_;        ///< c of the selective map
   Field logarithms_, stiffness_;
   PerThread<Memory> memory_;
 };
@@ -212,7 +214,8 @@ class Rows final : public VolumetricRows {
 }  // namespace
 
 std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts) {
-  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<VolumetricRows> { return std::make_unique<Rows<d>>(parts); });
+  return with_dimension(parts.families.body().dimension(),
+                        [&](auto d) -> std::unique_ptr<VolumetricRows> { return std::make_unique<Rows<d>>(parts); });
 }
 
 }  // namespace perikit

@@ -10,8 +10,8 @@
 
 namespace perikit {
 
-/// Row i of B: b_ij = Fbar_i^-T g_ij by neighbour and b_ii = -sum_j b_ij, g_ij the stencil of the point gradient. Entries are of single
-/// precision: products with them are limited by memory. B^T has the same numbers, so that both remain adjoint.
+/// Row i of B: b_ij = Fbar_i^-T g_ij by neighbour and b_ii = -sum_j b_ij, g_ij the stencil of the point gradient. Entries are of
+/// single precision: products with them are limited by memory. B^T has the same numbers, so that both remain adjoint.
 class VolumetricRows {
  public:
   virtual ~VolumetricRows() = default;

@@ -6,13 +6,14 @@
 
 namespace perikit {
 
-/// At one state the tangent is K = A + B^T W B, B the rates of the logarithmic volumes of points and W a diagonal of about their bulk moduli
-/// times volumes, A what is left: with W near the whole, A is the tangent of a compressible body. B has one row a point,
+/// At one state the tangent is K = A + B^T W B, B the rates of the logarithmic volumes of points and W a diagonal of about their
+/// bulk moduli times volumes, A what is left: with W near the whole, A is the tangent of a compressible body. B has one row a
+/// point,
 ///
 ///   (B w)_i = tr(Fbar_i^-1 dFbar_i) = d(ln Jbar_i) w,   Fbar the point gradient:
 ///
-/// where a body has far more bulk than shear modulus, pressures p = W B u as further unknowns make its equations well conditioned.
-/// Fields of displacements and forces have `dimension` components, those of volumes and pressures one.
+/// where a body has far more bulk than shear modulus, pressures p = W B u as further unknowns make its equations well
+/// conditioned. Fields of displacements and forces have `dimension` components, those of volumes and pressures one.
 class VolumetricPart {
  public:
   virtual ~VolumetricPart() = default;
@@ -26,7 +27,8 @@ class VolumetricPart {
   virtual void squares(ConstFieldView c, FieldView q) const = 0;
   /// ln Jbar by point, of the state of B.
   virtual ConstFieldView logarithms() const = 0;
-  /// By point: the second derivative of its energy where its volume grows alone, d^2/d(ln Jbar)^2 [J]; 0 where there is no energy.
+  /// By point: the second derivative of its energy where its volume grows alone, d^2/d(ln Jbar)^2 [J]; 0 where there is no
+  /// energy.
   virtual ConstFieldView stiffness() const = 0;
 };
 
