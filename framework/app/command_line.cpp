@@ -34,7 +34,11 @@ void add_commands(CLI::App& app, Options& options) {
   run_command->add_flag("--resume", options.resume, "Go on from the last checkpoint of the folder");
   run_command->add_flag("--force", options.force, "Replace files in the folder that perikit did not write");
   run_command->add_flag("--quiet", options.quiet, "No progress, no summary");
-  with_scene(add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check));
+  CLI::App* check_command =
+      add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check);
+  with_scene(check_command);
+  check_command->add_option("--ranks", options.ranks, "Predict what each of so many ranks holds and exchanges")
+      ->check(CLI::Range(1, 100000));
   CLI::App* study_command =
       add("study", "Run a scene for lists of values of some of its keys; write a table and a work-precision plot", study);
   study_command->add_option("study", options.scene, "Study file (TOML)")->required();

@@ -13,9 +13,12 @@
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "new_project.hpp"
+#include "perikit/core/communicator.hpp"
+#include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
+#include "ranks.hpp"
 
 namespace perikit::app {
 
@@ -28,13 +31,33 @@ std::unique_ptr<Registry> open_registry(const Options& options) {
 }
 
 Scene read(const Options& options, Registry& registry) {
-  if (options.threads > 0) set_thread_count(options.threads);
+  if (options.threads > 0)
+    set_thread_count(options.threads);
+  else if (communicator().size() > 1)
+    set_thread_count(cores_of_rank());
   return read_scene(options.scene, registry, {options.overrides, options.trust});
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
+
+/// What the set-up is at, on a terminal; gone when it is over, whatever its end.
+class SetUpLine {
+ public:
+  explicit SetUpLine(bool shown) : shown_(shown) {}
+  SetUpLine(const SetUpLine&) = delete;
+  SetUpLine& operator=(const SetUpLine&) = delete;
+  ~SetUpLine() {
+    if (shown_) tell("\r\033[K");
+  }
+  void write(const std::string& step) const {
+    if (shown_) tell(fmt::format("\r\033[Kset-up: {}", step));
+  }
+
+ private:
+  bool shown_;
+};
 
 /// Adds a line to run.log; a full disk must not hide why the run ended.
 void log_end(RunRecorder& recorder, const std::string& line) {
@@ -52,10 +75,14 @@ void run(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   const auto start = std::chrono::steady_clock::now();
-  Simulation simulation(scene, *registry);
+  const bool show = !options.quiet && communicator().rank() == 0 && isatty(STDERR_FILENO);
+  auto line = std::make_unique<SetUpLine>(show);
+  Simulation simulation(scene, *registry, [&](const std::string& step) { line->write(step); });
+  line.reset();
   const double set_up = seconds_since(start);
-  const std::string summary = simulation.summary();   // estimates the step: not after a checkpoint is in place
-  if (options.explain) fmt::print("{}", simulation.explanation(*registry));
+  const bool first = communicator().rank() == 0;     // which alone speaks
+  const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
                        library_fingerprints(*registry), options.force);
@@ -65,8 +92,10 @@ void run(const Options& options) {
                                                                         recorder.resumed_step(), simulation.problem().state().time)
                                                           : "no checkpoint to resume from: the run starts from its initial state";
     recorder.log(from);
-    if (!options.quiet) fmt::print("{}\n", from);
+    if (!options.quiet && first) fmt::print("{}\n", from);
   }
+  if (communicator().size() > 1)
+    if (const std::string warning = crowded(thread_count()); !warning.empty()) recorder.log(warning);
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused())
     recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
@@ -80,7 +109,7 @@ void run(const Options& options) {
   }
   const std::string closing = recorder.closing(set_up);
   log_end(recorder, closing);
-  if (!options.quiet)
+  if (!options.quiet && first)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());
   if (recorder.cancelled()) {
     const std::string stopped = fmt::format(
@@ -96,6 +125,7 @@ void check(const Options& options) {
   const Scene scene = read(options, *registry);
   Simulation simulation(scene, *registry);
   std::string summary = simulation.summary();   // which may still refuse
+  if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks);
   if (options.explain) summary += simulation.explanation(*registry);
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.

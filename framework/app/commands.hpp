@@ -17,7 +17,7 @@ struct Options {
   std::filesystem::path scene, output, library;
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
-  int threads = 0, jobs = 1;
+  int threads = 0, jobs = 1, ranks = 1;
   bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false;
   std::string kind, part;
   PlotOptions plot;

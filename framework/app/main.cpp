@@ -12,9 +12,14 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <new>
+#include <optional>
+#include <string>
 
 #include "command_line.hpp"
+#include "commands.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
@@ -26,6 +31,8 @@ void stop(int signal) {
   perikit::request_stop();
   std::signal(signal, SIG_DFL);
 }
+
+using namespace perikit;
 
 /// Where a standard stream is closed, the next file that is opened would take its place, and messages would go into results.
 void open_standard_streams() {
@@ -41,30 +48,58 @@ void end_at_once(int status, void*) {
   ::_exit(status);
 }
 
+/// One message and one status for all ranks. What all of them meet rank 0 tells, and ends the others before they tell it again;
+/// what one of them meets alone, it tells after a while.
+int end(Communicator* ranks, int rank, int status, const std::string& message) {
+  if (ranks && rank > 0 && sleep(4) > 0) std::_Exit(status);  // a signal: rank 0 has told it, and ends the others
+  if (ranks || rank == 0) tell(message + "\n");
+  std::fflush(nullptr);
+  if (ranks) ranks->abort(status);
+  return status;
+}
+
+/// Reads the command line; of several ranks rank 0 alone speaks.
+std::optional<int> read_command_line(int argc, char** argv, int rank, app::Options& options) {
+  if (rank == 0) return app::read_command_line(argc, argv, options);
+  const int out = dup(STDOUT_FILENO), err = dup(STDERR_FILENO), nowhere = open("/dev/null", O_WRONLY);
+  dup2(nowhere, STDOUT_FILENO);
+  dup2(nowhere, STDERR_FILENO);
+  const std::optional<int> status = app::read_command_line(argc, argv, options);
+  std::fflush(nullptr);
+  dup2(out, STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  for (const int file : {out, err, nowhere}) close(file);
+  return status;
+}
+
 /// Every way in which a command can end.
 int status_of(int argc, char** argv) {
-  using namespace perikit;
+  const Launch launch = find_launch();
+  std::unique_ptr<Communicator> ranks;
+  std::optional<CommunicatorScope> scope;
+  const auto end_with = [&](int status, const std::string& message) { return end(ranks.get(), launch.rank, status, message); };
   try {
     app::Options options;
-    if (const std::optional<int> status = app::read_command_line(argc, argv, options)) return *status;
+    if (const std::optional<int> status = read_command_line(argc, argv, launch.rank, options)) return *status;
+    if (launch.size > 1 && options.command != app::run)
+      throw InputError(
+          fmt::format("found {} processes ({}); allowed: one, but for `perikit run`, which shares out a scene among them",
+                      launch.size, launch.variable));
+    ranks = join_ranks(launch);
+    if (ranks) scope.emplace(*ranks);
     options.command(options);
     return app::done;
   } catch (const InputError& e) {
-    tell(fmt::format("{}\n", e.what()));
-    return app::input_refused;
+    return end_with(app::input_refused, e.what());
   } catch (const RunError& e) {
-    tell(fmt::format("the run failed: {}\n", e.what()));
-    return app::run_failed;
+    return end_with(app::run_failed, fmt::format("the run failed: {}", e.what()));
   } catch (const std::bad_alloc&) {
-    tell("the run failed: not enough memory\n");
-    return app::run_failed;
+    return end_with(app::run_failed, "the run failed: not enough memory");
   } catch (const std::exception& e) {
-    if (std::ferror(stdout)) return app::run_failed;  // said by the caller
-    tell(fmt::format("internal error: {}\n", e.what()));
-    return app::run_failed;
+    if (!ranks && std::ferror(stdout)) return app::run_failed;  // said by the caller
+    return end_with(app::run_failed, fmt::format("internal error: {}", e.what()));
   } catch (...) {
-    tell("internal error: something that is no std::exception was thrown; a library of parts may have done so\n");
-    return app::run_failed;
+    return end_with(app::run_failed, "internal error: something that is no std::exception was thrown; a library of parts may have done so");
   }
 }
 

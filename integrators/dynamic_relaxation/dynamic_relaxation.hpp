@@ -5,7 +5,7 @@ namespace perikit {
 
 struct RelaxationOptions {
   LoadStepOptions load_steps;
-  bool kinetic = false;            ///< kinetic damping instead of viscous damping
+  bool kinetic = false;  ///< kinetic damping instead of viscous damping
 };
 
 /// One equilibrium by dynamic relaxation: damped motion of fictitious masses, one force evaluation an iteration.
@@ -19,14 +19,14 @@ class Relaxation final : public EquilibriumSolver {
   double find_mass(Problem& problem, ConstFieldView u, ConstFieldView free);
 
   RelaxationOptions options_;
-  FieldView eigenvector_;          ///< of the last estimate; kept with the problem
+  FieldView eigenvector_;  ///< of the last estimate; kept with the problem
   Field r_, last_r_, v_;
 };
 
 class DynamicRelaxation final : public Integrator {
  public:
   explicit DynamicRelaxation(const RelaxationOptions& options) : options_(options) {}
-  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true, .several_ranks = true}; }
   void run(Problem& problem, Observer& observer) override;
 
  private:

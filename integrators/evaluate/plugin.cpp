@@ -8,7 +8,7 @@ using namespace perikit;
 class Evaluate final : public Integrator {
  public:
   explicit Evaluate(const ParameterValues& values) : values_(values) {}
-  IntegratorTraits traits() const noexcept override { return {}; }
+  IntegratorTraits traits() const noexcept override { return {.several_ranks = true}; }
   std::string plan(Problem& problem) override {
     refuse_damage(problem);
     return "one evaluation of the initial displacement";

@@ -63,7 +63,10 @@ class KrylovEquations final : public LinearisedProblem {
 class Jfnk final : public Integrator {
  public:
   explicit Jfnk(const JfnkOptions& options) : options_(options) {}
-  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  IntegratorTraits traits() const noexcept override {
+    const bool matrix = options_.preconditioner != "auto" && options_.preconditioner != "none";
+    return {.dynamic = false, .quasi_static = true, .several_ranks = !matrix};
+  }
   void run(Problem& problem, Observer& observer) override;
 
  private:

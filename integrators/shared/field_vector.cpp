@@ -30,23 +30,23 @@ void assign(N_Vector z, Value&& value) {
   });
 }
 
-constexpr auto add = [](double a, double b) { return a + b; };
-constexpr auto least = [](double a, double b) { return std::min(a, b); };
+/// Exact, over all ranks.
+template <class Value>
+double sum(N_Vector x, Value&& value) {
+  return total_over_ranks(exact_sum(size(x), value));
+}
 
-double over_ranks(double value, decltype(add)) { return communicator().sum(value); }
-double over_ranks(double value, decltype(least)) { return -communicator().largest(-value); }
-
-/// Sum or another associative reduction, by blocks in order.
-template <class Value, class Combine>
-double reduce(N_Vector x, double start, Value&& value, Combine&& join) {
+/// The smallest value on all ranks.
+template <class Value>
+double least(N_Vector x, double start, Value&& value) {
   constexpr std::size_t block = 16384;
   const std::size_t n = size(x);
   std::vector<double> parts((n + block - 1) / block, start);
   parallel_for(parts.size(), [&](std::size_t b) {
-    for (std::size_t k = b * block; k < std::min(n, (b + 1) * block); ++k) parts[b] = join(parts[b], value(k));
+    for (std::size_t k = b * block; k < std::min(n, (b + 1) * block); ++k) parts[b] = std::min(parts[b], value(k));
   });
-  for (const double part : parts) start = join(start, part);
-  return over_ranks(start, join);
+  for (const double part : parts) start = std::min(start, part);
+  return -communicator().largest(-start);
 }
 
 N_Vector clone_of(N_Vector w, bool with_memory) {
@@ -95,10 +95,10 @@ void set_operations(N_Vector v) {
   ops->nvaddconst = [](N_Vector x, realtype c, N_Vector z) { assign(z, [c, a = data(x)](std::size_t k) { return a[k] + c; }); };
   ops->nvdotprod = [](N_Vector x, N_Vector y) { return dot(content(x).view, content(y).view); };
   ops->nvmaxnorm = [](N_Vector x) { return largest_magnitude(content(x).view); };
-  ops->nvmin = [](N_Vector x) { return reduce(x, data(x)[0], [a = data(x)](std::size_t k) { return a[k]; }, least); };
-  ops->nvl1norm = [](N_Vector x) { return reduce(x, 0.0, [a = data(x)](std::size_t k) { return std::abs(a[k]); }, add); };
+  ops->nvmin = [](N_Vector x) { return least(x, data(x)[0], [a = data(x)](std::size_t k) { return a[k]; }); };
+  ops->nvl1norm = [](N_Vector x) { return sum(x, [a = data(x)](std::size_t k) { return std::abs(a[k]); }); };
   ops->nvwl2norm = [](N_Vector x, N_Vector w) {
-    return std::sqrt(reduce(x, 0.0, [a = data(x), b = data(w)](std::size_t k) { return a[k] * b[k] * a[k] * b[k]; }, add));
+    return std::sqrt(sum(x, [a = data(x), b = data(w)](std::size_t k) { return a[k] * b[k] * a[k] * b[k]; }));
   };
   ops->nvwrmsnorm = [](N_Vector x, N_Vector w) { return N_VWL2Norm(x, w) / std::sqrt(static_cast<double>(size(x))); };
 }

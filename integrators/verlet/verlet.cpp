@@ -91,14 +91,14 @@ class Stepper {
   /// That of the constraints: what keeps the energy of the prescribed components in balance, their change of kinetic energy less
   /// the work of the other forces on them.
   void add_work_of_constraints(double dt) {
-    double held = 0;
+    ExactSum held;
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
       const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
-      held += 0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]];
+      held.add(0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]]);
       speed_[k] = now;
     }
-    state_.energies.external_work += communicator().sum(held);
+    state_.energies.external_work += total_over_ranks(held);
   }
 
   /// Velocities of the prescribed components at full step t.

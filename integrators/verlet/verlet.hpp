@@ -17,7 +17,7 @@ struct VerletOptions {
 class Verlet final : public Integrator {
  public:
   explicit Verlet(const VerletOptions& options) : options_(options) {}
-  IntegratorTraits traits() const noexcept override { return {.dynamic = true, .quasi_static = false}; }
+  IntegratorTraits traits() const noexcept override { return {.dynamic = true, .quasi_static = false, .several_ranks = true}; }
   std::string plan(Problem& problem) override;
   void run(Problem& problem, Observer& observer) override;
 

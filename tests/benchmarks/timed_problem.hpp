@@ -31,11 +31,11 @@ class TimedProblem final : public contract::ForwardingProblem {
   Share forces, actions, assemblies, companions;
 
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
-    if (late()) return {0, "time is up"};
+    if (late()) return {.point = 0, .description = "time is up"};
     return timed(forces, [&] { return of_.evaluate_forces(u, force, energy, time_step); });
   }
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
-    if (late()) return {0, "time is up"};
+    if (late()) return {.point = 0, .description = "time is up"};
     return timed(actions, [&] { return of_.tangent_action(u, w, Kw); });
   }
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override {

@@ -207,10 +207,11 @@ TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a 
   const std::vector<Example> all = examples(Kind::kinematics);
   if (all.empty()) return;  // a stabilization is tested
   const Scene scene = parse_scene(rate_scene(all.front(), 2, false, false), "contract.toml", subject().registry);
-  CHECK_THROWS_WITH_AS(build_problem(scene, subject().registry, {.quasi_static = true}),
+  WorkSteps steps;
+  CHECK_THROWS_WITH_AS(build_problem(scene, subject().registry, {.quasi_static = true}, steps),
                        doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
                        InputError);
-  CHECK_NOTHROW(build_problem(scene, subject().registry, {}));
+  CHECK_NOTHROW(build_problem(scene, subject().registry, {}, steps));
 }
 
 TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces and work as from both ends") {

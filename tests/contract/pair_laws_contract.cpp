@@ -158,6 +158,47 @@ TEST_CASE("kinematics: the surface correction of pair laws changes surfaces and 
   }
 }
 
+TEST_CASE("kinematics: the stress of pair laws is the derivative of their energy density by a homogeneous deformation") {
+  for (const Example& law : pair_laws())
+    for (int d = 1; d <= 3; ++d)
+      for (const bool cloud : {false, true}) {
+        INFO(law.part, " (", law.table, "), ", d, "D ", std::string(cloud ? "cloud" : "lattice"));
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        options.crack = d > 1;
+        const auto simulation = build(scene_text(options, kinematics_table(law)));
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        Noise random(5);
+        double H[3][3], direction[3][3];
+        for (int a = 0; a < 3; ++a)
+          for (int b = 0; b < 3; ++b) H[a][b] = 0.1 * random(), direction[a][b] = random();
+        const auto sampled = [&](double by) {
+          set_field(body, problem.state().displacement(), [&](const Point& x) {
+            Point u{};
+            for (std::size_t a = 0; a < static_cast<std::size_t>(d); ++a)
+              for (std::size_t b = 0; b < static_cast<std::size_t>(d); ++b) u[a] += (H[a][b] + by * direction[a][b]) * x[b];
+            return u;
+          });
+          PointSamples samples{.virial = true};
+          REQUIRE(problem.sample(samples).ok());
+          return samples;
+        };
+        constexpr double step = 1e-5;
+        const PointSamples here = sampled(0), more = sampled(step), less = sampled(-step);
+        REQUIRE(here.P.components() == d * d);
+        double largest = 0;
+        for (const std::int32_t p : body.internal())
+          for (int c = 0; c < d * d; ++c) largest = std::max(largest, std::abs(here.P.component(c)[p]));
+        REQUIRE(largest > 0);
+        for (const std::int32_t p : body.internal()) {
+          double rate = 0;
+          for (int c = 0; c < d * d; ++c) rate += here.P.component(c)[p] * direction[c / d][c % d];
+          const double difference = (more.strain_energy_density.data()[p] - less.strain_energy_density.data()[p]) / (2 * step);
+          CHECK(std::abs(rate - difference) <= 1e-7 * largest);
+        }
+      }
+}
+
 TEST_CASE("kinematics: pair laws refuse what they do not have, and say what they cannot represent") {
   for (const Example& law : pair_laws()) {
     BodyOptions options;

@@ -114,3 +114,12 @@ TEST_CASE("questionable: a field that is not finite is told of") {
                "warning: frame 0: shape_tensor_condition is not finite at point 8 (in input order), whose family is too poor"),
       run.out);
 }
+
+TEST_CASE("questionable: bonds that are so short that cracks follow the lattice") {
+  const std::string scene = plate + "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n", cubic = "--set family.influence=cubic_spline ";
+  warned(scene, cubic + "--set family.horizon_ratio=3.015",
+         "bonds are 1.29 spacings long on average, weighted by influence \"cubic_spline\": cracks follow the lattice");
+  silent(scene, cubic + "--set family.horizon_ratio=4.015");
+  silent(scene, "--set family.horizon_ratio=3.015");
+  silent(plate, cubic + "--set family.horizon_ratio=3.015");
+}

@@ -2,6 +2,8 @@
 
 #include <doctest/doctest.h>
 
+#include <initializer_list>
+
 #include "perikit/core/parallel.hpp"
 
 using namespace perikit;

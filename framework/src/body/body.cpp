@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "perikit/body/images.hpp"
@@ -23,31 +24,50 @@ Body::Body(BodyFrame frame, const std::vector<Point>& positions, const std::vect
   points_of_all_ranks_ = points();
 }
 
-Body::Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material)
-    : frame_(whole.frame_), margin_(whole.margin_), points_of_all_ranks_(whole.points_of_all_ranks_) {
-  std::vector<std::int32_t> place(whole.stride_, -1);   // by internal index of the whole body, kept points
+Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
+    : frame_(whole.frame_),
+      margin_(whole.margin_),
+      points_of_all_ranks_(whole.points_of_all_ranks_),
+      stride_of_whole_(whole.stride_),
+      colours_(part.colours) {
+  const auto role = [&](std::int32_t number) { return part.roles[static_cast<std::size_t>(number)]; };
+  for (std::size_t n = 0; n < whole.points(); ++n)
+    if (part.roles[n] != Role::absent) numbers_.push_back(static_cast<std::int32_t>(n));
+  internal_.resize(numbers_.size());
+  std::vector<std::int32_t> place(whole.stride_, -1);  // by internal index of the whole body: those that keep their material
   if (whole.lattice_) {
-    for (std::size_t n = 0; n < kept.size(); ++n)
-      if (kept[n]) internal_.push_back(whole.internal_[n]);
-    number_lattice(*whole.lattice_, whole.uniform_volume_);
-    for (const std::int32_t p : internal_) place[static_cast<std::size_t>(p)] = p;
-  } else {
-    std::vector<Point> positions;
-    std::vector<double> volumes;
-    std::vector<std::int32_t> from;
-    for (std::size_t n = 0; n < kept.size(); ++n) {
-      if (!kept[n]) continue;
-      const auto p = static_cast<std::size_t>(whole.internal_[n]);
-      from.push_back(whole.internal_[n]);
-      positions.push_back(whole.position(p));
-      volumes.push_back(whole.volume(p));
+    const Lattice lattice = box_of(*whole.lattice_, part.first, part.last, frame_.horizon);
+    for (std::size_t n = 0; n < numbers_.size(); ++n) {
+      const auto k = whole.lattice_->cell(whole.internal_[static_cast<std::size_t>(numbers_[n])]);
+      internal_[n] = static_cast<std::int32_t>(lattice.index(k[0] - part.first[0], k[1] - part.first[1], k[2] - part.first[2]));
     }
-    place_cloud(positions, volumes);
-    for (std::size_t n = 0; n < from.size(); ++n) place[static_cast<std::size_t>(from[n])] = internal_[n];
+    number_lattice(lattice, whole.uniform_volume_);
+  } else {
+    std::vector<std::int32_t> order(numbers_.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::ranges::sort(order, {}, [&](std::int32_t n) {
+      return whole.internal_[static_cast<std::size_t>(numbers_[static_cast<std::size_t>(n)])];
+    });
+    stride_ = padded(order.size());
+    positions_.assign(4 * stride_, 0.0);
+    for (std::size_t p = 0; p < order.size(); ++p) {
+      const auto n = static_cast<std::size_t>(order[p]);
+      internal_[n] = static_cast<std::int32_t>(p);
+      std::copy_n(&whole.positions_[4 * static_cast<std::size_t>(whole.internal_[static_cast<std::size_t>(numbers_[n])])], 4,
+                  &positions_[4 * p]);
+    }
+    number_cloud();
   }
-  for (const std::int32_t p : whole.internal_)
-    if (!owned[static_cast<std::size_t>(whole.input_of(static_cast<std::size_t>(p)))]) place[static_cast<std::size_t>(p)] = -1;
-  copy_sets(whole, place, ghost_material);
+  places_.assign(stride_, 0);
+  own_.assign(stride_, 0);
+  for (std::size_t n = 0; n < numbers_.size(); ++n) {
+    const auto p = static_cast<std::size_t>(internal_[n]);
+    places_[p] = whole.internal_[static_cast<std::size_t>(numbers_[n])];
+    own_[p] = role(numbers_[n]) == Role::own;
+    if (role(numbers_[n]) >= Role::near) place[static_cast<std::size_t>(places_[p])] = internal_[n];
+  }
+  copy_sets(whole, place, far_material);
+  for (auto& [name, members] : sets_) std::erase_if(members, [&](std::int32_t p) { return !own_[static_cast<std::size_t>(p)]; });
 }
 
 Body::Body(const Body& whole, const Images& images, std::uint16_t image_material)
@@ -136,20 +156,27 @@ void Body::number_lattice(const Lattice& lattice, double volume) {
 
 void Body::place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes) {
   const std::vector<std::int32_t> order = morton_order(positions, frame_.horizon);
-  const std::size_t n = positions.size();
-  stride_ = padded(n);
-  margin_ = padding;
-  internal_.resize(n);
-  input_.assign(stride_, -1);
-  alive_.assign(stride_ / 8, 0);
+  stride_ = padded(positions.size());
+  internal_.resize(positions.size());
   positions_.assign(4 * stride_, 0.0);
-  for (std::size_t p = 0; p < n; ++p) {
+  for (std::size_t p = 0; p < order.size(); ++p) {
     const auto from = static_cast<std::size_t>(order[p]);
     internal_[from] = static_cast<std::int32_t>(p);
-    input_[p] = order[p];
-    alive_[p / 8] |= static_cast<std::uint8_t>(1u << (p % 8));
     for (std::size_t c = 0; c < 3; ++c) positions_[4 * p + c] = positions[from][c];
     positions_[4 * p + 3] = volumes[from];
+  }
+  number_cloud();
+}
+
+/// What follows from the order of the points.
+void Body::number_cloud() {
+  margin_ = padding;
+  input_.assign(stride_, -1);
+  alive_.assign(stride_ / 8, 0);
+  for (std::size_t n = 0; n < internal_.size(); ++n) {
+    const auto p = static_cast<std::size_t>(internal_[n]);
+    input_[p] = static_cast<std::int32_t>(n);
+    alive_[p / 8] |= static_cast<std::uint8_t>(1u << (p % 8));
   }
 }
 
@@ -165,8 +192,8 @@ bool Body::cut(const Point& a, const Point& b) const noexcept {
 }
 
 std::size_t Body::bytes() const noexcept {
-  return (internal_.size() + input_.size()) * sizeof(std::int32_t) + positions_.size() * sizeof(double) +
-         alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
+  return (internal_.size() + input_.size() + places_.size() + numbers_.size()) * sizeof(std::int32_t) + own_.size() +
+         positions_.size() * sizeof(double) + alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
 }
 
 }  // namespace perikit

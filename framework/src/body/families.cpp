@@ -69,21 +69,22 @@ struct CellList {
   }
 };
 
+double squared_distance(std::span<const double> rows, std::size_t p, std::size_t q) {
+  double r2 = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double d = rows[4 * q + c] - rows[4 * p + c];
+    r2 += d * d;
+  }
+  return r2;
+}
+
 }  // namespace
 
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon) {
   const CellList cells(rows, points, dimension, horizon);
   const double limit = horizon * (1 + 1e-10);
-  const auto distance2 = [&](std::size_t p, std::size_t q) {
-    double r2 = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double d = rows[4 * q + c] - rows[4 * p + c];
-      r2 += d * d;
-    }
-    return r2;
-  };
   const auto in_family = [&](std::size_t p, std::int32_t q) {
-    return static_cast<std::size_t>(q) != p && distance2(p, static_cast<std::size_t>(q)) <= limit * limit;
+    return static_cast<std::size_t>(q) != p && squared_distance(rows, p, static_cast<std::size_t>(q)) <= limit * limit;
   };
   constexpr std::size_t block = 1024;
   const std::size_t blocks = (points + block - 1) / block;
@@ -102,7 +103,8 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
       auto next = lists.neighbour.begin() + lists.first[p];
       cells.around(&rows[4 * p], [&](std::int32_t q) {
         if (!in_family(p, q)) return;
-        if (distance2(p, static_cast<std::size_t>(q)) <= 1e-24 * horizon * horizon) coincident = static_cast<std::int64_t>(p);
+        if (squared_distance(rows, p, static_cast<std::size_t>(q)) <= 1e-24 * horizon * horizon)
+          coincident = static_cast<std::int64_t>(p);
         *next++ = q;
       });
       std::sort(lists.neighbour.begin() + lists.first[p], next);
@@ -114,6 +116,60 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
                                         rows[at], rows[at + 1], rows[at + 2]));
   }
   return lists;
+}
+
+std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
+                                        std::vector<std::uint8_t> from) {
+  const CellList cells(rows, points, dimension, horizon);
+  const double limit = horizon * (1 + 1e-10);
+  std::vector<std::uint8_t> reached = from;
+  constexpr std::size_t block = 1024;
+  parallel_for((points + block - 1) / block, [&](std::size_t b) {
+    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p) {
+      if (from[p]) continue;
+      cells.around(&rows[4 * p], [&](std::int32_t q) {
+        if (from[static_cast<std::size_t>(q)] && squared_distance(rows, p, static_cast<std::size_t>(q)) <= limit * limit)
+          reached[p] = 1;
+      });
+    }
+  });
+  return reached;
+}
+
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points) {
+  const std::span<const double> rows = body.rows();
+  const std::size_t points = body.points();
+  const CellList cells(rows, points, body.dimension(), body.horizon());
+  const double limit = body.horizon() * (1 + 1e-10);
+  std::vector<std::vector<std::int32_t>> touches((points + block_points - 1) / block_points);
+  parallel_for(touches.size(), [&](std::size_t b) {
+    std::vector<std::int32_t>& units = touches[b];
+    units.push_back(static_cast<std::int32_t>(b));
+    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p)
+      cells.around(&rows[4 * p], [&](std::int32_t q) {
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / block_points);
+        if (unit == units.back() || std::ranges::find(units, unit) != units.end()) return;
+        if (squared_distance(rows, p, static_cast<std::size_t>(q)) > limit * limit) return;
+        if (!body.cut(body.position(p), body.position(static_cast<std::size_t>(q)))) units.push_back(unit);
+      });
+    std::sort(units.begin(), units.end());
+  });
+  return touches;
+}
+
+std::vector<std::int32_t> block_colours(const std::vector<std::vector<std::int32_t>>& touches, std::size_t units) {
+  std::vector<std::int32_t> colours;
+  std::vector<std::vector<bool>> used;  // by colour and unit
+  for (const std::vector<std::int32_t>& of_block : touches) {
+    const auto free = std::ranges::find_if(used, [&](const std::vector<bool>& taken) {
+      return std::ranges::none_of(of_block, [&](std::int32_t unit) { return taken[static_cast<std::size_t>(unit)]; });
+    });
+    const std::size_t colour = static_cast<std::size_t>(free - used.begin());
+    if (free == used.end()) used.emplace_back(units, false);
+    for (const std::int32_t unit : of_block) used[colour][static_cast<std::size_t>(unit)] = true;
+    colours.push_back(static_cast<std::int32_t>(colour));
+  }
+  return colours;
 }
 
 std::vector<std::int32_t> morton_order(const std::vector<Point>& positions, double cell) {

@@ -18,7 +18,8 @@ std::array<double, 3> Lattice::position(std::int64_t index) const noexcept {
   const auto k = cell(index);
   std::array<double, 3> x{};
   for (int a = 0; a < dimension; ++a) {
-    x[static_cast<std::size_t>(axis[a])] = lower[static_cast<std::size_t>(axis[a])] + (static_cast<double>(k[a]) + 0.5) * spacing;
+    x[static_cast<std::size_t>(axis[a])] =
+        lower[static_cast<std::size_t>(axis[a])] + (static_cast<double>(k[a] + first[a]) + 0.5) * spacing;
   }
   return x;
 }
@@ -27,6 +28,24 @@ std::int64_t lattice_cells(double lower, double upper, double spacing) {
   // The last point may lie on `upper` up to rounding.
   return static_cast<std::int64_t>(std::floor((upper - lower) / spacing * (1 + 1e-12) + 0.5 + 1e-9));
 }
+
+namespace {
+
+/// Pitches and sizes, from the extent.
+void lay_out(Lattice& lattice, double horizon) {
+  std::array<std::int64_t, 3> reach{};
+  for (int k = 0; k < lattice.dimension; ++k)
+    reach[k] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(horizon / lattice.spacing * (1 + 1e-10))), 0,
+                                        lattice.extent[k] - 1);
+  lattice.pitch[0] = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.extent[0] + reach[0])));
+  lattice.pitch[1] = lattice.extent[1] + reach[1];
+  lattice.reach = reach[0] + lattice.pitch[0] * (reach[1] + lattice.pitch[1] * reach[2]);
+  lattice.base = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.reach)));
+  const std::int64_t last = lattice.index(lattice.extent[0] - 1, lattice.extent[1] - 1, lattice.extent[2] - 1);
+  lattice.cells = static_cast<std::int64_t>(padded(static_cast<std::size_t>(last + 1 + lattice.reach)));
+}
+
+}  // namespace
 
 Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>& lower, const std::array<double, 3>& upper,
                      double horizon) {
@@ -38,18 +57,36 @@ Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>&
   for (int a = 0; a < dimension; ++a) cells[static_cast<std::size_t>(a)] = lattice_cells(lower[a], upper[a], spacing);
   std::stable_sort(lattice.axis.begin(), lattice.axis.begin() + dimension,
                    [&](int a, int b) { return cells[static_cast<std::size_t>(a)] > cells[static_cast<std::size_t>(b)]; });
-  std::array<std::int64_t, 3> reach{};
-  for (int k = 0; k < dimension; ++k) {
-    lattice.extent[k] = cells[static_cast<std::size_t>(lattice.axis[k])];
-    reach[k] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(horizon / spacing * (1 + 1e-10))), 0, lattice.extent[k] - 1);
-  }
-  lattice.pitch[0] = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.extent[0] + reach[0])));
-  lattice.pitch[1] = lattice.extent[1] + reach[1];
-  lattice.reach = reach[0] + lattice.pitch[0] * (reach[1] + lattice.pitch[1] * reach[2]);
-  lattice.base = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.reach)));
-  const std::int64_t last = lattice.index(lattice.extent[0] - 1, lattice.extent[1] - 1, lattice.extent[2] - 1);
-  lattice.cells = static_cast<std::int64_t>(padded(static_cast<std::size_t>(last + 1 + lattice.reach)));
+  for (int k = 0; k < dimension; ++k) lattice.extent[k] = cells[static_cast<std::size_t>(lattice.axis[k])];
+  lattice.whole = lattice.extent;
+  lay_out(lattice, horizon);
   return lattice;
+}
+
+Lattice box_of(const Lattice& lattice, const std::array<std::int64_t, 3>& first, const std::array<std::int64_t, 3>& last,
+               double horizon) {
+  Lattice box = lattice;
+  box.first = first;
+  for (std::size_t k = 0; k < 3; ++k) box.extent[k] = last[k] - first[k];
+  lay_out(box, horizon);
+  return box;
+}
+
+LatticeTiling::LatticeTiling(const Lattice& lattice) {
+  constexpr std::int64_t segment = 32;  // groups
+  const auto& n = lattice.whole;
+  const auto group = static_cast<std::int64_t>(padding);
+  const std::int64_t groups = (n[0] + group - 1) / group, segments = (groups + segment - 1) / segment,
+                     points = n[0] * n[1] * n[2];
+  std::int64_t tile1 = 16, tile2 = 8;
+  while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * group)) < 16 && tile1 * tile2 > 1)
+    (tile1 > tile2 ? tile1 : tile2) /= 2;
+  size = {segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, groups / 16), tile1, tile2};
+  count = {(groups + size[0] - 1) / size[0], (n[1] + tile1 - 1) / tile1, (n[2] + tile2 - 1) / tile2};
+}
+
+std::array<std::int64_t, 3> LatticeTiling::of(const std::array<std::int64_t, 3>& cell) const noexcept {
+  return {cell[0] / static_cast<std::int64_t>(padding) / size[0], cell[1] / size[1], cell[2] / size[2]};
 }
 
 std::vector<std::array<int, 3>> family_offsets(const Lattice& lattice, double horizon) {

@@ -1,66 +1,212 @@
 #include "perikit/body/partition.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+#include <stdexcept>
 
-#include "perikit/body/images.hpp"
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// Coordinate along the longest side of the body, by input number.
-std::vector<double> along_longest_side(const Body& body) {
-  std::array<double, 3> low, high;
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
-  for (const std::int32_t p : body.internal()) {
-    const Point x = body.position(static_cast<std::size_t>(p));
-    for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], x[a]), high[a] = std::max(high[a], x[a]);
+using Cells = std::array<std::int64_t, 3>;
+
+/// Sizes of the blocks of points that loops over clouds run over; the first is a multiple of the others.
+constexpr std::size_t cloud_blocks[] = {256, 64};
+
+/// Ranks first ... first + ranks - 1 get the tiles low ... high - 1: cut across the longest side, near where the points divide as
+/// the ranks.
+class Bisection {
+ public:
+  Bisection(const LatticeTiling& tiling, const std::vector<std::int64_t>& points)
+      : tiling_(tiling), points_(points), rank_(points.size(), 0) {}
+
+  void share(Cells low, Cells high, int first, int ranks) {
+    if (ranks == 1) return each(low, high, [&](std::size_t tile) { rank_[tile] = first; });
+    std::size_t axis = 3;
+    std::int64_t longest = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::int64_t length = (high[a] - low[a]) * tiling_.size[a] * (a == 0 ? static_cast<std::int64_t>(padding) : 1);
+      if (high[a] - low[a] > 1 && length > longest) axis = a, longest = length;
+    }
+    if (axis == 3) return;  // one tile for several ranks: one of them is left without points
+    const int lower = ranks / 2;
+    const double wanted = static_cast<double>(count(low, high)) * lower / ranks;
+    std::int64_t cut = low[axis] + 1;
+    double nearest = -1;
+    for (std::int64_t k = low[axis] + 1; k < high[axis]; ++k) {
+      Cells end = high;
+      end[axis] = k;
+      const double off = std::abs(static_cast<double>(count(low, end)) - wanted);
+      if (nearest < 0 || off < nearest) cut = k, nearest = off;
+    }
+    Cells middle_high = high, middle_low = low;
+    middle_high[axis] = middle_low[axis] = cut;
+    share(low, middle_high, first, lower);
+    share(middle_low, high, first + lower, ranks - lower);
   }
-  std::size_t axis = 0;
-  for (std::size_t a = 1; a < 3; ++a)
-    if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
-  std::vector<double> along;
-  for (const std::int32_t p : body.internal()) along.push_back(body.position(static_cast<std::size_t>(p))[axis]);
-  return along;
-}
+  int rank(std::size_t tile) const noexcept { return rank_[tile]; }
+
+ private:
+  template <class Use>
+  void each(const Cells& low, const Cells& high, Use&& use) const {
+    for (std::int64_t c = low[2]; c < high[2]; ++c)
+      for (std::int64_t b = low[1]; b < high[1]; ++b)
+        for (std::int64_t a = low[0]; a < high[0]; ++a) use(static_cast<std::size_t>(tiling_.number({a, b, c})));
+  }
+  std::int64_t count(const Cells& low, const Cells& high) const {
+    std::int64_t sum = 0;
+    each(low, high, [&](std::size_t tile) { sum += points_[tile]; });
+    return sum;
+  }
+
+  const LatticeTiling& tiling_;
+  const std::vector<std::int64_t>& points_;
+  std::vector<int> rank_;
+};
 
 }  // namespace
 
-Partition::Partition(Body whole, int rank, int size)
-    : whole_(std::move(whole)), owned_(whole_.points(), false), kept_(whole_.points(), false), place_(whole_.points(), -1),
-      lent_(static_cast<std::size_t>(size)), borrowed_(static_cast<std::size_t>(size)) {
-  const std::vector<double> along = along_longest_side(whole_);
-  const auto n = static_cast<std::int64_t>(along.size());
-  std::vector<std::int32_t> order(along.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return along[static_cast<std::size_t>(a)] < along[static_cast<std::size_t>(b)]; });
-  std::vector<int> rank_of(along.size());
-  std::vector<double> low(static_cast<std::size_t>(size), std::numeric_limits<double>::infinity()), high(low.size(), -low.front());
-  for (std::int64_t k = 0; k < n; ++k) {
-    const auto p = static_cast<std::size_t>(order[static_cast<std::size_t>(k)]);
-    const auto r = static_cast<std::size_t>(k * size / n);
-    rank_of[p] = static_cast<int>(r);
-    low[r] = std::min(low[r], along[p]);
-    high[r] = std::max(high[r], along[p]);
+Partition::Partition(Body whole, const Reach& reach) : whole_(std::move(whole)), owner_(whole_.points(), 0) {
+  const int size = communicator().size();
+  whole_.lattice() ? share_lattice(size) : share_cloud(size);
+  points_.assign(static_cast<std::size_t>(size), 0);
+  for (const std::int32_t rank : owner_) ++points_[static_cast<std::size_t>(rank)];
+  if (std::ranges::find(points_, 0) != points_.end())
+    throw std::domain_error(
+        fmt::format("found {} ranks for a body of {} points, which is shared out in blocks of points that are "
+                    "evaluated together; allowed: fewer ranks, and threads on each (--threads)",
+                    size, whole_.points()));
+  part_.roles.assign(whole_.points(), Role::absent);
+  for (std::size_t n = 0; n < owner_.size(); ++n)
+    if (owner_[n] == communicator().rank()) part_.roles[n] = Role::own;
+  whole_.lattice() ? keep_box(reach) : keep_families(reach);
+  exchange_borders();
+}
+
+void Partition::share_lattice(int size) {
+  const Lattice& lattice = *whole_.lattice();
+  const LatticeTiling tiling(lattice);
+  const auto tile = [&](std::int32_t p) { return static_cast<std::size_t>(tiling.number(tiling.of(lattice.cell(p)))); };
+  std::vector<std::int64_t> points(static_cast<std::size_t>(tiling.tiles()), 0);
+  for (const std::int32_t p : whole_.internal()) ++points[tile(p)];
+  Bisection bisection(tiling, points);
+  bisection.share({}, tiling.count, 0, size);
+  for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = bisection.rank(tile(whole_.internal()[n]));
+}
+
+/// Pieces of the curve that orders the points.
+void Partition::share_cloud(int size) {
+  const std::size_t block = cloud_blocks[0], blocks = (whole_.points() + block - 1) / block;
+  for (std::size_t n = 0; n < owner_.size(); ++n) {
+    const std::size_t b = static_cast<std::size_t>(whole_.internal()[n]) / block;
+    owner_[n] = static_cast<std::int32_t>(b * static_cast<std::size_t>(size) / blocks);
   }
-  const double reach = halo(whole_);
-  const auto keeps = [&](std::size_t r, std::size_t p) { return along[p] >= low[r] - reach && along[p] <= high[r] + reach; };
-  const auto mine = static_cast<std::size_t>(rank);
-  for (std::size_t p = 0; p < along.size(); ++p) {
-    const auto owner = static_cast<std::size_t>(rank_of[p]);
-    owned_[p] = owner == mine;
-    kept_[p] = owned_[p] || keeps(mine, p);
-    if (!kept_[p]) continue;
-    place_[p] = static_cast<std::int32_t>(inputs_.size());
-    inputs_.push_back(static_cast<std::int32_t>(p));
-    if (!owned_[p]) borrowed_[owner].push_back(static_cast<std::int32_t>(p));
-    for (std::size_t r = 0; r < low.size() && owned_[p]; ++r)
-      if (r != mine && keeps(r, p)) lent_[r].push_back(static_cast<std::int32_t>(p));
+}
+
+/// Cells within reach of the box of the owned ones.
+void Partition::keep_box(const Reach& reach) {
+  const Lattice& lattice = *whole_.lattice();
+  const LatticeTiling tiling(lattice);
+  const auto group = static_cast<std::int64_t>(padding);
+  Cells low = lattice.extent, high{};
+  for (std::size_t n = 0; n < owner_.size(); ++n) {
+    if (part_.roles[n] != Role::own) continue;
+    const Cells k = lattice.cell(whole_.internal()[n]);
+    for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], k[a]), high[a] = std::max(high[a], k[a] + 1);
   }
+  const auto bond = static_cast<std::int64_t>(std::floor(whole_.horizon() / lattice.spacing * (1 + 1e-10)));
+  const auto grow = [&](std::int64_t by) {
+    for (std::size_t a = 0; a < static_cast<std::size_t>(lattice.dimension); ++a) {
+      low[a] = std::max<std::int64_t>(0, low[a] - by);
+      high[a] = std::min(lattice.extent[a], high[a] + by);
+    }
+  };
+  grow((reach.bonds - 1) * bond);
+  for (std::size_t a = 0; a < 3 && reach.blocks; ++a) {
+    const std::int64_t side = tiling.size[a] * (a == 0 ? group : 1);
+    low[a] = low[a] / side * side;
+    high[a] = std::min(lattice.extent[a], (high[a] + side - 1) / side * side);
+  }
+  const Cells near_low = low, near_high = high;
+  grow(bond);
+  low[0] = low[0] / group * group;
+  high[0] = std::min(lattice.extent[0], (high[0] + group - 1) / group * group);
+  part_.first = low;
+  part_.last = high;
+  const auto within = [](const Cells& k, const Cells& from, const Cells& to) {
+    return k[0] >= from[0] && k[0] < to[0] && k[1] >= from[1] && k[1] < to[1] && k[2] >= from[2] && k[2] < to[2];
+  };
+  for (std::size_t n = 0; n < owner_.size(); ++n) {
+    const Cells k = lattice.cell(whole_.internal()[n]);
+    if (part_.roles[n] != Role::own && within(k, low, high))
+      part_.roles[n] = within(k, near_low, near_high) ? Role::near : Role::far;
+  }
+}
+
+/// Points that bonds lead to, in whole blocks.
+void Partition::keep_families(const Reach& reach) {
+  const std::size_t points = whole_.points();
+  std::vector<std::uint8_t> reached(points, 0);  // by internal index
+  const auto mark = [&](Role role) {
+    for (std::size_t n = 0; n < points; ++n)
+      if (reached[static_cast<std::size_t>(whole_.internal()[n])]) part_.roles[n] = std::max(part_.roles[n], role);
+  };
+  const auto fill_blocks = [&] {
+    for (std::size_t b = 0; b < points; b += cloud_blocks[0]) {
+      const auto begin = reached.begin() + static_cast<std::ptrdiff_t>(b),
+                 end = reached.begin() + static_cast<std::ptrdiff_t>(std::min(points, b + cloud_blocks[0]));
+      if (std::find(begin, end, 1) != end) std::fill(begin, end, std::uint8_t{1});
+    }
+  };
+  const auto step = [&] {
+    reached = with_families(whole_.rows(), points, whole_.dimension(), whole_.horizon(), std::move(reached));
+  };
+  for (std::size_t n = 0; n < points; ++n) reached[static_cast<std::size_t>(whole_.internal()[n])] = part_.roles[n] == Role::own;
+  for (int k = 1; k < reach.bonds; ++k) step();
+  if (reach.blocks) fill_blocks();
+  mark(Role::near);
+  step();
+  fill_blocks();
+  mark(Role::far);
+  for (const std::size_t block : cloud_blocks) {
+    const auto touches = block_reach(whole_, block);
+    const std::vector<std::int32_t> colours = block_colours(touches, touches.size());
+    for (std::size_t b = 0; b < colours.size(); ++b)
+      if (reached[b * block]) part_.colours[block].push_back(colours[b]);
+  }
+}
+
+/// Each rank tells the owners of its ghosts which they are.
+void Partition::exchange_borders() {
+  const auto size = points_.size();
+  lent_.resize(size);
+  borrowed_.resize(size);
+  for (std::size_t n = 0; n < owner_.size(); ++n)
+    if (part_.roles[n] == Role::near || part_.roles[n] == Role::far)
+      borrowed_[static_cast<std::size_t>(owner_[n])].push_back(static_cast<std::int32_t>(n));
+  std::vector<std::vector<double>> to(size), from(size);
+  std::vector<double> asked(size), wanted(size);
+  const auto exchange = [&](auto&& outgoing, auto&& incoming) {
+    std::vector<Message> messages;
+    for (std::size_t k = 0; k < size; ++k)
+      if (static_cast<int>(k) != communicator().rank()) messages.push_back({static_cast<int>(k), outgoing(k), incoming(k)});
+    communicator().exchange(messages);
+  };
+  for (std::size_t k = 0; k < size; ++k) {
+    to[k].assign(borrowed_[k].begin(), borrowed_[k].end());
+    asked[k] = static_cast<double>(to[k].size());
+  }
+  exchange([&](std::size_t k) { return std::span<const double>(&asked[k], 1); },
+           [&](std::size_t k) { return std::span(&wanted[k], 1); });
+  for (std::size_t k = 0; k < size; ++k) from[k].resize(static_cast<std::size_t>(wanted[k]));
+  exchange([&](std::size_t k) { return std::span<const double>(to[k]); }, [&](std::size_t k) { return std::span(from[k]); });
+  for (std::size_t k = 0; k < size; ++k)
+    for (const double number : from[k]) lent_[k].push_back(static_cast<std::int32_t>(number));
 }
 
 }  // namespace perikit

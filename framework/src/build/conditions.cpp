@@ -123,13 +123,12 @@ void fill(const std::vector<std::optional<Expression>>& values, const Body& body
 }
 
 /// The last frame of an earlier run of the same points.
-void start_from(const std::filesystem::path& results, const Body& body, const Partition* partition, State& state) {
+void start_from(const std::filesystem::path& results, const Body& body, State& state) {
   const LoadedFrame frame = read_last_frame(results, body.points_of_all_ranks());
   const auto copy = [&](const std::string& name, FieldView field) {
     const OutputField& from = frame.fields.at(name);
     for (const std::int32_t p : body.owned()) {
-      const auto place = static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(p)));
-      const std::size_t row = partition ? static_cast<std::size_t>(partition->input(place)) : place;
+      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
       for (int c = 0; c < field.components; ++c) field.component(c)[p] = from.data[3 * row + static_cast<std::size_t>(c)];
     }
   };
@@ -141,14 +140,18 @@ void start_from(const std::filesystem::path& results, const Body& body, const Pa
 
 }  // namespace
 
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, bool quasi_static, State& state) {
+void set_initial_state(const Scene& scene, const Body& body, const Constraints& constraints, bool quasi_static, State& state) {
   for (const BoundaryDescription& boundary : scene.boundaries)
     if (scene.initial_from && (boundary.velocity || quasi_static) && !boundary.face.empty())
-      throw InputError(boundary.position, "boundary", "found a face together with initial.from, whose results do not say where the face was; allowed: in explicit runs a face with a displacement");
-  constraints.start_images([&](int c, const Point& x) {
-    return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
-  }, !quasi_static, state.displacement());
-  if (scene.initial_from) start_from(*scene.initial_from, body, partition, state);
+      throw InputError(boundary.position, "boundary",
+                       "found a face together with initial.from, whose results do not say where the face was; allowed: in "
+                       "explicit runs a face with a displacement");
+  constraints.start_images(
+      [&](int c, const Point& x) {
+        return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
+      },
+      !quasi_static, state.displacement());
+  if (scene.initial_from) start_from(*scene.initial_from, body, state);
   if (!scene.initial_displacement.empty()) fill(scene.initial_displacement, body, state.displacement());
   if (!scene.initial_velocity.empty()) fill(scene.initial_velocity, body, state.velocity());
 }

@@ -28,7 +28,8 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
 /// points.
 Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static);
 
-/// Displacements and velocities at the start, of images as the constraints have them. Throws InputError where an earlier run does not hold them.
-void set_initial_state(const Scene& scene, const Body& body, const Partition* partition, const Constraints& constraints, bool quasi_static, State& state);
+/// Displacements and velocities at the start, of images as the constraints have them. Throws InputError where an earlier run does
+/// not hold them.
+void set_initial_state(const Scene& scene, const Body& body, const Constraints& constraints, bool quasi_static, State& state);
 
 }  // namespace perikit

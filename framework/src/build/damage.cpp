@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -9,6 +10,8 @@
 
 #include "build/crossing_bonds.hpp"
 #include "families/families.hpp"
+#include "perikit/core/communicator.hpp"
+#include "perikit/problem/ghosts.hpp"
 
 namespace perikit {
 
@@ -41,8 +44,8 @@ void refuse_unsuited(const Scene& scene, const Formulation& formulation, const D
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
-  if (ranks) refuse("a body on several ranks", "one rank");
   const std::string criterion = fmt::format("\"{}\"", scene.damage->type);
+  if (ranks && (traits.stress || traits.energy)) refuse(criterion + " on several ranks", "one rank, or criteria by stretch");
   if (traits.stress && formulation.pairs)
     refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
            "kinematics with gradients, or criteria by stretch or energy");
@@ -72,7 +75,7 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
 
 /// Limits of the bonds between regions: those of the weaker material for the numbers of the interface.
 void build_interfaces(const Scene& scene, const PartFactory& factory, const TermParts& parts, DamagePoint at,
-                      const ImageMap* images, BodyDamage& damage) {
+                      const ImageMap* images, const Partition* partition, BodyDamage& damage) {
   const Body& body = parts.families->body();
   const InterfaceDescription& first = scene.interfaces.front();
   const auto refuse = [](const InterfaceDescription& interface, const std::string& message) {
@@ -91,6 +94,12 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
   damage.side.assign(body.stride(), 0);
   for (const RegionDescription& region : scene.regions)
     for (const std::int32_t p : body.set(region.set)) damage.side[static_cast<std::size_t>(p)] = side_of(region.set);
+  if (partition) {
+    Field sides = body.make_field(1);
+    std::copy(damage.side.begin(), damage.side.end(), sides.data());
+    Ghosts(*partition, body, 1).forward(sides);
+    std::transform(sides.data(), sides.data() + sides.size(), damage.side.begin(), [](double side) { return static_cast<std::uint16_t>(side); });
+  }
   for (const InterfaceDescription& interface : scene.interfaces) {
     InterfaceDamage own{side_of(interface.between[0]), side_of(interface.between[1]), {infinite, infinite}};
     const auto law = factory.damage(*interface.damage);
@@ -105,6 +114,7 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
         refuse(interface, error.what());
       }
     }
+    for (double* limit : {&own.limits.onset, &own.limits.failure}) *limit = -communicator().largest(-*limit);
     damage.interfaces.push_back(own);
   }
 }
@@ -112,12 +122,12 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static, bool ranks) {
+                                               const ImageMap* images, const Partition* partition, bool quasi_static) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr, ranks);
+  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr, partition != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
@@ -148,12 +158,18 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     if (gradually) damage->crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
     equal = equal && limits.onset == limits.failure;
   }
-  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, *damage);
+  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, partition, *damage);
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
   if (images)
     for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
       if (field->size() > 0) images->copy_from_sources(*field);
+  if (partition) {
+    Ghosts ghosts(*partition, body, 1);
+    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+      if (field->size() > 0) ghosts.forward(*field);
+    equal = communicator().largest(equal ? 0 : 1) == 0;
+  }
   if (equal) damage->failure = Field();
   return damage;
 }

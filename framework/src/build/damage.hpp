@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "perikit/body/partition.hpp"
 #include "perikit/plugin/part.hpp"
 #include "perikit/problem/image_map.hpp"
 #include "perikit/scene/scene.hpp"
@@ -10,9 +11,10 @@
 
 namespace perikit {
 
-/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. images (null: none) have the
-/// limits of their sources. ranks: several share the body. Throws InputError where the criterion does not suit them or the integrator.
+/// The criterion of the scene with its limits by point, for these parts of the terms; null without [damage]. images (null: none)
+/// have the limits of their sources, ghosts of a partition (null: one rank) those of their owners. Throws InputError where the
+/// criterion does not suit the kinematics or the integrator.
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, bool quasi_static, bool ranks);
+                                               const ImageMap* images, const Partition* partition, bool quasi_static);
 
 }  // namespace perikit

@@ -31,22 +31,28 @@ Load distributed(const LoadDescription& description, const Body& body, const Ter
   return load;
 }
 
-/// What of a load on the whole body falls on the points that `part` owns.
-void keep_owned(const Partition& partition, const Body& part, Load& load) {
+/// By internal index of the whole body: where the owned points of a part are in it; -1: others.
+std::vector<std::int32_t> own_places(const Partition& partition, const Body& part) {
+  std::vector<std::int32_t> own(partition.whole().stride(), -1);
+  for (const std::int32_t p : part.owned()) own[static_cast<std::size_t>(part.places().place[static_cast<std::size_t>(p)])] = p;
+  return own;
+}
+
+/// What of a load on the whole body falls on the points of a part.
+void keep_owned(const std::vector<std::int32_t>& own, Load& load) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < load.points.size(); ++k) {
-    const std::int32_t input = partition.whole().input_of(static_cast<std::size_t>(load.points[k]));
-    if (!partition.owns(input)) continue;
-    load.points[kept] = part.internal()[static_cast<std::size_t>(partition.place(input))];
+    const std::int32_t place = own[static_cast<std::size_t>(load.points[k])];
+    if (place < 0) continue;
+    load.points[kept] = place;
     load.share[kept++] = load.share[k];
   }
   load.points.resize(kept);
   load.share.resize(kept);
 }
 
-void refuse_pressure(const Scene& scene, const LoadDescription& load, const TermParts& parts, const Partition* partition) {
+void refuse_pressure(const Scene& scene, const LoadDescription& load, const TermParts& parts) {
   const auto refuse = [&](const std::string& text) { throw InputError(load.position, "load.pressure", text); };
-  if (partition) refuse("found with several ranks; allowed: one rank");
   if (!load.follower) return;
   if (parts.formulation.pairs)
     refuse("found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
@@ -56,10 +62,9 @@ void refuse_pressure(const Scene& scene, const LoadDescription& load, const Term
         "allowed: a boundary that holds a set");
 }
 
-void add_pressure(const Scene& scene, const LoadDescription& description, const TermParts& parts, const Partition* partition,
-                  const ImageMap* images, bool quasi_static, std::vector<Load>& loads,
-                  std::vector<FollowingPressure>& pressures) {
-  refuse_pressure(scene, description, parts, partition);
+void add_pressure(const Scene& scene, const LoadDescription& description, const TermParts& parts, const ImageMap* images,
+                  bool quasi_static, std::vector<Load>& loads, std::vector<FollowingPressure>& pressures) {
+  refuse_pressure(scene, description, parts);
   const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
   SurfaceAreas areas = surface_areas(description, parts, images);
   if (description.follower) {
@@ -90,16 +95,17 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* p
     of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
     whole.families = of_whole.get();
   }
+  const std::vector<std::int32_t> own = partition ? own_places(*partition, body) : std::vector<std::int32_t>();
   std::vector<Load> loads;
   std::vector<FollowingPressure> pressures;
   for (const LoadDescription& description : scene.loads) {
     refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
     if (description.type == LoadDescription::Type::pressure) {
-      add_pressure(scene, description, parts, partition, images, quasi_static, loads, pressures);
+      add_pressure(scene, description, parts, images, quasi_static, loads, pressures);
       continue;
     }
     Load load = distributed(description, partition ? partition->whole() : body, whole, images);
-    if (partition) keep_owned(*partition, body, load);
+    if (partition) keep_owned(own, load);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;

@@ -127,7 +127,10 @@ MaterialRecord silent_record() {
 std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool others) {
   std::vector<MaterialRecord> records;
   for (const auto& part : materials(scene)) records.push_back(build_record(*part, scene, factory, body, records.size()));
-  if (others) records.push_back(silent_record());
+  if (others) {
+    records.push_back(silent_record());
+    records.back().far = !body.places().place.empty();
+  }
   return std::make_unique<Laws>(body.space(), std::move(records), body.material_ids(), body.stride());
 }
 

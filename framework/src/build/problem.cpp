@@ -10,6 +10,7 @@
 #include "build/image_planes.hpp"
 #include "build/materials.hpp"
 #include "build/questionable.hpp"
+#include "build/several_ranks.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
@@ -32,7 +33,6 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   ScenePlanes planes = build_planes(scene, body, quasi_static);
   if (planes.planes.empty()) return {};
   const ScenePlanes::Origin& any = planes.origins.front();
-  if (communicator().size() > 1) throw InputError(any.position, any.key, "found with several ranks; allowed: one rank");
   Images images = make_images(body, planes.planes);
   try {
     body = Body(body, images, image_material(scene));
@@ -45,8 +45,14 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   return {std::move(images), std::move(planes.motions)};
 }
 
+/// How far the forces of a formulation reach (partition.hpp).
+Partition::Reach reach_of(const Formulation& formulation) {
+  return {.bonds = formulation.bond && formulation.far_share > 0 ? 3 : 2,
+          .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1)};
+}
+
 /// The bodies of this rank and, where there are several, of all of them.
-Beyond place_points(const Scene& scene, ProblemParts& parts, bool quasi_static) {
+Beyond place_points(const Scene& scene, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   Body whole = build_body(scene);
   Beyond beyond = place_images(scene, whole, quasi_static);
   if (communicator().size() == 1) {
@@ -54,7 +60,11 @@ Beyond place_points(const Scene& scene, ProblemParts& parts, bool quasi_static) 
     if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     return beyond;
   }
-  parts.partition = std::make_unique<const Partition>(std::move(whole), communicator().rank(), communicator().size());
+  try {
+    parts.partition = std::make_unique<const Partition>(std::move(whole), reach_of(formulation));
+  } catch (const std::domain_error& error) {
+    throw InputError(scene.body.position, "body", error.what());
+  }
   parts.body = std::make_unique<const Body>(parts.partition->part(image_material(scene)));
   return beyond;
 }
@@ -141,33 +151,42 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
 
 }  // namespace
 
-std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator) {
+std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
+                                           WorkSteps& steps) {
   const bool quasi_static = integrator.quasi_static;
   ProblemParts parts;
-  Beyond beyond = place_points(scene, parts, quasi_static);
+  TermParts of_terms{
+      .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
+  refuse_on_ranks(scene, of_terms.formulation, integrator);
+  steps.begin("points");
+  Beyond beyond = place_points(scene, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
-  const bool others = partition || parts.images;   // points that store nothing
-
-  TermParts of_terms{.formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
+  const bool others = partition || parts.images;  // points that store nothing
   refuse_stress(scene, body, of_terms.formulation);
+  steps.begin("laws");
   parts.laws = build_laws(scene, factory, body, others);
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
+  steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), quasi_static, partition != nullptr));
+  if (scene.damage) steps.begin("limits of bonds");
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
   of_terms.damage = parts.fracture.damage();
+  steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
+  steps.begin("evaluation points");
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
   if (others) parts.materials.push_back(scene.material->type);
 
+  steps.begin("boundaries and loads");
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
-  set_initial_state(scene, body, partition, constraints, quasi_static, state);
+  set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));

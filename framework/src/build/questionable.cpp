@@ -111,6 +111,28 @@ void find_no_neighbours(const Scene& scene, const Families& families, std::vecto
                   scene.influence->type, omega / largest, r));
 }
 
+/// Bonds that are hardly longer than the spacing know few directions, and cracks run along these (framework/docs/fracture.md,
+/// "Kernels that follow the lattice").
+void find_short_bonds(const Scene& scene, const Families& families, std::vector<std::string>& found) {
+  constexpr double least = 1.45;  // spacings
+  const Body& body = families.body();
+  if (!scene.damage || !families.needs().influence || !families.lattice() || body.dimension() == 1) return;
+  double sum = 0, weight = 0;
+  std::array<double, 1> r, omega;
+  for (const auto& offset : family_offsets(*body.lattice(), body.horizon())) {
+    double square = 0;
+    for (const auto cells : offset) square += static_cast<double>(cells) * static_cast<double>(cells);
+    r[0] = std::min(1.0, std::sqrt(square) * body.spacing() / body.horizon());
+    families.influence()->evaluate(r, omega);
+    sum += omega[0] * std::sqrt(square);
+    weight += omega[0];
+  }
+  if (sum >= least * weight) return;
+  found.push_back(fmt::format("bonds are {:.3g} spacings long on average, weighted by influence \"{}\": cracks follow the lattice; "
+                              "a larger horizon_ratio or another influence helps, or a cloud",
+                              sum / weight, scene.influence->type));
+}
+
 }  // namespace
 
 std::vector<std::string> questionable(const Scene& scene, const Families& families, const Constraints& constraints,
@@ -120,6 +142,7 @@ std::vector<std::string> questionable(const Scene& scene, const Families& famili
   find_held_loads(scene, families.body(), constraints, found);
   find_jumps(scene, families.body(), quasi_static, state, found);
   find_no_neighbours(scene, families, found);
+  find_short_bonds(scene, families, found);
   return found;
 }
 

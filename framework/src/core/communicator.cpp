@@ -1,8 +1,11 @@
 #include "perikit/core/communicator.hpp"
 
+#include <cstdlib>
 #include <utility>
 
 namespace perikit {
+
+Communicator::~Communicator() = default;
 
 namespace {
 
@@ -10,9 +13,12 @@ class Serial final : public Communicator {
  public:
   int rank() const noexcept override { return 0; }
   int size() const noexcept override { return 1; }
-  double sum(double value) override { return value; }
+  void sum(std::span<std::int64_t>) override {}
   double largest(double value) override { return value; }
-  void exchange(const std::vector<std::vector<double>>& to, std::vector<std::vector<double>>& from) override { from = to; }
+  void exchange(std::span<const Message>) override {}
+  std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override { return {{bytes.begin(), bytes.end()}}; }
+  void broadcast(std::vector<std::byte>&) override {}
+  [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
 };
 
 thread_local Communicator* current = nullptr;
@@ -25,6 +31,16 @@ Communicator& communicator() noexcept {
 }
 
 CommunicatorScope::CommunicatorScope(Communicator& mine) noexcept : before_(std::exchange(current, &mine)) {}
-CommunicatorScope::~CommunicatorScope() { current = before_; }
+CommunicatorScope::~CommunicatorScope() {
+  current = before_;
+}
+
+double total_over_ranks(ExactSum sum) {
+  if (communicator().size() > 1) {
+    sum.normalize();
+    communicator().sum(sum.numbers());
+  }
+  return sum.value();
+}
 
 }  // namespace perikit

@@ -9,22 +9,12 @@ namespace perikit {
 
 namespace {
 
-/// Partial sums are over blocks of this many numbers, whatever the number of threads.
 constexpr std::size_t sum_block = 16384;
-
-template <class Term>
-double blocked_sum(std::size_t n, Term&& term) {
-  return ordered_sum((n + sum_block - 1) / sum_block, [&](std::size_t b) { return term(b * sum_block, std::min(n, (b + 1) * sum_block)); });
-}
 
 }  // namespace
 
 double dot(ConstFieldView a, ConstFieldView b) {
-  return communicator().sum(blocked_sum(a.size(), [&](std::size_t begin, std::size_t end) {
-    double sum = 0;
-    for (std::size_t k = begin; k < end; ++k) sum += a.data[k] * b.data[k];
-    return sum;
-  }));
+  return total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return a.data[k] * b.data[k]; }));
 }
 
 double norm(ConstFieldView a) { return std::sqrt(dot(a, a)); }
@@ -57,15 +47,18 @@ void mask(ConstFieldView mask, FieldView x) {
   });
 }
 
-void fill_with_noise(ConstFieldView mask, std::uint64_t seed, FieldView x) {
-  over_blocks(x.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      std::uint64_t k = i + seed;
-      k = (k ^ (k >> 30)) * 0xbf58476d1ce4e5b9ULL;
-      k = (k ^ (k >> 27)) * 0x94d049bb133111ebULL;
-      x.data[i] = mask.data[i] != 0 ? static_cast<double>((k ^ (k >> 31)) >> 11) * 0x1.0p-52 - 1.0 : 0.0;
-    }
-  });
+void fill_with_noise(ConstFieldView mask, std::uint64_t seed, const Places& places, FieldView x) {
+  const std::size_t stride = places.place.empty() ? x.stride : places.stride;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(x.components); ++c)
+    over_blocks(x.stride, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) {
+        const std::size_t i = c * x.stride + p, at = places.place.empty() ? p : static_cast<std::size_t>(places.place[p]);
+        std::uint64_t k = c * stride + at + seed;
+        k = (k ^ (k >> 30)) * 0xbf58476d1ce4e5b9ULL;
+        k = (k ^ (k >> 27)) * 0x94d049bb133111ebULL;
+        x.data[i] = mask.data[i] != 0 ? static_cast<double>((k ^ (k >> 31)) >> 11) * 0x1.0p-52 - 1.0 : 0.0;
+      }
+    });
 }
 
 }  // namespace perikit

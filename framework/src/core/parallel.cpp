@@ -3,7 +3,6 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "core/thread_team.hpp"
 #include "perikit/core/simd.hpp"
@@ -27,13 +26,5 @@ void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)
   team_for(threads, n, context, body);
 }
 }  // namespace detail
-
-double ordered_sum(std::size_t blocks, const std::function<double(std::size_t)>& term) {
-  std::vector<double> parts(blocks);
-  parallel_for(blocks, [&](std::size_t b) { parts[b] = term(b); });
-  double total = 0;
-  for (const double part : parts) total += part;
-  return total;
-}
 
 }  // namespace perikit

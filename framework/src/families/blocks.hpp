@@ -20,6 +20,8 @@ class Colouring {
  public:
   Colouring() = default;
   explicit Colouring(const BlockReach& reach);
+  /// Given colours, by block.
+  explicit Colouring(const std::vector<std::int32_t>& colour_of);
 
   template <class Body>
   void for_each(Body&& body) const {

@@ -27,6 +27,9 @@ void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows)
 /// Blocks of so many points, and those that hold neighbours of them.
 BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points = cloud_block_points);
 
+/// Colours of these blocks; on a part of a body those that they have in the whole one.
+Colouring cloud_colouring(const Body& body, const BlockReach& reach, std::size_t block_points = cloud_block_points);
+
 /// Whether a point of block b moves.
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points = cloud_block_points) noexcept;
 /// Whether a group of eight points in block b is marked.

@@ -2,11 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
+namespace {
+
+bool on_any_rank(bool here) {
+  return communicator().largest(here ? 1 : 0) > 0;
+}
+
+}  // namespace
+
 Fracture::Fracture(Families& families, const BodyDamage& damage, std::unique_ptr<BondFinder> finder)
-    : families_(families), damage_(damage), finder_(std::move(finder)) {
+    : families_(families), damage_(damage), shared_(families.body()), finder_(std::move(finder)) {
   if (damage.gradual()) gradual_.emplace(families.body(), damage.crack_speed);
 }
 
@@ -37,7 +48,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   ++updates_;
   std::vector<BondChange> changes = finder_->find(u);
   if (gradual_) changes = gradual_->let_go(changes, time_step);
-  if (changes.empty()) return {};
+  if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;
   if (!begin) {
     fail(std::move(changes), u, u, nullptr, body, update);
@@ -55,14 +66,18 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   // Those of each half of the step at the mean of their moments.
   for (const bool early : {true, false}) {
     std::vector<BondChange> of_half;
-    double sum = 0;
+    ExactSum sum;
+    std::int64_t count = 0;  // each bond once, where its first point is
     for (std::size_t k = 0; k < changes.size(); ++k) {
       if ((moments[k] < 0.5) != early || families_.integrity(changes[k].bond) <= changes[k].integrity) continue;
       of_half.push_back(changes[k]);
-      sum += moments[k];
+      if (!families_.body().owns(static_cast<std::size_t>(changes[k].bond.point))) continue;
+      sum.add(moments[k]);
+      ++count;
     }
-    if (of_half.empty()) continue;
-    const double moment = sum / static_cast<double>(of_half.size());
+    communicator().sum({&count, 1});
+    if (count == 0) continue;
+    const double moment = total_over_ranks(sum) / static_cast<double>(count);
     for (std::size_t k = 0; k < u.size(); ++k) at_.data()[k] = before_.data()[k] + moment * (u.data[k] - before_.data()[k]);
     // The bonds act until they fail, at `moment`. A step has the forces of its beginning for the first half, and those of its
     // end, which are to be without these bonds, for the second: what the bonds owe, or gave too much, is an impulse. Of the first
@@ -80,7 +95,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
 /// the marked groups there owe.
 void Fracture::fail(std::vector<BondChange> changes, ConstFieldView u, ConstFieldView at, const Owing& owing, const Body& body,
                     BondUpdate& update) {
-  while (!changes.empty()) {
+  while (on_any_rank(!changes.empty())) {
     std::vector<std::int32_t> ends;
     for (const BondChange& c : changes) {
       ends.push_back(c.bond.point);
@@ -90,12 +105,13 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView u, ConstFiel
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
     GroupMarks marks(families_.body().stride() / padding, 0);
     families_.mark(ends, marks);
+    shared_.mark(marks);
     const double here = body.energy(u, marks), there = owing ? body.energy(at, marks) : here;
     if (owing) owing(1, marks);
     families_.lower(changes);
     body.changed(ends);
     const double left = body.energy(u, marks);
-    update.changed += changes.size();
+    update.changed += std::max<std::size_t>(changes.size(), 1);
     update.released += here - left;
     update.dissipated += owing ? there - body.energy(at, marks) : here - left;
     if (owing) owing(-1, marks);
@@ -110,13 +126,22 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView u, ConstFiel
 }
 
 std::vector<BondId> Fracture::fragments(std::span<const std::int32_t> points) const {
-  std::vector<BondId> bonds = families_.fragment_bonds(points);
+  // Others know the whole families of their own points alone.
+  std::vector<std::int32_t> own;
+  std::ranges::copy_if(points, std::back_inserter(own),
+                       [&](std::int32_t p) { return families_.body().owns(static_cast<std::size_t>(p)); });
+  std::vector<BondId> bonds = families_.fragment_bonds(own);
   const Field& limit = damage_.last();
   std::erase_if(bonds, [&](BondId b) { return !std::isfinite(limit.data()[b.point] + limit.data()[b.far]); });
-  return bonds;
+  return shared_.of_all(bonds);
 }
 
-void Fracture::restore(std::span<const BondChange> changes, const std::function<void(std::span<const std::int32_t>)>& changed) {
+std::vector<BondChange> Fracture::changed() const {
+  return shared_.outward(families_.changed());
+}
+
+void Fracture::restore(std::span<const BondChange> of_all, const std::function<void(std::span<const std::int32_t>)>& changed) {
+  const std::vector<BondChange> changes = shared_.inward(of_all);
   changed(families_.mend());
   const std::vector<std::int32_t> ends = families_.lower(changes);
   changed(ends);
@@ -125,10 +150,13 @@ void Fracture::restore(std::span<const BondChange> changes, const std::function<
 }
 
 BondChecks Fracture::checks() const {
-  const std::vector<BondChange> present = families_.changed();
-  const auto failed = static_cast<std::size_t>(
-      std::count_if(present.begin(), present.end(), [](const BondChange& c) { return c.integrity == 0; }));
-  return {updates_, updates_ * finder_->groups(), finder_->checked(), failed, present.size() - failed};
+  std::int64_t counts[4] = {static_cast<std::int64_t>(updates_ * finder_->groups()),
+                            static_cast<std::int64_t>(finder_->checked()), 0, 0};
+  for (const BondChange& change : families_.changed())
+    if (families_.body().owns(static_cast<std::size_t>(change.bond.point))) ++counts[change.integrity == 0 ? 2 : 3];
+  communicator().sum(counts);
+  const auto count = [&](std::size_t k) { return static_cast<std::size_t>(counts[k]); };
+  return {updates_, count(0), count(1), count(2), count(3)};
 }
 
 }  // namespace perikit

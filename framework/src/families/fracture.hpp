@@ -1,6 +1,7 @@
 #pragma once
 /// The bonds of one run: finds those that fail, lowers them, and accounts for their energy and, in explicit steps, for the moment
-/// inside of the step at which they failed.
+/// inside of the step at which they failed. On several ranks each decides the same of the bonds that it holds, as it sees the
+/// same displacements and limits; fragments are found by the owners of their points and told to all.
 
 #include <functional>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "families/bond_finder.hpp"
 #include "families/families.hpp"
 #include "families/gradual_failure.hpp"
+#include "families/shared_bonds.hpp"
 
 namespace perikit {
 
@@ -21,23 +23,27 @@ class Fracture {
 
   /// What it needs of those who know the forces. Marks: groups of points that depend on bonds that fail.
   struct Body {
-    /// Strain energy of the evaluation points of the marked groups.
+    /// Strain energy of the evaluation points of the marked groups, over all ranks.
     std::function<double(ConstFieldView u, const GroupMarks&)> energy;
     /// force += factor times the forces of at least these evaluation points, of the same ones whatever the bonds are.
     std::function<void(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
-  /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds.
+  /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds. All ranks must call it.
   BondUpdate update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction, const Body& body);
 
-  /// Back to these bonds, which are those of `Families::changed` at another time.
+  /// Every bond that is not as it was at the set-up, by places in the whole body: on rank 0 those of all ranks. All ranks must
+  /// call it.
+  std::vector<BondChange> changed() const;
+  /// Back to these bonds, which `changed` has named at another time. All ranks must call it.
   void restore(std::span<const BondChange> changes, const std::function<void(std::span<const std::int32_t>)>& changed);
+  /// Over all ranks, which must call it; bonds are counted once.
   BondChecks checks() const;
   std::size_t bytes() const noexcept { return finder_->bytes(); }
 
  private:
-  /// The bonds of fragments among the points that may fail.
+  /// The bonds of fragments among the points that may fail. All ranks must call it.
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
   /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
@@ -47,6 +53,7 @@ class Fracture {
 
   Families& families_;
   const BodyDamage& damage_;
+  SharedBonds shared_;
   std::unique_ptr<BondFinder> finder_;
   std::optional<GradualFailure> gradual_;
   std::size_t updates_ = 0;

@@ -22,7 +22,7 @@ const std::vector<PointField>& point_fields() {
       {"strain_energy_density", 1, false, "strain energy density", "J/m³",
        [](From f) { return f.scalar(f.samples().strain_energy_density); }},
       {"deformation_gradient", 9, true, "deformation gradient", "", [](From f) { return f.tensor(f.samples().H, true); }},
-      {"first_piola", 9, true, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples().P); }},
+      {"first_piola", 9, false, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples(true).P); }},
       {"cauchy", 9, true, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples().cauchy); }},
       {"von_mises", 1, true, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples().von_mises); }},
       {"jacobian", 1, true, "jacobian", "", [](From f) { return f.jacobian(); }},
@@ -103,8 +103,8 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
   return out;
 }
 
-const PointSamples& PointFields::samples() {
-  if (!samples_) problem_.sample(samples_.emplace());
+const PointSamples& PointFields::samples(bool virial) {
+  if (!samples_ || (virial && !samples_->virial)) problem_.sample(samples_.emplace(PointSamples{.virial = virial}));
   return *samples_;
 }
 

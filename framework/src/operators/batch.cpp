@@ -152,8 +152,19 @@ int BatchWork::balance_pass(int n, BatchScratch& s, bool both_ends) const noexce
   return -1;
 }
 
+/// Bonds with a far end: no point of this rank feels them, and their gradients are anything.
+void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
+  for (int l = 0; l < n; ++l) {
+    if (laws_.far(static_cast<std::size_t>(s.owner[l])))
+      s.far[l] = s.owner[l];
+    else if (laws_.far(static_cast<std::size_t>(s.far[l])))
+      s.owner[l] = s.far[l];
+  }
+}
+
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
   if (balance_) return balance_pass(n, s, both_ends);
+  if (both_ends && laws_.any_far()) leave_out_far(n, s);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;

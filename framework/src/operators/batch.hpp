@@ -128,6 +128,7 @@ class BatchWork {
   int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P,
            double* energy) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
+  void leave_out_far(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.

@@ -27,7 +27,7 @@ void refuse_ranks(const ProblemParts& parts) {
 
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
     : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
-  if (parts_.partition) ghosts_.emplace(*parts_.partition, body());
+  if (parts_.partition) ghosts_.emplace(*parts_.partition, body(), dimension());
   if (!parts_.partition && !parts_.images) return;
   seen_ = make_field();
   seen_direction_ = make_field();
@@ -39,7 +39,36 @@ ProblemParts::ProblemParts() = default;
 ProblemParts::ProblemParts(ProblemParts&&) noexcept = default;
 ProblemParts::~ProblemParts() = default;
 
-ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) const {
+namespace {
+
+/// A failure on one rank is one on all of them, which must say the same: that of the point that comes first.
+void agree(EvaluationStatus& status) {
+  std::vector<std::byte> mine;
+  if (!status.ok()) {
+    ByteWriter out;
+    out.value(status.point);
+    out.bytes(status.description.data(), status.description.size());
+    mine = out.take();
+  }
+  std::vector<std::byte> first;
+  std::int64_t least = -1;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(mine)) {
+    if (of_rank.empty()) continue;
+    const auto point = ByteReader(of_rank).value<std::int64_t>();
+    if (least >= 0 && point >= least) continue;
+    least = point;
+    first = of_rank;
+  }
+  communicator().broadcast(first);
+  ByteReader in(first);
+  status.point = in.value<std::int64_t>();
+  status.description.assign(first.size() - sizeof status.point, ' ');
+  in.bytes(status.description.data(), status.description.size());
+}
+
+}  // namespace
+
+ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) {
   if (!ghosts_ && !images()) return u;
   copy(u, memory);
   if (ghosts_) ghosts_->forward(memory);
@@ -47,11 +76,13 @@ ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) const {
   return memory;
 }
 
-void BodyProblem::finish(FieldView force, EvaluationStatus& status) const {
+void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
   if (images() && status.ok()) images()->fold(force);
   if (!ghosts_) return;
-  if (communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return ghosts_->accumulate(force);
-  if (status.ok()) status = {0, "inadmissible deformation on another rank"};
+  if (communicator().largest(status.ok() ? 0.0 : 1.0) != 0)
+    agree(status);
+  else
+    ghosts_->clear(force);
 }
 
 template <class Fill>
@@ -68,14 +99,11 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status = terms().forces(seen(u, seen_), force, energy);
-  if (energy) *energy = communicator().sum(*energy);
   if (history) history->set_time_step(0);
   if (!status.ok()) {
-    const auto p = static_cast<std::size_t>(body().internal()[static_cast<std::size_t>(status.point)]);
-    const std::size_t id = body().material_ids().empty() ? 0 : body().material_ids()[p];
     status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
                                      terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
-                                     status.description, parts_.kinematics, parts_.materials[id]);
+                                     status.description, parts_.kinematics, parts_.materials[status.material]);
   }
   if (weak_springs_ && status.ok()) {
     if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
@@ -153,6 +181,7 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
   const ConstFieldView u = state().displacement();
   const StepBegin begin = [&](FieldView before) {
     for (std::size_t k = 0; k < before.size(); ++k) before.data[k] = u.data[k] - time_step * velocity.data[k];
+    if (ghosts_) ghosts_->forward(before);
     if (images()) images()->extend(before);
   };
   const bool explicit_step = velocity.data != nullptr;
@@ -174,17 +203,17 @@ void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
   const FieldView u = state().displacement();
   const std::span<const double> by_point = masses().by_point();
   const ConstFieldView free = constraints().free();
-  double held = 0;
+  ExactSum held;
   for (std::size_t k = 0; k < velocity.size(); ++k) {
     const double mass = by_point[k % velocity.stride];
     if (free.data[k] != 0 && mass > 0) {
       velocity.data[k] += impulse.data[k] / mass;
       u.data[k] += drift.data[k] / mass;
     } else {
-      held += impulse.data[k] * velocity.data[k];
+      held.add(impulse.data[k] * velocity.data[k]);
     }
   }
-  state().energies.external_work -= held;
+  state().energies.external_work -= total_over_ranks(held);
   status = evaluate_forces(u, state().internal_force(), &state().energies.strain);
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
@@ -210,26 +239,58 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
 }
 
+namespace {
+
+/// What laws remember, rank by rank: evaluation points have numbers of their own on each.
+void write_history(std::span<const double> mine, ByteWriter& out) {
+  const auto of_ranks = communicator().gather(std::as_bytes(mine));
+  out.value(static_cast<std::uint64_t>(of_ranks.size()));
+  for (const std::vector<std::byte>& of_rank : of_ranks) {
+    out.value(static_cast<std::uint64_t>(of_rank.size() / sizeof(double)));
+    out.bytes(of_rank.data(), of_rank.size());
+  }
+}
+
+/// Without history the number of ranks may be another.
+void read_history(ByteReader& in, std::span<double> mine) {
+  const auto ranks = in.value<std::uint64_t>();
+  const auto own = static_cast<std::uint64_t>(communicator().rank());
+  std::uint64_t all = 0, found = 0;
+  for (std::uint64_t rank = 0; rank < ranks; ++rank) {
+    const auto count = in.value<std::uint64_t>();
+    all += count;
+    if (rank == own) found = count;
+    if (rank == own && count == mine.size())
+      in.bytes(mine.data(), mine.size_bytes());
+    else
+      in.skip(count, sizeof(double));
+  }
+  if (all > 0 && ranks != static_cast<std::uint64_t>(communicator().size()))
+    throw InputError(fmt::format("found the history of materials on {} ranks; allowed: the same number of ranks", ranks));
+  if (found != mine.size()) throw InputError("the saved state belongs to other materials");
+}
+
+}  // namespace
+
 std::vector<std::byte> BodyProblem::snapshot() const {
   ByteWriter out;
-  out.value(static_cast<std::uint64_t>(body().stride()));
+  out.value(static_cast<std::uint64_t>(whole().stride()));
   values_.constraints.write(out);
   parts_.fracture.write(terms(), out);
-  out.numbers(terms().history() ? terms().history()->values() : std::span<double>());
-  values_.state.write(out);
+  write_history(terms().history() ? terms().history()->values() : std::span<double>(), out);
+  values_.state.write(whole(), out);
   return out.take();
 }
 
 void BodyProblem::restore(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
-  if (in.value<std::uint64_t>() != body().stride()) throw InputError("the saved state belongs to another body");
+  if (in.value<std::uint64_t>() != whole().stride()) throw InputError("the saved state belongs to another body");
   constraints().read(in);
   parts_.fracture.read(terms(), in);
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
-  if (in.value<std::uint64_t>() != history.size()) throw InputError("the saved state belongs to other materials");
-  in.bytes(history.data(), history.size_bytes());
+  read_history(in, history);
   terms().history_restored();
-  state().read(in);
+  state().read(whole(), in);
   if (!in.done()) throw InputError("the saved state is damaged");
   if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
 }
@@ -247,8 +308,11 @@ struct BeforeState {
     stride = in.value<std::uint64_t>();
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
-    history.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
-    in.bytes(history.data(), history.size() * sizeof(double));
+    for (auto ranks = in.value<std::uint64_t>(); ranks > 0; --ranks) {  // see write_history
+      const auto count = std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double));
+      history.resize(history.size() + count);
+      in.bytes(history.data() + history.size() - count, count * sizeof(double));
+    }
   }
 };
 
@@ -260,6 +324,7 @@ BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot
 }
 
 void BodyProblem::carry(std::span<const std::byte> snapshot) {
+  if (ghosts_) throw InputError("several ranks cannot take them over");
   const BeforeState before(snapshot);
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
   if (before.stride != body().stride()) throw InputError("the earlier run had another body");

@@ -1,52 +1,60 @@
 #include "perikit/problem/ghosts.hpp"
 
-#include "perikit/core/communicator.hpp"
-
 namespace perikit {
 
-Ghosts::Ghosts(const Partition& partition, const Body& part) {
-  const auto internal = [&](const Points& inputs) {
-    Points points;
-    for (const auto& of_rank : inputs) {
-      points.emplace_back();
-      for (const std::int32_t input : of_rank) points.back().push_back(part.internal()[static_cast<std::size_t>(partition.place(input))]);
-    }
+Ghosts::Ghosts(const Partition& partition, const Body& part, int components) {
+  std::vector<std::int32_t> of_number(partition.whole().points(), -1);
+  for (const std::int32_t p : part.internal()) of_number[static_cast<std::size_t>(part.number(static_cast<std::size_t>(p)))] = p;
+  const auto internal = [&](const std::vector<std::int32_t>& numbers) {
+    std::vector<std::int32_t> points;
+    for (const std::int32_t number : numbers) points.push_back(of_number[static_cast<std::size_t>(number)]);
     return points;
   };
-  lent_ = internal(partition.lent());
-  borrowed_ = internal(partition.borrowed());
+  for (std::size_t k = 0; k < partition.lent().size(); ++k) {
+    if (partition.lent()[k].empty() && partition.borrowed()[k].empty()) continue;
+    Neighbour& neighbour =
+        neighbours_.emplace_back(static_cast<int>(k), internal(partition.lent()[k]), internal(partition.borrowed()[k]));
+    neighbour.to.resize(neighbour.lent.size() * static_cast<std::size_t>(components));
+    neighbour.from.resize(neighbour.borrowed.size() * static_cast<std::size_t>(components));
+  }
+  messages_.reserve(neighbours_.size());
 }
 
-std::vector<std::vector<double>> Ghosts::gather(FieldView field, const Points& points) {
-  std::vector<std::vector<double>> values;
-  for (const auto& of_rank : points) {
-    values.emplace_back();
+void Ghosts::forward(FieldView field) {
+  const auto components = static_cast<std::size_t>(field.components);
+  messages_.clear();
+  for (Neighbour& neighbour : neighbours_) {
+    double* to = neighbour.to.data();
     for (int c = 0; c < field.components; ++c)
-      for (const std::int32_t p : of_rank) values.back().push_back(field.component(c)[p]);
+      for (const std::int32_t p : neighbour.lent) *to++ = field.component(c)[p];
+    messages_.push_back({neighbour.rank,
+                         {neighbour.to.data(), components * neighbour.lent.size()},
+                         {neighbour.from.data(), components * neighbour.borrowed.size()}});
   }
-  return values;
-}
-
-void Ghosts::forward(FieldView field) const {
-  std::vector<std::vector<double>> values;
-  communicator().exchange(gather(field, lent_), values);
-  for (std::size_t k = 0; k < borrowed_.size(); ++k) {
-    auto value = values[k].begin();
+  communicator().exchange(messages_);
+  for (const Neighbour& neighbour : neighbours_) {
+    const double* from = neighbour.from.data();
     for (int c = 0; c < field.components; ++c)
-      for (const std::int32_t p : borrowed_[k]) field.component(c)[p] = *value++;
+      for (const std::int32_t p : neighbour.borrowed) field.component(c)[p] = *from++;
   }
 }
 
-void Ghosts::accumulate(FieldView field) const {
-  std::vector<std::vector<double>> values;
-  communicator().exchange(gather(field, borrowed_), values);
-  for (std::size_t k = 0; k < lent_.size(); ++k) {
-    auto value = values[k].begin();
-    for (int c = 0; c < field.components; ++c) {
-      for (const std::int32_t p : lent_[k]) field.component(c)[p] += *value++;
-      for (const std::int32_t p : borrowed_[k]) field.component(c)[p] = 0.0;
-    }
-  }
+void Ghosts::clear(FieldView field) const {
+  for (const Neighbour& neighbour : neighbours_)
+    for (int c = 0; c < field.components; ++c)
+      for (const std::int32_t p : neighbour.borrowed) field.component(c)[p] = 0.0;
+}
+
+std::size_t Ghosts::size() const noexcept {
+  std::size_t count = 0;
+  for (const Neighbour& neighbour : neighbours_) count += neighbour.borrowed.size();
+  return count;
+}
+
+std::size_t Ghosts::sent() const noexcept {
+  std::size_t count = 0;
+  for (const Neighbour& neighbour : neighbours_) count += neighbour.lent.size();
+  return count;
 }
 
 }  // namespace perikit

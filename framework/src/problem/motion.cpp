@@ -4,21 +4,16 @@
 #include <cmath>
 
 #include "perikit/core/communicator.hpp"
-#include "perikit/core/parallel.hpp"
+#include "perikit/core/field_operations.hpp"
 
 namespace perikit {
 
 double kinetic_energy(const Problem& problem, ConstFieldView velocity) {
   const std::span<const double> masses = problem.masses().by_point();
-  constexpr std::size_t block = 8192;
-  return communicator().sum(ordered_sum((masses.size() + block - 1) / block, [&](std::size_t b) {
-    double sum = 0;
-    for (std::size_t p = b * block; p < std::min(masses.size(), (b + 1) * block); ++p) {
-      double v2 = 0;
-      for (int c = 0; c < velocity.components; ++c) v2 += velocity.component(c)[p] * velocity.component(c)[p];
-      sum += 0.5 * masses[p] * v2;
-    }
-    return sum;
+  return total_over_ranks(exact_sum(masses.size(), [&](std::size_t p) {
+    double v2 = 0;
+    for (int c = 0; c < velocity.components; ++c) v2 += velocity.component(c)[p] * velocity.component(c)[p];
+    return 0.5 * masses[p] * v2;
   }));
 }
 

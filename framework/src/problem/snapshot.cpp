@@ -28,6 +28,11 @@ void ByteReader::bytes(void* to, std::size_t size) {
   bytes_ = bytes_.subspan(size);
 }
 
+void ByteReader::skip(std::uint64_t count, std::size_t size) {
+  if (count > bytes_.size() / size) throw InputError("the saved state is too short");
+  bytes_ = bytes_.subspan(count * size);
+}
+
 std::string ByteReader::text() {
   const auto length = value<std::uint64_t>();
   if (length > 256) throw InputError("the saved state is damaged");

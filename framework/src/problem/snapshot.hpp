@@ -2,6 +2,7 @@
 /// Run state as bytes, and back.
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -37,6 +38,7 @@ class ByteReader {
     bytes(&v, sizeof v);
     return v;
   }
+  void skip(std::uint64_t count, std::size_t size);
   /// At most 256 characters.
   std::string text();
   bool done() const noexcept { return bytes_.empty(); }

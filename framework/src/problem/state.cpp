@@ -1,5 +1,9 @@
 #include "perikit/problem/state.hpp"
 
+#include <algorithm>
+#include <cstring>
+
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
 #include "problem/snapshot.hpp"
 
@@ -28,7 +32,29 @@ std::size_t State::bytes() const noexcept {
   return total;
 }
 
-void State::write(ByteWriter& out) const {
+namespace {
+
+/// From all ranks, one after the other, on rank 0.
+std::vector<double> gathered(const std::vector<double>& mine) {
+  std::vector<double> together;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
+    const std::size_t before = together.size();
+    together.resize(before + of_rank.size() / sizeof(double));
+    if (!of_rank.empty()) std::memcpy(together.data() + before, of_rank.data(), of_rank.size());
+  }
+  return together;
+}
+
+}  // namespace
+
+void State::write(const Body& whole, ByteWriter& out) const {
+  const std::vector<std::int32_t>& owned = body_->owned();
+  const auto places = body_->places().place;
+  std::vector<double> values, to;  // of owned points; where those of all ranks go
+  if (!places.empty()) {
+    for (const std::int32_t p : owned) values.push_back(places[static_cast<std::size_t>(p)]);
+    to = gathered(values);
+  }
   out.value(time);
   out.value(step);
   out.value(energies);
@@ -41,11 +67,23 @@ void State::write(ByteWriter& out) const {
   for (const auto& [name, field] : fields_) {
     out.text(name);
     out.value(static_cast<std::int64_t>(field.components()));
-    out.bytes(field.data(), field.size() * sizeof(double));
+    if (places.empty()) {
+      out.bytes(field.data(), field.size() * sizeof(double));
+      continue;
+    }
+    for (int c = 0; c < field.components(); ++c) {
+      for (std::size_t n = 0; n < owned.size(); ++n) values[n] = field.component(c)[owned[n]];
+      const std::vector<double> from = gathered(values);
+      if (from.empty()) continue;
+      std::vector<double> all(whole.stride(), 0.0);
+      for (std::size_t n = 0; n < from.size(); ++n) all[static_cast<std::size_t>(to[n])] = from[n];
+      out.bytes(all.data(), all.size() * sizeof(double));
+    }
   }
 }
 
-void State::read(ByteReader& in) {
+void State::read(const Body& whole, ByteReader& in) {
+  const auto places = body_->places().place;
   time = in.value<double>();
   step = in.value<std::int64_t>();
   energies = in.value<Energies>();
@@ -63,7 +101,16 @@ void State::read(ByteReader& in) {
     if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
     const FieldView field = declare(name, static_cast<int>(components));
     if (field.components != components) throw InputError("the saved state is damaged");
-    in.bytes(field.data, field.size() * sizeof(double));
+    if (places.empty()) {
+      in.bytes(field.data, field.size() * sizeof(double));
+      continue;
+    }
+    std::vector<double> all(whole.stride());
+    for (int c = 0; c < field.components; ++c) {
+      in.bytes(all.data(), all.size() * sizeof(double));
+      for (const std::int32_t p : body_->owned())
+        field.component(c)[p] = all[static_cast<std::size_t>(places[static_cast<std::size_t>(p)])];
+    }
   }
 }
 

@@ -30,7 +30,7 @@ EvaluationStatus WeakSprings::refuse(ConstFieldView u) const {
   const Body& body = families_.body();
   const LoosePiece* const driven = driven_piece(pieces_, body, u, problem_.state().external_force());
   if (!driven) return {};
-  return {body.input_of(static_cast<std::size_t>(driven->points.front())),
+  return {body.input_of(static_cast<std::size_t>(driven->points.front())), 0,
           fmt::format("nothing holds {}, and the loads move it ([run] weak_springs would hold it)", driven->name(body))};
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace perikit {
@@ -32,11 +33,14 @@ std::string RunRecorder::closing(double set_up) const {
   std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
   text += fmt::format("time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, steps_time,
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
+  if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
   if (steps > 0) {
     text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
                         steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
   }
-  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most\n", static_cast<double>(problem.bytes()) / 1e6, peak_bytes() / 1e6);
+  const double arrays = communicator().largest(static_cast<double>(problem.bytes())), peak = communicator().largest(peak_bytes());
+  text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most{}\n", arrays / 1e6, peak / 1e6,
+                      communicator().size() > 1 ? ", on the rank with most" : "");
   const Energies& e = problem.state().energies;
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, e.external_work);

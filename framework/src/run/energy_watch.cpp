@@ -23,12 +23,13 @@ constexpr double lost_share = 0.95;
 /// The kinetic energy that rounding of the displacements gives to the body at each step [J]: a body that is at rest, but far from
 /// where it was, has no other.
 double rounding_energy(BodyProblem& problem, double time_step) {
-  double largest = 0, mass = 0;
+  double largest = 0;
+  ExactSum mass;
   const ConstFieldView u = problem.state().displacement();
   for (std::size_t k = 0; k < u.size(); ++k) largest = std::max(largest, std::abs(u.data[k]));
-  for (const double m : problem.masses().by_point()) mass += m;
+  for (const double m : problem.masses().by_point()) mass.add(m);
   const double speed = 16 * std::numeric_limits<double>::epsilon() * communicator().largest(largest) / time_step;
-  return 0.5 * communicator().sum(mass) * speed * speed;
+  return 0.5 * total_over_ranks(mass) * speed * speed;
 }
 
 }  // namespace

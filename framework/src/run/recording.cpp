@@ -13,9 +13,12 @@
 #include "files/atomic_file.hpp"
 #include "output/history_file.hpp"
 #include "output/result_file.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/run/simulation.hpp"
+#include "problem/snapshot.hpp"
 #include "run/checkpoint.hpp"
+#include "run/gathering.hpp"
 #include "run/reduction.hpp"
 #include "run/run_folder.hpp"
 
@@ -43,7 +46,7 @@ std::int64_t with_row(std::int64_t before, std::span<const double> row) {
 }
 
 ReferenceData reference_of(const BodyProblem& problem) {
-  const Body& body = problem.body();
+  const Body& body = problem.whole();
   ReferenceData data;
   for (std::size_t p = 0; p < body.owned().size(); ++p) {
     const auto i = static_cast<std::size_t>(body.owned()[p]);
@@ -62,6 +65,24 @@ ReferenceData reference_of(const BodyProblem& problem) {
   return data;
 }
 
+/// What a run goes on from, from rank 0 to the others.
+void share(Checkpoint& checkpoint) {
+  if (communicator().size() == 1) return;
+  // But for what only rank 0 looks at: the fingerprints of files.
+  const auto each = [&](auto&& visit) {
+    OutputProgress& o = checkpoint.output;
+    for (std::int64_t* number : {&o.frames, &o.history_rows, &o.next_time, &o.history_every, &o.steps_expected, &checkpoint.step}) visit(*number);
+    for (double* number : {&o.end_time, &o.frame_spacing, &o.energies.initial, &o.energies.largest, &o.energies.off, &checkpoint.time}) visit(*number);
+  };
+  ByteWriter out;
+  each([&](auto& value) { out.value(value); });
+  std::vector<std::byte> head = out.take();
+  communicator().broadcast(head);
+  communicator().broadcast(checkpoint.state);
+  ByteReader in(head);
+  each([&](auto& value) { value = in.value<std::remove_reference_t<decltype(value)>>(); });
+}
+
 }  // namespace
 
 void request_stop() noexcept { stop = true; }
@@ -77,7 +98,8 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
                          std::string libraries, bool force)
     : simulation_(simulation),
       folder_(std::move(folder)),
-      show_progress_(show_progress),
+      show_progress_(show_progress && communicator().rank() == 0),
+      first_(communicator().rank() == 0),
       fields_(simulation.problem(), simulation.dynamic(), !simulation.scene().initial_velocity.empty()),
       libraries_(std::move(libraries)),
       start_(std::chrono::steady_clock::now()),
@@ -95,10 +117,11 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   columns_ = perikit::history_columns(scene);
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
-  output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
-  const bool earlier = start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_));
+  if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
+  const bool earlier = communicator().largest(first_ && start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_)) ? 1 : 0) > 0;
   if (earlier) start_from_checkpoint();
-  else start_fresh(start);
+  else if (first_) start_fresh(start);
+  if (!first_) return;
   writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
@@ -119,8 +142,14 @@ void RunRecorder::start_fresh(RunStart start) {
 }
 
 void RunRecorder::start_from_checkpoint() {
-  const Checkpoint checkpoint = read_checkpoint(folder_);
-  const bool lengthened = check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+  Checkpoint checkpoint;
+  bool lengthened = false;
+  if (first_) {
+    checkpoint = read_checkpoint(folder_);
+    lengthened = check_checkpoint(checkpoint, simulation_.scene(), body_, libraries_, folder_);
+  }
+  share(checkpoint);
+  lengthened = communicator().largest(lengthened ? 1 : 0) > 0;
   try {
     simulation_.problem().restore(checkpoint.state);
   } catch (const InputError& error) {
@@ -128,9 +157,10 @@ void RunRecorder::start_from_checkpoint() {
   }
   done_ = checkpoint.output;
   if (lengthened) check_longer();
-  check_kept_files();
+  if (first_) check_kept_files();
   resumed_step_ = first_step_ = checkpoint.step;
   first_time_ = checkpoint.time;
+  if (!first_) return;
   log_text_ = read_text(folder_ / "run.log");
   if (const auto marked = read_marked(folder_ / "scene.toml"); !marked || marked->text != simulation_.scene().resolved) output_->mark(simulation_.scene().resolved);
 }
@@ -175,6 +205,7 @@ RunRecorder::~RunRecorder() {
 }
 
 void RunRecorder::log(std::string_view message) {
+  if (!first_) return;
   std::istringstream lines{std::string(message)};
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("warning")) warnings_.push_back(line);
@@ -209,9 +240,9 @@ bool RunRecorder::checkpoint_due(std::int64_t step, double time) const {
 }
 
 bool RunRecorder::wants_sample(std::int64_t step, double time) {
-  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends the
-  // run after the next step.
-  stopping_ = stop_requested();
+  // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
+  // the run after the next step.
+  stopping_ = communicator().largest(stop_requested() ? 1 : 0) > 0;
   return stopping_ || frame_due(step, time) || history_due(step);
 }
 
@@ -231,7 +262,7 @@ void RunRecorder::step_done(const StepReport& report) {
   if (row || frame || stopping_) watch_energies(report, row || frame);
   if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
-  if (frame) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
+  if (frame && first_) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
   done_.history_rows += row;
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
@@ -245,10 +276,13 @@ void RunRecorder::step_done(const StepReport& report) {
   progress(report);
 }
 
-bool RunRecorder::interrupted() const noexcept { return stop_requested(); }
+bool RunRecorder::interrupted() const noexcept {
+  return communicator().largest(stop_requested() ? 1 : 0) > 0;
+}
 
 void RunRecorder::stopped_within_step() {
   stopping_ = true;
+  if (communicator().size() > 1) communicator().broadcast(last_step_.state);  // rank 0 has it
   simulation_.problem().restore(last_step_.state);
   fields_.renew();
   if (!last_step_.row) write_history(last_step_.report, false);
@@ -263,23 +297,26 @@ void RunRecorder::working(std::string_view what) {
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  history_->sync();   // frames are on the disk already
+  std::vector<std::byte> state = simulation_.problem().snapshot();
+  if (!first_) return;
+  history_->sync();  // frames are on the disk already
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
-                             simulation_.problem().snapshot()});
+                             std::move(state)});
 }
 
 void RunRecorder::write_frame(const StepReport& report) {
   std::vector<OutputField> fields;
   for (const std::string& name : frame_fields_) {
-    fields.push_back(fields_.get(name));
+    const OutputField& mine = fields_.get(name);
+    fields.push_back({name, mine.width, gather_points(simulation_.problem(), mine.data, static_cast<std::size_t>(mine.width))});
     const std::vector<double>& values = fields.back().data;
     const auto strange = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
-    if (strange == values.end() || !strange_fields_.insert(name).second) continue;
+    if (!first_ || strange == values.end() || !strange_fields_.insert(name).second) continue;
     log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, (strange - values.begin()) / fields.back().width,
                     name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
   }
-  writer_->write(report.time, report.step, fields);
   ++frames_written_;
+  if (first_) writer_->write(report.time, report.step, fields);
 }
 
 void RunRecorder::write_history(const StepReport& report, bool counts) {
@@ -295,10 +332,10 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           static_cast<double>(report.iterations),
                           report.residual};
   for (const HistoryDescription& record : simulation_.scene().output.history)
-    row.push_back(reduced(record, problem.body(), fields_.get(record.quantity), report.time));
-  history_->row(row);
+    row.push_back(reduced(record, problem, fields_.get(record.quantity), report.time));
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;
+  if (first_) history_->row(row);
 }
 
 bool RunRecorder::line_due() {

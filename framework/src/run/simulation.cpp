@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "perikit/build/problem.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
@@ -10,11 +12,12 @@
 
 namespace perikit {
 
-Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(scene) {
+Simulation::Simulation(const Scene& scene, const PartFactory& factory, WorkSteps::Show show)
+    : set_up_(std::move(show)), scene_(scene) {
   if (scene_.threads) set_thread_count(*scene_.threads);
   integrator_ = factory.integrator(*scene_.integrator);
   traits_ = integrator_->traits();
-  problem_ = build_problem(scene_, factory, traits_);
+  problem_ = build_problem(scene_, factory, traits_, set_up_);
   if (traits_.dynamic) problem_->masses().by_point();   // refuses missing densities
   if (traits_.quasi_static && !scene_.initial_velocity.empty()) {
     throw InputError(
@@ -26,6 +29,7 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory) : scene_(
   carried_ = carry_from_earlier_run(scene_, *problem_);
   evaluate_conditions();
   watch_pieces();
+  set_up_.end();
 }
 
 void Simulation::watch_pieces() {
@@ -93,13 +97,41 @@ void Simulation::run(Observer& observer) {
   }
 }
 
+namespace {
+
+/// How the body lies on ranks. All of them must call it.
+std::string ranks_summary(const BodyProblem& problem) {
+  const Partition& partition = *problem.partition();
+  const std::vector<std::int64_t>& points = partition.points();
+  const double mean = static_cast<double>(partition.whole().points()) / static_cast<double>(points.size());
+  const auto ghosts = static_cast<double>(problem.ghosts()->size());
+  const auto bytes = static_cast<double>(problem.bytes());
+  const double most_ghosts = communicator().largest(ghosts), most_bytes = communicator().largest(bytes);
+  const double sent = communicator().largest(8.0 * problem.dimension() * static_cast<double>(problem.ghosts()->sent()));
+  return fmt::format(
+      "ranks         {} with {} threads each\n"
+      "balance       {} points on the largest rank, {:.3f} of the mean\n"
+      "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
+      "exchange      at most {:.3g} MB a rank and step\n"
+      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n",
+      points.size(), thread_count(), *std::ranges::max_element(points),
+      static_cast<double>(*std::ranges::max_element(points)) / mean, most_ghosts, most_ghosts / mean, sent / 1e6,
+      most_bytes / 1e6, most_bytes / mean);
+}
+
+}  // namespace
+
 std::string Simulation::summary() {
   const Body& body = problem_->body();
   const ModelReport report = problem_->terms().report();
-  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.owned().size(),
+  std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points_of_all_ranks(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
-  if (problem_->images()) text += fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
-  text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds, static_cast<double>(report.bonds) / static_cast<double>(body.points()));
+  if (problem_->images())
+    text +=
+        fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
+  if (problem_->partition()) return text + ranks_summary(*problem_) + plan();
+  text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds,
+                      static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   if (report.singular_families > 0) {
     text += fmt::format("warning       {} points have {}\n", report.singular_families,
@@ -119,9 +151,12 @@ std::string Simulation::summary() {
   const double bytes = static_cast<double>(problem_->bytes());
   text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.owned().size()));
   if (!loose_.empty()) text += fmt::format("warning       nothing but weak springs ({:g} of a point's stiffness) holds {}\n", scene_.weak_springs, loose_);
+  return text + plan();
+}
+
+std::string Simulation::plan() {
   const std::string plan = integrator_->plan(*problem_);
-  if (!plan.empty()) text += fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
-  return text;
+  return plan.empty() ? plan : fmt::format("integration   {}: {}\n", scene_.integrator->type, plan);
 }
 
 std::string Simulation::explanation(const Registry& registry) const {

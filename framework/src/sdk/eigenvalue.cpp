@@ -1,10 +1,9 @@
 #include "perikit/sdk/eigenvalue.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
-
-#include <Eigen/Eigenvalues>
 
 #include "perikit/core/field_operations.hpp"
 
@@ -15,15 +14,16 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
   const int d = problem.dimension();
   Field q = problem.make_field(), before = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
   if (!warm) {
-    fill_with_noise(scale, 1, vector);
+    fill_with_noise(scale, 1, problem.body().places(), vector);
   } else {
     // A little noise: a symmetric eigenvector must not hide a growing one of another symmetry.
-    const double size = norm(vector) / std::sqrt(static_cast<double>(problem.body().points_of_all_ranks() * static_cast<std::size_t>(d)));
-    fill_with_noise(scale, 1, w);
+    const double size =
+        norm(vector) / std::sqrt(static_cast<double>(problem.body().points_of_all_ranks() * static_cast<std::size_t>(d)));
+    fill_with_noise(scale, 1, problem.body().places(), w);
     combine(1, vector, 0.05 * size, w, vector);
   }
   const double size = norm(vector);
-  if (!(size > 0)) return 0.0;   // nothing is free
+  if (!(size > 0)) return 0.0;  // nothing is free
   for (std::size_t k = 0; k < n; ++k) q.data()[k] = vector.data[k] / size;
   std::vector<double> alpha, beta;
   const int most = 80;

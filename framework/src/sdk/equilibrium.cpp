@@ -21,7 +21,7 @@ void Equilibrium::begin(double t, ConstFieldView u) {
   copy(u, u_);
   if (external_.data && !problem_.loads().follow()) problem_.loads().evaluate(t, external_);
   Field noise = problem_.make_field();
-  fill_with_noise(free_, 1, noise);
+  fill_with_noise(free_, 1, problem_.body().places(), noise);
   const double size = norm(noise);
   // Where the start itself is inadmissible there is nothing to estimate; the first residual says so.
   if (size > 0 && problem_.tangent_action(u, noise, scratch_).ok()) stiffness_ = norm(scratch_) / size;
@@ -56,12 +56,13 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
     return false;
   }
   if (external_.data) combine(1, r, 1, external_, r);
-  double squares = external_.data ? dot(external_, external_) : 0.0, reactions = 0;
+  double squares = external_.data ? dot(external_, external_) : 0.0;
+  ExactSum reactions;
   for (const std::int64_t dof : problem_.constraints().dofs()) {
     const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
-    reactions += reaction * reaction - outer * outer;   // loads on prescribed components go into the reactions
+    reactions.add(reaction * reaction - outer * outer);  // loads on prescribed components go into the reactions
   }
-  squares += communicator().sum(reactions);
+  squares += total_over_ranks(reactions);
   mask(free_, r);
   norm_ = norm(r);
   reference_ = std::sqrt(std::max(squares, 0.0));

@@ -23,7 +23,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       flux_(D * points_),
       force_(points_) {
   const BlockReach reach = cloud_reach(families_.lists(), points_);
-  colouring_ = Colouring(reach);
+  colouring_ = cloud_colouring(families_.body(), reach);
   quiet_ = parts.quiet_blocks(reach);
   local_ = parts.local_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {

@@ -16,6 +16,7 @@ class CloudBonds final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
+  bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override { return families_.lists().neighbour.size(); }

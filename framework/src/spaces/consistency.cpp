@@ -64,7 +64,7 @@ class WeightSystem {
     Field probe = make(), image = make(), everywhere = make();
     for (const std::int32_t p : body_.owned())
       for (int c = 0; c < d(); ++c) everywhere.component(c)[p] = 1;
-    fill_with_noise(everywhere, 1, probe);
+    fill_with_noise(everywhere, 1, body_.places(), probe);
     closed_.project(probe);
     apply(probe, image);
     double sum = 0, reference = 0;

@@ -20,6 +20,7 @@ class LatticeBonds final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t blocks() const noexcept override { return tiles_.blocks.size(); }
+  bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   void report(ModelReport& report) const override;

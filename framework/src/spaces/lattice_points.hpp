@@ -16,6 +16,7 @@ class LatticePoints final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t blocks() const noexcept override { return tiles_.blocks.size(); }
+  bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
   void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed
   void report(ModelReport& report) const override;

@@ -27,6 +27,7 @@ class Weighted final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t blocks() const noexcept override { return block_first_.size() - 1; }
+  bool owns(std::size_t b) const noexcept override { return lattice_ ? lattice_->tiles.owns(b) : body_.owns(b * cloud_block); }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override {

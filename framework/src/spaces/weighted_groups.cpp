@@ -31,11 +31,16 @@ void Weighted<D>::prepare_lattice() {
   const std::vector<std::int32_t> stencil_of = store_stencils();
   for (const LatticeBlock& block : lattice_->tiles.blocks) {
     block_first_.push_back(groups_.size());
-    std::map<std::int32_t, std::vector<std::int32_t>> members;  // by class
+    // By class, in the order of their first points: the numbers of classes depend on what else a rank has.
+    std::map<std::int32_t, std::size_t> known;
+    std::vector<std::pair<std::int32_t, std::vector<std::int32_t>>> members;
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c)
       for (int l = 0; l < chunk_points; ++l) {
         const std::int32_t p = lattice_->tiles.chunks[c].first + l, family = found.of_point[static_cast<std::size_t>(p)];
-        if (family >= 0) members[family].push_back(p);
+        if (family < 0) continue;
+        const auto [entry, fresh] = known.try_emplace(family, members.size());
+        if (fresh) members.push_back({family, {}});
+        members[entry->second].second.push_back(p);
       }
     for (const auto& [family, points] : members) group_points(points, family, stencil_of[static_cast<std::size_t>(family)]);
   }
@@ -122,7 +127,7 @@ void Weighted<D>::prepare_cloud() {
   });
   fallbacks_ = std::accumulate(fallbacks.begin(), fallbacks.end(), std::size_t{0});
   dropped_ = std::accumulate(dropped.begin(), dropped.end(), std::size_t{0});
-  cloud_colouring_ = Colouring(cloud_reach(cloud_->lists(), body_.points(), cloud_block));
+  cloud_colouring_ = cloud_colouring(body_, cloud_reach(cloud_->lists(), body_.points(), cloud_block), cloud_block);
 }
 
 template <int D>

@@ -25,6 +25,7 @@ class CloudPairs final : public PairLoop {
     return &nearest_;
   }
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
+  bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
   std::size_t bytes() const noexcept override {
     return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
@@ -76,7 +77,7 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(lists_, points_);
-  colouring_ = Colouring(reach);
+  colouring_ = cloud_colouring(families_.body(), reach);
   if (parts.quiet) watch_waves(reach);
 }
 

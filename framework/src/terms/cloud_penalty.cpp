@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
@@ -32,20 +31,23 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
     mirror_rows(u, points_, u_);
     std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
     quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
-    over_points([&](std::size_t b) { return quiet_.begins(b); }, [&](std::size_t p) {
-      gradient_.at(p, u_, &flux_[D * p]);
-      if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
-      for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
-    });
-    over_points([&](std::size_t b) { return quiet_.awake(b, 2); }, [&](std::size_t p) {
-      const Row f = factor * position_[p][3] * force_of_point(p);
-      for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
-    });
-    if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+    over_points([&](std::size_t b) { return quiet_.begins(b); },
+                [&](std::size_t p) {
+                  gradient_.at(p, u_, &flux_[D * p]);
+                  if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
+                  for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
+                });
+    over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
+                [&](std::size_t p) {
+                  const Row f = factor * position_[p][3] * force_of_point(p);
+                  for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
+                });
+    for (std::size_t b = 0; b < energies.size(); ++b)
+      if (families_.body().owns(b * cloud_block_points)) energy->add(energies[b]);
   }
 
   void add_density(ConstFieldView u, double* density) override {
@@ -57,16 +59,14 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     });
   }
 
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
     mirror_rows(u, points_, u_);
     quiet_.wake();
-    double energy = 0;
     for (std::size_t p = 0; p < points_; ++p) {
-      if (!marks[p / padding]) continue;
+      if (!marks[p / padding] || !families_.body().owns(p)) continue;
       gradient_.at(p, u_, &flux_[D * p]);
-      energy += energy_of_point(p, &flux_[D * p]);
+      energy.add(energy_of_point(p, &flux_[D * p]));
     }
-    return energy;
   }
 
   void bonds_changed(std::span<const std::int32_t> points) override {

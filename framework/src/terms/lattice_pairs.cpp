@@ -40,6 +40,7 @@ class LatticePairs final : public PairLoop {
   }
 
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
+  bool owns(std::size_t b) const noexcept override { return families_.tiles.owns(b); }
   std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
 
   bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return families_.tiles.marked(b, marks); }

@@ -1,9 +1,7 @@
-#include <numeric>
-
-#include "terms/family_point.hpp"
 #include "families/lattice_families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "spaces/lattice_gradient.hpp"
+#include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
@@ -36,7 +34,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
     std::vector<double> energies(energy ? families_.tiles.blocks.size() : 0, 0.0);
     quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
@@ -57,7 +55,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       for_chunks(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, source_, force); });
     });
     families_.tiles.clear_dead(force);
-    if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+    if (energy) add_owned(energies, *energy);
   }
 
   void add_density(ConstFieldView u, double* density) override {
@@ -70,7 +68,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     });
   }
 
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
     std::vector<double> energies(families_.tiles.blocks.size(), 0.0);
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       alignas(64) double H[D * D * batch_points], sums[D * batch_points];
@@ -82,7 +80,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         for (const double e : of_points) energies[b] += e;
       });
     });
-    return std::accumulate(energies.begin(), energies.end(), 0.0);
+    add_owned(energies, energy);
   }
 
   void bonds_changed(std::span<const std::int32_t> points) override {
@@ -103,9 +101,14 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   std::size_t bytes() const noexcept override { return M_.bytes() + B_.bytes() + flux_.bytes() + source_.bytes(); }
 
  private:
+  void add_owned(const std::vector<double>& energies, ExactSum& sum) const {
+    for (std::size_t b = 0; b < energies.size(); ++b)
+      if (families_.tiles.owns(b)) sum.add(energies[b]);
+  }
   template <class Body>
   void for_chunks(std::size_t b, Body&& body) const {
-    for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; ++c) body(families_.tiles.chunks[c]);
+    for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; ++c)
+      body(families_.tiles.chunks[c]);
   }
 
   void set_matrices(const LatticeChunk& chunk) {
@@ -115,12 +118,10 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       if (!(pattern.live >> l & 1) || !penalised(pattern.condition[l])) continue;  // M = 0
       const auto p = static_cast<std::size_t>(chunk.first + l);
       double intact = 0, inverse[6], M[6];
-      for (std::size_t s = 0; s < families_.slots.size(); ++s)
-        intact += pattern.b(s, l) * families_.slots.omega[s];
+      for (std::size_t s = 0; s < families_.slots.size(); ++s) intact += pattern.b(s, l) * families_.slots.omega[s];
       families_.inverse_shape(pattern, l, inverse);
       const double V = families_.volume;
-      parts_.stabilization->penalty(
-          penalty_point(families_, parts_.laws, p, V * intact, inverse), M);
+      parts_.stabilization->penalty(penalty_point(families_, parts_.laws, p, V * intact, inverse), M);
       for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
     }
   }
@@ -132,7 +133,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         const double* M = M_.component(c) + chunk.first + l;
         Pack sum(0.0);
         for (std::size_t s = 0; s < families_.slots.offsets.size(); ++s) {
-          sum += Pack::load(pattern.b_of(s) + l) * Pack(families_.slots.omega[s]) * (Pack::load(M) + Pack::load(M + families_.slots.shifts[s]));
+          sum += Pack::load(pattern.b_of(s) + l) * Pack(families_.slots.omega[s]) *
+                 (Pack::load(M) + Pack::load(M + families_.slots.shifts[s]));
         }
         sum.store(B_.component(c) + chunk.first + l);
       }
@@ -142,7 +144,9 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     return static_cast<std::uint8_t>(pattern.mask[slot] >> l);
   }
   /// Component of H beside internal axis e.
-  std::size_t component(int c, int e) const noexcept { return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]); }
+  std::size_t component(int c, int e) const noexcept {
+    return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]);
+  }
 
   /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b.
   template <class Use>
@@ -219,7 +223,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   const LatticeFamilies& families_;
   LatticeOperator<D> operator_;
   Field M_, B_;
-  Field flux_, source_;   ///< Q, v
+  Field flux_, source_;  ///< Q, v
   QuietBlocks quiet_;
 };
 

@@ -1,7 +1,5 @@
 #include "terms/mechanics.hpp"
 
-#include <numeric>
-
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
 #include "perikit/core/dimension.hpp"
@@ -27,12 +25,18 @@ BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noex
   return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen};
 }
 
-std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, double* energy) {
+/// Each block is one rank's.
+void Mechanics::add_owned(const std::vector<double>& energies, ExactSum& sum) const {
+  for (std::size_t b = 0; b < energies.size(); ++b)
+    if (space_->owns(b)) sum.add(energies[b]);
+}
+
+std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);  // summed in the order of the blocks
+  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
-  if (energy) *energy = std::accumulate(energies.begin(), energies.end(), *energy);
+  if (energy) add_owned(energies, *energy);
   return pass.bad;
 }
 
@@ -43,7 +47,7 @@ std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldVie
   return pass.bad;
 }
 
-double Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks) {
+void Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
   const Body& body = parts_.families.body();
   std::vector<std::int32_t> points;
   for (std::size_t p = 0; p < body.stride(); ++p)
@@ -54,7 +58,7 @@ double Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks) {
   std::vector<double> energies(space_->blocks(), 0.0);
   Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
   space_->run(pass);
-  return std::accumulate(energies.begin(), energies.end(), 0.0);
+  add_owned(energies, energy);
 }
 
 void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {

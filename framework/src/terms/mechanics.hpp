@@ -13,12 +13,12 @@ class Mechanics final : public Term {
  public:
   explicit Mechanics(const SpaceParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) override;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
   void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override { space_->bonds_changed(points); }
@@ -37,6 +37,7 @@ class Mechanics final : public Term {
 
  private:
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
+  void add_owned(const std::vector<double>& energies, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;

@@ -145,15 +145,13 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-double PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks) {
+void PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
   if (density_.size() == 0) density_ = body_.make_field(2);
   if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
   loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
-  double energy = 0;
-  for (std::size_t p = 0; p < body_.stride(); ++p) {
-    if (marks[p / padding] && body_.alive(p)) energy += body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]);
-  }
-  return energy;
+  for (std::size_t p = 0; p < body_.stride(); ++p)
+    if (marks[p / padding] && body_.alive(p) && body_.owns(p))
+      energy.add(body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]));
 }
 
 template <int D>
@@ -165,6 +163,51 @@ void PairForces<D>::add_forces_near(ConstFieldView u, const GroupMarks& marks, c
   loop_->run(pass);
 }
 
+template <int D>
+void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
+  FamilyArrays& family = bonds.family;
+  families_.load(p, BondsOf::intact, family);
+  for (auto* array : {&bonds.extension, &bonds.modulus, &bonds.omega, &bonds.energy, &bonds.force}) array->assign(family.size, 0.0);
+  for (std::size_t k = 0; k < family.far.size(); ++k) {
+    const auto far = static_cast<std::size_t>(family.far[k]);
+    bonds.omega[k] = family.whole_omega(k);
+    bonds.extension[k] = bond_stretch(body_, u, BondId::of(static_cast<std::int32_t>(p), family.far[k])) * family.length[k];
+    double& modulus = bonds.modulus[k];
+    modulus = fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
+    if (fields_.correction.size() == 0) continue;
+    double factor = 0;
+    for (int a = 0; a < D; ++a) {
+      const double cosine = family.xi[a][k] / family.length[k];
+      factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
+    }
+    modulus *= factor;
+  }
+  law_.bond_law({family.bonds, family.length.data(), bonds.omega.data(), bonds.extension.data(), bonds.modulus.data(),
+                 bonds.energy.data(), bonds.force.data(), nullptr});
+}
+
+template <int D>
+void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
+  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+    Bonds bonds;
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body_.alive(p)) continue;
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
+      const double q = formulation_.dilatation ? q_.data()[p] : 0.0;
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * q,
+                     factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
+        for (int a = 0; a < D; ++a) {
+          const double y = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
+          for (int e = 0; e < D; ++e) P.component(a * D + e)[p] += factor * y * family.xi[e][k];
+        }
+      }
+    }
+  });
+}
+
 /// Half of b V_i V_j w, and what the bond adds to V_i phi: that is shared as the bonds make up theta, phi_i/theta_i d theta_i.
 template <int D>
 void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
@@ -174,33 +217,16 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
   const std::size_t groups = body_.stride() / padding;
   parallel_for(groups, [&](std::size_t g) {
     if (!marks[g]) return;
-    FamilyArrays family;
-    AlignedVector<double> extension, modulus, omega, energy;
+    Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
       if (!body_.alive(p)) continue;
-      families_.load(p, BondsOf::intact, family);
-      for (auto* array : {&extension, &modulus, &omega, &energy}) array->assign(family.size, 0.0);
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
       const auto own = static_cast<std::int32_t>(p);
-      for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const auto far = static_cast<std::size_t>(family.far[k]);
-        omega[k] = family.whole_omega(k);
-        extension[k] = bond_stretch(body_, u, BondId::of(own, family.far[k])) * family.length[k];
-        modulus[k] =
-            fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
-        if (fields_.correction.size() == 0) continue;
-        double factor = 0;
-        for (int a = 0; a < D; ++a) {
-          const double cosine = family.xi[a][k] / family.length[k];
-          factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
-        }
-        modulus[k] *= factor;
-      }
-      law_.bond_law(
-          {family.bonds, family.length.data(), omega.data(), extension.data(), modulus.data(), energy.data(), nullptr, nullptr});
       const double theta = formulation_.dilatation ? scale_.data()[p] * theta_.data()[p] : 0.0;
       const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const double w = 0.5 * energy[k] + by_theta * omega[k] * family.length[k] * extension[k];
+        const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * bonds.extension[k];
         samples.add({own, family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w, {}});
       }
     }
@@ -238,7 +264,8 @@ void PairForces<D>::set_correction() {
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only) {
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
+                                       const std::uint8_t* only) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -249,7 +276,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
-  if (energies) energies->assign(batches, 0.0);
+  std::vector<ExactSum> energies(energy ? static_cast<std::size_t>(thread_count()) : 0);
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
@@ -258,32 +285,34 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, std::
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
     formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
-                                       energies || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+                                       energy || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energies && body_.alive(p)) (*energies)[b] += body_.volume(p) * phi[l];
+      if (energy && body_.alive(p) && body_.owns(p))
+        energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
     }
   });
+  for (const ExactSum& of_thread : energies) energy->add(of_thread);
   return -1;
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, double* energy) {
-  std::vector<double> volumetric, bonds(energy ? loop_->blocks() : 0, 0.0);
+std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
+  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? &volumetric : nullptr, nullptr);
+    const std::int64_t bad = dilatation(u, {}, energy, nullptr);
     if (bad >= 0) return bad;
   }
   PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr};
   pass.screen = screen_;
   if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
   const std::int64_t bad = loop_->run(pass);
-  for (const std::vector<double>* parts : {&volumetric, &bonds})
-    for (const double e : *parts) *energy += e;
+  for (std::size_t b = 0; b < bonds.size(); ++b)
+    if (loop_->owns(b)) energy->add(bonds[b]);
   return bad;
 }
 
@@ -307,6 +336,10 @@ std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples)
   if (formulation_.dilatation) {
     const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
     if (bad >= 0) return bad;
+  }
+  if (samples.virial) {
+    samples.P = body_.make_field(D * D);
+    add_virial(u, samples.P);
   }
   const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
   for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];

@@ -20,14 +20,14 @@ class PairForces final : public Term {
  public:
   explicit PairForces(const PairParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) override;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
-  /// strain_energy_density only.
+  /// strain_energy_density, and P where it is asked for.
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override { return formulation_.dilatation ? 2 : 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   /// Half of each bond of the marked groups, and their dilatation.
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override;
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
   void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
@@ -37,14 +37,24 @@ class PairForces final : public Term {
   QuietCounts quiet_counts() const noexcept override { return loop_->quiet_counts(); }
 
  private:
+  /// The bonds of one point that are left.
+  struct Bonds {
+    FamilyArrays family;
+    AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
+    AlignedVector<double> energy, force;
+  };
+  void load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const;
+  /// P_i = sum_j b V_j (w'/2 + omega |xi| q_i) n (x) xi: the derivative of the energy density of a point by a homogeneous deformation.
+  void add_virial(ConstFieldView u, FieldView P) const;
   /// Moduli of points with the same family, loaded without cuts.
   void set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus);
   void warn(const PairPoint& point, const MaterialRecord& record);
   void set_correction();
   PairPoint point(std::size_t p) const;
-  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point -> density.
-  /// only: groups of points to do, null for all.
-  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, std::vector<double>* energies, double* density, const std::uint8_t* only = nullptr);
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
+  /// density. only: groups of points to do, null for all.
+  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
+                          const std::uint8_t* only = nullptr);
 
   const Families& families_;
   const Body& body_;

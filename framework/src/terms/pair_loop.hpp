@@ -58,7 +58,10 @@ class PairLoop {
   /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
-  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of zero or non-finite length, or -1.
+  /// Whether the points of block b are this rank's.
+  virtual bool owns(std::size_t b) const noexcept = 0;
+  /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of
+  /// zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;
   virtual std::size_t bytes() const noexcept = 0;
   QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }

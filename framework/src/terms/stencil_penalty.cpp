@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <numeric>
 
 #include "families/cloud_rows.hpp"
 #include "families/quiet_blocks.hpp"
@@ -36,19 +35,18 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
-  double energy_of(ConstFieldView u, const GroupMarks& marks) override {
+  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
     read(u);
     std::vector<Row> t;
-    double energy = 0;
     for (std::size_t r = 0; r < rows_.size(); ++r)
-      if (marks[rows_.point(r) / padding] && stencil_[r] >= 0) energy += 0.5 * springs(r, t);
-    return energy;
+      if (marks[rows_.point(r) / padding] && stencil_[r] >= 0 && rows_.body().owns(rows_.point(r)))
+        energy.add(0.5 * springs(r, t));
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, double* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
     read(u);
     force_.assign(rows_.size(), Row{});
-    std::vector<double> energies(cloud_blocks(rows_.size()), 0.0);
+    std::vector<double> energies(energy ? rows_.size() : 0, 0.0);
     quiet_.look(1, [&](std::size_t b) {
       bool any = false;
       over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
@@ -57,11 +55,15 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     colouring_.for_each([&](std::size_t b) {
       if (!quiet_.awake(b, 1)) return;
       std::vector<Row> t;
-      over_rows(b, [&](std::size_t r) { energies[b] += 0.5 * pull(r, factor, t); });
+      over_rows(b, [&](std::size_t r) {
+        const double twice = pull(r, factor, t);
+        if (energy) energies[r] = 0.5 * twice;
+      });
     });
     for (std::size_t r = 0; r < rows_.size(); ++r)
       for (int c = 0; c < D; ++c) force.component(c)[rows_.point(r)] += force_[r][c];
-    if (energy) *energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+    for (std::size_t r = 0; r < energies.size(); ++r)
+      if (rows_.body().owns(rows_.point(r))) energy->add(energies[r]);
   }
 
   void add_density(ConstFieldView u, double* density) override {

@@ -7,6 +7,7 @@
 
 #include "assembly/assembly.hpp"
 #include "families/families.hpp"
+#include "perikit/core/exact_sum.hpp"
 #include "operators/bond_samples.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
@@ -17,8 +18,8 @@ namespace perikit {
 class Term {
  public:
   virtual ~Term() = default;
-  /// force += -dE/du [N]; *energy += E [J] where wanted.
-  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) = 0;
+  /// force += -dE/du [N]; *energy += E of what this rank owns [J] where wanted.
+  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) = 0;
   /// Kw += -d(force)/du w [N].
   virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// Adds to the energy density, and sets what else it knows.
@@ -30,8 +31,8 @@ class Term {
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
 
   // Where bonds fail.
-  /// E of what the points of the marked groups own [J].
-  virtual double energy_of(ConstFieldView u, const GroupMarks& marks) = 0;
+  /// energy += E of what those points of the marked groups own that this rank owns [J].
+  virtual void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) = 0;
   /// force += the forces of all evaluation points that belong to the points of the marked groups, and of any others: the same
   /// ones whichever bonds are left. `near`: those groups and everything in their families. An inadmissible point adds nothing.
   virtual void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) = 0;

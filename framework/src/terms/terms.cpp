@@ -7,6 +7,7 @@
 #include "assembly/block_pattern.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/terms/terms.hpp"
 #include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
@@ -96,18 +97,21 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   if (bad < 0) return status;
   const Body& body = parts_.families->body();
   const Point x = body.position(static_cast<std::size_t>(bad));
-  status.point = body.input_of(static_cast<std::size_t>(bad));
+  status.point = body.number(static_cast<std::size_t>(bad));
+  if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(bad)];
   status.description = fmt::format("point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
   return status;
 }
 
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
-  if (energy) *energy = 0;
+  ExactSum sum;
   if (criterion_) criterion_->begin_forces(u);
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces(u, force, energy);
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
+    bad = (*term)->add_forces(u, force, energy ? &sum : nullptr);
   if (criterion_ && bad < 0) criterion_->end_forces();
+  if (energy) *energy = total_over_ranks(sum);
   return status(bad);
 }
 
@@ -119,7 +123,7 @@ EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw
 }
 
 EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
-  samples = {};
+  samples = {.virial = samples.virial};
   samples.strain_energy_density = parts_.families->body().make_field(1);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
@@ -191,9 +195,9 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBeg
   if (!failing_) return {};
   const Families& families = *parts_.families;
   const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
-    double sum = 0;
-    for (const auto& term : terms_) sum += term->energy_of(at, marks);
-    return sum;
+    ExactSum sum;
+    for (const auto& term : terms_) term->energy_of(at, marks, sum);
+    return total_over_ranks(sum);
   };
   const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
     Field& own = failing_->force;
@@ -215,7 +219,9 @@ std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
   return BondCriterion(*parts_.families, parts_.formulation, nullptr, terms_, parts_.skip).energies(u);
 }
 
-std::vector<BondChange> Terms::changed_bonds() const { return parts_.families->changed(); }
+std::vector<BondChange> Terms::changed_bonds() const {
+  return failing_ ? failing_->fracture.changed() : parts_.families->changed();
+}
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {
   if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });

@@ -5,7 +5,7 @@
 
 namespace perikit {
 
-std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, double* energy) {
+std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
   apply(u, 1.0, force, energy);
   return -1;
 }

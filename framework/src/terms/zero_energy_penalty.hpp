@@ -14,7 +14,7 @@ namespace perikit {
 
 class ZeroEnergyPenalty : public Term {
  public:
-  std::int64_t add_forces(ConstFieldView u, FieldView force, double* energy) final;
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
   /// Of all points: its loops have no parts.
@@ -31,8 +31,8 @@ class ZeroEnergyPenalty : public Term {
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
-  /// force += -factor dE/du [N]; *energy += E [J] where wanted.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, double* energy) = 0;
+  /// force += -factor dE/du [N]; *energy += E of what this rank owns [J] where wanted.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) = 0;
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;

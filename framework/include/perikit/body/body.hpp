@@ -13,6 +13,7 @@
 
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/field.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "perikit/core/space.hpp"
 
 namespace perikit {
@@ -36,6 +37,19 @@ class Crack {
 
 struct Images;
 
+/// What a point is to a rank: nothing; one whose displacement alone it needs; one that it evaluates, as its own points feel it;
+/// its own.
+enum class Role : std::uint8_t { absent, far, near, own };
+
+/// A rank's part of a body.
+struct BodyPart {
+  std::vector<Role> roles;                      ///< by input number
+  std::array<std::int64_t, 3> first{}, last{};  ///< lattices: the box of cells that holds all but absent points
+  /// Clouds: by size of the blocks of points that loops run over, the colour of each block of the part. Its blocks are whole ones
+  /// of the body.
+  std::map<std::size_t, std::vector<std::int32_t>> colours;
+};
+
 /// What a body is beside its points.
 struct BodyFrame {
   Space space = Space::solid;
@@ -52,9 +66,8 @@ class Body {
   Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells);
   /// A cloud: positions and volumes [m^3] in input order; not empty.
   Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes);
-  /// The kept points of another body, by input number; those that are not owned are ghosts, with a material of their own. Sets keep
-  /// owned points.
-  Body(const Body& whole, const std::vector<bool>& owned, const std::vector<bool>& kept, std::uint16_t ghost_material);
+  /// A rank's part of another body, in the same order. Far points have a material of their own; sets keep the rank's own points.
+  Body(const Body& whole, const BodyPart& part, std::uint16_t far_material);
 
   /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws std::domain_error
   /// where two points of a lattice would be one.
@@ -68,8 +81,8 @@ class Body {
   int dimension() const noexcept { return perikit::dimension(frame_.space); }
   Space space() const noexcept { return frame_.space; }
   double section() const noexcept { return frame_.section; }
-  std::size_t points() const noexcept { return internal_.size(); }   ///< with ghosts and images
-  /// Of the body on all ranks, each once.
+  std::size_t points() const noexcept { return internal_.size(); }  ///< with ghosts and images
+  /// Of the body on all ranks, without images.
   std::size_t points_of_all_ranks() const noexcept { return points_of_all_ranks_; }
   std::size_t stride() const noexcept { return stride_; }
   double spacing() const noexcept { return frame_.spacing; }
@@ -92,6 +105,21 @@ class Body {
   /// Bit p % 8 of byte p / 8.
   std::span<const std::uint8_t> alive_bits() const noexcept { return alive_; }
 
+  /// Where the points lie in the fields of the whole body.
+  Places places() const noexcept { return {places_, stride_of_whole_}; }
+  /// Input number in the whole body.
+  std::int32_t number(std::size_t internal_index) const noexcept {
+    const std::int32_t input = input_of(internal_index);
+    return numbers_.empty() || input < 0 ? input : numbers_[static_cast<std::size_t>(input)];
+  }
+  /// Whether no other rank owns the point.
+  bool owns(std::size_t internal_index) const noexcept { return own_.empty() || own_[internal_index]; }
+  /// Of a part of a cloud; null: the colours of blocks are not prescribed.
+  const std::vector<std::int32_t>* block_colours(std::size_t block_points) const noexcept {
+    const auto known = colours_.find(block_points);
+    return known == colours_.end() ? nullptr : &known->second;
+  }
+
   /// Points that belong to this body alone: all of them, but for ghosts and images.
   const std::vector<std::int32_t>& owned() const noexcept { return sets_.at("all"); }
   /// Internal indices in input order. "all" exists.
@@ -105,6 +133,7 @@ class Body {
 
  private:
   void number_lattice(const Lattice& lattice, double volume);
+  void number_cloud();
   void copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others);
   void place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions);
   void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
@@ -120,6 +149,12 @@ class Body {
   std::map<std::string, std::vector<std::int32_t>> sets_;
   std::vector<std::uint16_t> material_ids_;
   std::size_t points_of_all_ranks_ = 0;
+  // Of a part; else empty.
+  std::vector<std::int32_t> places_;   ///< by internal index
+  std::vector<std::int32_t> numbers_;  ///< by input number
+  std::vector<std::uint8_t> own_;      ///< by internal index
+  std::size_t stride_of_whole_ = 0;
+  std::map<std::size_t, std::vector<std::int32_t>> colours_;
 };
 
 /// Neighbour lists of a cloud in compressed rows: the family of p is neighbour[first[p] ... first[p + 1]), ascending.
@@ -130,6 +165,16 @@ struct FamilyLists {
 
 /// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws std::domain_error for coincident points.
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon);
+
+/// By point: whether it is one of `from`, or in the family of one. For points of bodies far larger than a family.
+std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
+                                        std::vector<std::uint8_t> from);
+
+/// Blocks of so many points of a cloud, and which of them hold points of their families, but for bonds that cracks cut.
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points);
+
+/// The first colour of which no earlier block touches one of the same units, block by block.
+std::vector<std::int32_t> block_colours(const std::vector<std::vector<std::int32_t>>& touches, std::size_t units);
 
 /// Order of points along a space-filling (Morton) curve of boxes of size `cell`.
 std::vector<std::int32_t> morton_order(const std::vector<Point>& positions, double cell);

@@ -14,13 +14,15 @@ namespace perikit {
 struct Lattice {
   int dimension = 3;
   double spacing = 0;
-  std::array<double, 3> lower{};              ///< input axes
-  std::array<int, 3> axis{0, 1, 2};           ///< internal axis k runs along input axis axis[k]
-  std::array<std::int64_t, 3> extent{1, 1, 1};///< cells along the internal axes
-  std::array<std::int64_t, 3> pitch{0, 0, 0}; ///< pitch[0]: cells from row to row; pitch[1]: rows from plane to plane
+  std::array<double, 3> lower{};                ///< input axes
+  std::array<int, 3> axis{0, 1, 2};             ///< internal axis k runs along input axis axis[k]
+  std::array<std::int64_t, 3> extent{1, 1, 1};  ///< cells along the internal axes
+  /// Of the lattice that this one is a box of, and where the box begins in it, along axis 0 at a multiple of `padding`.
+  std::array<std::int64_t, 3> whole{1, 1, 1}, first{};
+  std::array<std::int64_t, 3> pitch{0, 0, 0};  ///< pitch[0]: cells from row to row; pitch[1]: rows from plane to plane
   std::int64_t base = 0;
-  std::int64_t cells = 0;                     ///< size of a field component: a multiple of `padding`
-  std::int64_t reach = 0;                     ///< largest |shift|
+  std::int64_t cells = 0;  ///< size of a field component: a multiple of `padding`
+  std::int64_t reach = 0;  ///< largest |shift|
 
   std::int64_t index(std::int64_t k0, std::int64_t k1, std::int64_t k2) const noexcept {
     return base + k0 + pitch[0] * (k1 + pitch[1] * k2);
@@ -38,6 +40,24 @@ std::int64_t lattice_cells(double lower, double upper, double spacing);
 /// `horizon` limits the padding; offsets beyond the extent of the body never occur and need none.
 Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>& lower, const std::array<double, 3>& upper,
                      double horizon);
+
+/// The cells first ... last - 1 (internal axes) of a lattice that is no box itself.
+Lattice box_of(const Lattice& lattice, const std::array<std::int64_t, 3>& first, const std::array<std::int64_t, 3>& last,
+               double horizon);
+
+/// Blocks of cells that loops run over: rows times segments along the rows, small enough for the second-level cache and to share
+/// out among threads. They are those of the whole lattice; a box has what it holds of them.
+struct LatticeTiling {
+  explicit LatticeTiling(const Lattice& lattice);
+  std::array<std::int64_t, 3> size;   ///< of a tile: groups of `padding` cells along axis 0, cells along the others
+  std::array<std::int64_t, 3> count;  ///< of tiles along the internal axes
+  std::int64_t tiles() const noexcept { return count[0] * count[1] * count[2]; }
+  std::int64_t number(const std::array<std::int64_t, 3>& tile) const noexcept {
+    return tile[0] + count[0] * (tile[1] + count[1] * tile[2]);
+  }
+  /// The tile of a cell of the whole lattice.
+  std::array<std::int64_t, 3> of(const std::array<std::int64_t, 3>& cell) const noexcept;
+};
 
 /// Integer offsets (internal axes) of the bonds of a whole family: |d| spacing <= horizon (1 + 1e-10), d != 0. The first half
 /// holds one of each pair +d, -d; slot s + half is the reverse of slot s. Within a half axis 0 varies slowest.

@@ -1,9 +1,10 @@
 #pragma once
-/// One rank's share of a body. It owns some points; points of other ranks within two horizons of them are its ghosts. Every
-/// evaluation point belongs to the rank of its owner: ghosts store no energy, and the forces that they receive belong to the rank
-/// that owns them.
+/// One rank's share of a body. It owns whole blocks of points, and evaluates by itself all that its points feel: what lies within
+/// reach of them is there too, its ghosts. Then forces of owned points are complete, and sums come in the order that they have on
+/// one rank.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "perikit/body/body.hpp"
@@ -12,26 +13,40 @@ namespace perikit {
 
 class Partition {
  public:
-  /// Slabs of equal numbers of points across the longest side of the body.
-  Partition(Body whole, int rank, int size);
+  /// How far the force on a point depends on others: on evaluation points of points at most bonds - 1 bonds away, and the
+  /// displacement of their families. blocks: evaluation takes points of a block together, so that blocks must be whole.
+  struct Reach {
+    int bonds = 2;
+    bool blocks = false;
+  };
+  /// All ranks of the communicator must call it with the same body. Throws std::domain_error where it has too few blocks for
+  /// them.
+  Partition(Body whole, const Reach& reach);
 
   const Body& whole() const noexcept { return whole_; }
-  /// The points that this rank owns, and its ghosts, whose material is number `ghost_material`. Sets hold owned points only.
-  Body part(std::uint16_t ghost_material) const { return Body(whole_, owned_, kept_, ghost_material); }
+  /// The points of this rank and its ghosts; far ones have the material number `far_material`.
+  Body part(std::uint16_t far_material) const { return Body(whole_, part_, far_material); }
 
   /// Input numbers of the whole body, by rank: points that rank k has as ghosts and this one owns, and the other way round.
   const std::vector<std::vector<std::int32_t>>& lent() const noexcept { return lent_; }
   const std::vector<std::vector<std::int32_t>>& borrowed() const noexcept { return borrowed_; }
-  /// Input number in the whole body of the n-th kept point.
-  std::int32_t input(std::size_t n) const noexcept { return inputs_[n]; }
-  /// Place of a point among the kept ones, by its input number in the whole body; -1: not kept.
-  std::int32_t place(std::int32_t input) const noexcept { return place_[static_cast<std::size_t>(input)]; }
-  bool owns(std::int32_t input) const noexcept { return owned_[static_cast<std::size_t>(input)]; }
+  /// By input number: the rank that owns the point.
+  std::span<const std::int32_t> owners() const noexcept { return owner_; }
+  bool owns(std::int32_t input) const noexcept { return part_.roles[static_cast<std::size_t>(input)] == Role::own; }
+  /// Points of each rank.
+  const std::vector<std::int64_t>& points() const noexcept { return points_; }
 
  private:
+  void share_lattice(int size);
+  void share_cloud(int size);
+  void keep_box(const Reach& reach);
+  void keep_families(const Reach& reach);
+  void exchange_borders();
+
   Body whole_;
-  std::vector<bool> owned_, kept_;                      ///< by input number
-  std::vector<std::int32_t> inputs_, place_;
+  BodyPart part_;
+  std::vector<std::int32_t> owner_;
+  std::vector<std::int64_t> points_;
   std::vector<std::vector<std::int32_t>> lent_, borrowed_;
 };
 

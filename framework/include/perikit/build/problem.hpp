@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "perikit/core/work_steps.hpp"
 #include "perikit/plugin/part.hpp"
 #include "perikit/problem/integrator.hpp"
 #include "perikit/problem/body_problem.hpp"
@@ -11,7 +12,9 @@
 namespace perikit {
 
 /// Builds everything that the scene describes, by parts from `factory`, for an integrator with these traits. Where the communicator
-/// has several ranks: this rank's part of it. Throws InputError for what only building can show.
-std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator);
+/// has several ranks: this rank's part of it. steps: where it is told what takes time. Throws InputError for what only building
+/// can show.
+std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
+                                           WorkSteps& steps);
 
 }  // namespace perikit

@@ -1,22 +1,43 @@
 #pragma once
-/// What the processes of one run have to tell each other: global sums and pieces of fields. Everything that is global goes through
-/// here, and nothing else does, so that integrators and parts need not know how many processes there are. Serial unless a
-/// CommunicatorScope says otherwise.
+/// What the processes of one run have to tell each other. Everything that is global goes through here, and nothing else does, so
+/// that integrators and parts need not know how many processes there are. Serial unless a CommunicatorScope says otherwise. All
+/// ranks must call what says so, in the same order, from the thread that runs them.
 
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
+
+#include "perikit/core/exact_sum.hpp"
 
 namespace perikit {
 
+/// Numbers that go to a rank and come from it; what is `to` here has the size of `from` there.
+struct Message {
+  int rank;
+  std::span<const double> to;
+  std::span<double> from;
+};
+
 class Communicator {
  public:
-  virtual ~Communicator() = default;
+  virtual ~Communicator();
   virtual int rank() const noexcept = 0;
   virtual int size() const noexcept = 0;
-  /// Over all ranks, which must all call it; added in the order of the ranks, the same bits on each.
-  virtual double sum(double value) = 0;
+
+  /// numbers <- their sums over all ranks. All ranks must call it.
+  virtual void sum(std::span<std::int64_t> numbers) = 0;
+  /// Over all ranks, which must all call it.
   virtual double largest(double value) = 0;
-  /// Gives to[k] to rank k, and gets from[k] from it; sizes must agree. All ranks must call it.
-  virtual void exchange(const std::vector<std::vector<double>>& to, std::vector<std::vector<double>>& from) = 0;
+  /// Sends and receives all of them, from at most one message a rank. A rank calls it together with those that it names.
+  virtual void exchange(std::span<const Message> messages) = 0;
+  /// On rank 0 the bytes of every rank, in their order; empty on the others. All ranks must call it.
+  virtual std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) = 0;
+  /// bytes <- those of rank 0. All ranks must call it.
+  virtual void broadcast(std::vector<std::byte>& bytes) = 0;
+  /// Ends all ranks with this status, at once and whatever they are doing.
+  [[noreturn]] virtual void abort(int status) noexcept = 0;
 };
 
 /// That of this thread.
@@ -33,5 +54,19 @@ class CommunicatorScope {
  private:
   Communicator* before_;
 };
+
+/// The sum of what all ranks have added, rounded once: the same bits however the terms lie on ranks. All ranks must call it.
+double total_over_ranks(ExactSum sum);
+
+/// Numbers of the launcher that has started this process (mpirun, srun and their like), from its environment.
+struct Launch {
+  int rank = 0, size = 1;
+  const char* variable = nullptr;  ///< that says how many there are; null: started by none
+};
+Launch find_launch();
+
+/// The ranks that `launch` speaks of, by the library of MPI, which is opened only here. Null for one process. Throws InputError
+/// where the library is missing or knows of other numbers.
+std::unique_ptr<Communicator> join_ranks(const Launch& launch);
 
 }  // namespace perikit

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -6,8 +7,9 @@ namespace perikit {
 
 /// Where an evaluation met an inadmissible deformation.
 struct EvaluationStatus {
-  std::int64_t point = -1;         ///< input index of the point, -1: all well
-  std::string description;         ///< position, kinematics, material
+  std::int64_t point = -1;   ///< input index of the point in the whole body, -1: all well
+  std::size_t material = 0;  ///< number of its law
+  std::string description;   ///< position, kinematics, material
   bool ok() const noexcept { return point < 0; }
 };
 

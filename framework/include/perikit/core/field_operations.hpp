@@ -1,11 +1,14 @@
 #pragma once
-/// Vector operations on whole fields, on all threads, with sums that do not depend on their number, over all
-/// ranks of the communicator. Fields have equal shapes.
+/// Vector operations on whole fields, on all threads and all ranks of the communicator, with exact sums, which depend on the
+/// number of neither. Fields have equal shapes.
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
+#include "perikit/core/exact_sum.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/core/parallel.hpp"
 
@@ -16,6 +19,18 @@ template <class Body>
 void over_blocks(std::size_t n, Body&& body) {
   constexpr std::size_t block = 4096;
   parallel_for((n + block - 1) / block, [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); });
+}
+
+/// The exact sum of term(k) over [0, n) on this rank, on all threads.
+template <class Term>
+ExactSum exact_sum(std::size_t n, Term&& term) {
+  std::vector<ExactSum> parts(static_cast<std::size_t>(thread_count()));
+  over_blocks(n, [&](std::size_t begin, std::size_t end) {
+    ExactSum& part = parts[static_cast<std::size_t>(thread_index())];
+    for (std::size_t k = begin; k < end; ++k) part.add(term(k));
+  });
+  for (std::size_t t = 1; t < parts.size(); ++t) parts[0].add(parts[t]);
+  return parts[0];
 }
 
 /// Sum of a . b over all components.
@@ -32,7 +47,12 @@ void copy(ConstFieldView from, FieldView to);
 void fill(double value, FieldView x);
 /// x <- x * mask, componentwise.
 void mask(ConstFieldView mask, FieldView x);
-/// Fills x with fixed noise in [-1, 1), a hash of index and seed, where mask is not 0.
-void fill_with_noise(ConstFieldView mask, std::uint64_t seed, FieldView x);
+/// Where the points of a part of a body lie in the fields of the whole one; `place` is empty where the part is the whole.
+struct Places {
+  std::span<const std::int32_t> place;
+  std::size_t stride = 0;
+};
+/// Fills x with fixed noise in [-1, 1), a hash of the index in the whole body and of the seed, where mask is not 0.
+void fill_with_noise(ConstFieldView mask, std::uint64_t seed, const Places& places, FieldView x);
 
 }  // namespace perikit

@@ -3,7 +3,6 @@
 /// number of threads.
 
 #include <cstddef>
-#include <functional>
 #include <type_traits>
 
 namespace perikit {
@@ -21,10 +20,8 @@ void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)
 /// body(i) for i in [0, n), in any order, on all threads. body must be noexcept in effect.
 template <class Body>
 void parallel_for(std::size_t n, Body&& body) {
-  detail::parallel_for(n, &body, [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
+  detail::parallel_for(n, &body,
+                       [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
 }
-
-/// Sum of term(block) over blocks, added in block order: the same for every number of threads.
-double ordered_sum(std::size_t blocks, const std::function<double(std::size_t)>& term);
 
 }  // namespace perikit

@@ -20,7 +20,7 @@ struct OutputField {
 struct PointField {
   std::string name;
   int width;                                          ///< numbers per point: 1, 3 (vector) or 9 (tensor)
-  bool of_gradients;                                  ///< made of deformation gradients or stresses, which pair laws do not have
+  bool of_gradients;                                  ///< made of deformation gradients, which pair laws do not have
   std::string label, unit;                            ///< as pictures show them
   std::vector<double> (*compute)(PointFields& from);  ///< width * points
 

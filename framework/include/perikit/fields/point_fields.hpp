@@ -26,7 +26,8 @@ class PointFields {
  private:
   friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
 
-  const PointSamples& samples();
+  /// virial: with P of pair laws.
+  const PointSamples& samples(bool virial = false);
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;

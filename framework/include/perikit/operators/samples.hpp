@@ -8,9 +8,10 @@ namespace perikit {
 struct PointSamples {
   Field strain_energy_density;   ///< sum W psi / V [J/m^3]
   Field H;                       ///< F - I [-]; H33 included in plane and line spaces
-  Field P;                       ///< [Pa]
+  Field P;                       ///< [Pa]; of pair laws the virial per reference volume, where `virial` asks for it
   Field cauchy;                  ///< [Pa]
   Field von_mises;               ///< [Pa]
+  bool virial = false;           ///< asked for: P of pair laws
 };
 
 }  // namespace perikit

@@ -71,12 +71,16 @@ class BodyProblem final : public Problem {
   /// loose now, in words; empty: nothing.
   std::string watch_pieces(double weak_springs);
 
-  /// Everything that a run continues from, as bytes; restore is bitwise. restore throws InputError for what belongs to another problem.
+  /// Everything that a run continues from, as bytes, on rank 0; restore is bitwise, on any number of ranks. All ranks must call
+  /// both. restore throws InputError for what belongs to another problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
 
   Terms& terms() noexcept { return *parts_.terms; }
   const Terms& terms() const noexcept { return *parts_.terms; }
+  /// Null where one rank has the whole body.
+  const Partition* partition() const noexcept { return parts_.partition.get(); }
+  const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
   /// The body of all ranks.
   const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
   std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
@@ -89,9 +93,9 @@ class BodyProblem final : public Problem {
   ProblemValues values_;
   std::optional<Ghosts> ghosts_;
   /// u as the terms see it: with the values of ghosts and images, in `memory`; u itself where there are none.
-  ConstFieldView seen(ConstFieldView u, Field& memory) const;
-  /// Ends an evaluation: forces on ghosts and images go to where they belong; one status for all ranks.
-  void finish(FieldView force, EvaluationStatus& status) const;
+  ConstFieldView seen(ConstFieldView u, Field& memory);
+  /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
+  void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
   template <class Fill>
   void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;

@@ -1,27 +1,35 @@
 #pragma once
-/// The two ways of fields between the owners of points and their ghosts on other ranks.
+/// The way of fields from the owners of points to their ghosts on other ranks.
 
+#include <cstddef>
 #include <vector>
 
 #include "perikit/body/partition.hpp"
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
 class Ghosts {
  public:
-  /// `part` is that of the partition.
-  Ghosts(const Partition& partition, const Body& part);
+  /// `part` is that of the partition. Fields have at most so many components.
+  Ghosts(const Partition& partition, const Body& part, int components);
 
   /// Ghosts <- values of their owners.
-  void forward(FieldView field) const;
-  /// Owners += values of their ghosts, which become zero; in the order of the ranks.
-  void accumulate(FieldView field) const;
+  void forward(FieldView field);
+  /// Ghosts <- 0.
+  void clear(FieldView field) const;
+  std::size_t size() const noexcept;
+  /// Numbers that a forward sends, a component.
+  std::size_t sent() const noexcept;
 
  private:
-  using Points = std::vector<std::vector<std::int32_t>>;   ///< internal indices by rank
-  static std::vector<std::vector<double>> gather(FieldView field, const Points& points);
-
-  Points lent_, borrowed_;
+  struct Neighbour {
+    int rank;
+    std::vector<std::int32_t> lent, borrowed;  ///< internal indices
+    std::vector<double> to, from;              ///< component by component
+  };
+  std::vector<Neighbour> neighbours_;
+  std::vector<Message> messages_;
 };
 
 }  // namespace perikit

@@ -45,6 +45,9 @@ class Observer {
 struct IntegratorTraits {
   bool dynamic = false;       ///< needs densities; writes velocity
   bool quasi_static = false;  ///< time is a load parameter in [0, 1]; values of boundaries and loads that do not mention t ramp
+  /// Runs where each of several ranks has a part of the body: it asks for no assembled tangent, and what it sums over points goes
+  /// through the operations on fields or `total_over_ranks`.
+  bool several_ranks = false;
 };
 
 class Integrator {

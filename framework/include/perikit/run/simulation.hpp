@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "perikit/core/work_steps.hpp"
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/output/recorder.hpp"
 #include "perikit/plugin/registry.hpp"
@@ -20,9 +21,12 @@ namespace perikit {
 class Simulation {
  public:
   /// Builds body, model and integrator. Throws InputError for what only building can show (empty sets, missing densities).
-  Simulation(const Scene& scene, const PartFactory& factory);
+  /// show: told of each step of the work as it begins.
+  Simulation(const Scene& scene, const PartFactory& factory, WorkSteps::Show show = {});
 
   const Scene& scene() const noexcept { return scene_; }
+  /// What the set-up took.
+  const WorkSteps& set_up() const noexcept { return set_up_; }
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   bool dynamic() const noexcept { return traits_.dynamic; }
@@ -41,7 +45,10 @@ class Simulation {
   void evaluate_conditions();
   /// InputError where nothing holds a piece of a body whose equilibrium is looked for.
   void watch_pieces();
+  /// What the integrator intends, a line.
+  std::string plan();
 
+  WorkSteps set_up_;
   Scene scene_;
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
@@ -107,6 +114,7 @@ class RunRecorder final : public Observer {
   bool interrupted() const noexcept override;
   void stopped_within_step() override;
 
+  /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
   /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
@@ -144,6 +152,7 @@ class RunRecorder final : public Observer {
   std::filesystem::path folder_;
   std::unique_ptr<OutputFolder> output_;
   bool show_progress_;
+  bool first_;  ///< rank 0, which alone writes
   PointFields fields_;
   std::vector<std::string> frame_fields_;
   std::vector<std::string> columns_;

@@ -43,7 +43,7 @@ class Terms {
   explicit Terms(TermParts parts);
   ~Terms();
 
-  /// force <- -dE/du [N] (conservative terms), fully overwritten; E -> *energy where wanted.
+  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted.
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
   /// Kw <- -d(force)/du w [N], fully overwritten.
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);

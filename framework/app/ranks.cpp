@@ -1,0 +1,98 @@
+#include "ranks.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+#include "perikit/core/communicator.hpp"
+#include "perikit/run/simulation.hpp"
+
+namespace perikit::app {
+
+namespace {
+
+/// A rank without others: it sets itself up as if they were there.
+class LoneRank final : public Communicator {
+ public:
+  LoneRank(int rank, int size) : rank_(rank), size_(size) {}
+  int rank() const noexcept override { return rank_; }
+  int size() const noexcept override { return size_; }
+  void sum(std::span<std::int64_t>) override {}
+  double largest(double value) override { return value; }
+  void exchange(std::span<const Message>) override {}
+  std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override { return {{bytes.begin(), bytes.end()}}; }
+  void broadcast(std::vector<std::byte>&) override {}
+  [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
+
+ private:
+  int rank_, size_;
+};
+
+struct Share {
+  double points = 0, near = 0, ghosts = 0, bytes = 0;
+};
+
+Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks) {
+  LoneRank alone(rank, ranks);
+  const CommunicatorScope scope(alone);
+  Simulation simulation(scene, registry);
+  const Body& body = simulation.problem().body();
+  Share share{static_cast<double>(body.owned().size()), 0, 0, static_cast<double>(simulation.problem().bytes())};
+  share.ghosts = static_cast<double>(body.points()) - share.points;
+  const std::size_t materials = scene.regions.size() + 1;  // far points have one more
+  for (const std::int32_t p : body.internal())
+    share.near += !body.owns(static_cast<std::size_t>(p)) && body.material_ids()[static_cast<std::size_t>(p)] < materials;
+  return share;
+}
+
+int ranks_of_node() {
+  for (const char* variable : {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"})
+    if (const char* text = std::getenv(variable)) return std::max(1, std::atoi(text));
+  return std::max(1, communicator().size());
+}
+
+}  // namespace
+
+int cores_of_rank() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  const int all = std::max(1, static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN)));
+  const int bound = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : all;
+  return bound < all ? bound : std::max(1, bound / ranks_of_node());
+}
+
+std::string crowded(int threads) {
+  const int cores = cores_of_rank();
+  if (threads <= cores) return {};
+  return fmt::format(
+      "warning: each rank has {} threads on {} core{}; allowed: --threads {}, or mpirun --map-by slot:PE={}, or --bind-to none "
+      "where cores are free",
+      threads, cores, cores == 1 ? "" : "s", cores, threads);
+}
+
+std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks) {
+  std::vector<Share> shares;
+  for (int rank = 0; rank < ranks; ++rank) shares.push_back(share_of(scene, registry, rank, ranks));
+  const auto most = [&](auto&& value) { return std::ranges::max(shares, {}, value); };
+  double points = 0, exchanged = 0;
+  for (const Share& share : shares) points += share.points, exchanged += share.ghosts;
+  const double mean = points / ranks;
+  const Share largest = most(&Share::points), deepest = most(&Share::ghosts), heaviest = most(&Share::bytes),
+              busiest = most([](const Share&share) { return share.points + share.near; });
+  return fmt::format(
+      "ranks         {}\n"
+      "balance       {:.0f} points on the largest rank, {:.3f} of the mean\n"
+      "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
+      "exchange      at most {:.3g} MB a rank and step, {:.3g} MB by all\n"
+      "work          {:.0f} points evaluated on the busiest rank: {:.2f} of the speed of {} ranks without ghosts, at best\n"
+      "memory        at most {:.3g} MB a rank of its part, and about {:.3g} MB of where all points are\n",
+      ranks, largest.points, largest.points / mean, deepest.ghosts, deepest.ghosts / mean,
+      8e-6 * scene.body.dimension * deepest.ghosts, 8e-6 * scene.body.dimension * exchanged, busiest.points + busiest.near,
+      mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, 30e-6 * points);
+}
+
+}  // namespace perikit::app

@@ -1,0 +1,21 @@
+#pragma once
+/// What the command line does about several ranks.
+
+#include <string>
+
+#include "perikit/plugin/registry.hpp"
+#include "perikit/scene/scene.hpp"
+
+namespace perikit::app {
+
+/// Cores that a rank has: those that it is bound to, or its share of the machine's.
+int cores_of_rank();
+
+/// A warning where a rank has more threads than cores; else empty.
+std::string crowded(int threads);
+
+/// What each of so many ranks would hold and exchange, found by setting up one after the other, in lines. Throws InputError for
+/// what they would refuse.
+std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks);
+
+}  // namespace perikit::app

@@ -1,0 +1,86 @@
+#include "families/shared_bonds.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+
+#include "perikit/core/communicator.hpp"
+
+namespace perikit {
+
+/// On rank 0 those of all ranks, by places in the whole body.
+std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) const {
+  const auto place = body_.places().place;
+  std::vector<BondChange> named;
+  // Points have the order here that they have in the whole body: the smaller index stays the smaller one.
+  for (const auto& [bond, integrity] : mine)
+    named.push_back({{place[static_cast<std::size_t>(bond.point)], place[static_cast<std::size_t>(bond.far)]}, integrity});
+  std::vector<BondChange> all;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(named)))) {
+    const std::size_t before = all.size();
+    all.resize(before + of_rank.size() / sizeof(BondChange));
+    if (!of_rank.empty()) std::memcpy(&all[before], of_rank.data(), of_rank.size());
+  }
+  std::ranges::sort(all, {}, &BondChange::bond);
+  const auto rest = std::ranges::unique(all, {}, &BondChange::bond);
+  all.erase(rest.begin(), rest.end());
+  return all;
+}
+
+void SharedBonds::find_here() const {
+  if (!here_.empty()) return;
+  here_.assign(body_.places().stride, -1);
+  for (const std::int32_t p : body_.internal())
+    here_[static_cast<std::size_t>(body_.places().place[static_cast<std::size_t>(p)])] = p;
+}
+
+void SharedBonds::mark(GroupMarks& marks) const {
+  if (!part()) return;
+  std::vector<std::int32_t> mine;
+  for (const std::int32_t p : body_.owned())
+    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
+  std::vector<std::byte> bytes;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine))))
+    bytes.insert(bytes.end(), of_rank.begin(), of_rank.end());
+  communicator().broadcast(bytes);
+  std::vector<std::int32_t> all(bytes.size() / sizeof(std::int32_t));
+  if (!bytes.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
+  find_here();
+  for (const std::int32_t place : all)
+    if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
+}
+
+std::vector<BondChange> SharedBonds::outward(std::span<const BondChange> changes) const {
+  if (!part()) return {changes.begin(), changes.end()};
+  std::vector<BondChange> own;
+  std::ranges::copy_if(changes, std::back_inserter(own),
+                       [&](const BondChange& change) { return body_.owns(static_cast<std::size_t>(change.bond.point)); });
+  return merged(own);
+}
+
+std::vector<BondChange> SharedBonds::inward(std::span<const BondChange> changes) const {
+  if (!part()) return {changes.begin(), changes.end()};
+  find_here();
+  std::vector<BondChange> in;
+  for (const auto& [bond, integrity] : changes) {
+    const BondId own{here_[static_cast<std::size_t>(bond.point)], here_[static_cast<std::size_t>(bond.far)]};
+    if (own.point >= 0 && own.far >= 0) in.push_back({own, integrity});
+  }
+  return in;
+}
+
+std::vector<BondId> SharedBonds::of_all(std::span<const BondId> bonds) const {
+  if (!part()) return {bonds.begin(), bonds.end()};
+  std::vector<BondChange> mine;
+  for (const BondId bond : bonds) mine.push_back({bond, 0.0});
+  const std::vector<BondChange> all = merged(mine);
+  std::vector<std::byte> bytes(std::as_bytes(std::span(all)).begin(), std::as_bytes(std::span(all)).end());
+  communicator().broadcast(bytes);
+  std::vector<BondChange> told(bytes.size() / sizeof(BondChange));
+  if (!bytes.empty()) std::memcpy(told.data(), bytes.data(), bytes.size());
+  std::vector<BondId> here;
+  for (const BondChange& change : inward(told)) here.push_back(change.bond);
+  return here;
+}
+
+}  // namespace perikit

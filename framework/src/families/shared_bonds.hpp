@@ -1,0 +1,38 @@
+#pragma once
+/// Bonds of a part of a body as all ranks name them: by the places of their ends in the whole body. Where one rank has the whole,
+/// they keep their names.
+
+#include <span>
+#include <vector>
+
+#include "families/families.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/families/bonds.hpp"
+
+namespace perikit {
+
+class SharedBonds {
+ public:
+  /// `body` must outlive it.
+  explicit SharedBonds(const Body& body) : body_(body) {}
+
+  /// The changes that all ranks have, each once, ascending, by places in the whole body: on rank 0; on the others none. All ranks
+  /// must call it.
+  std::vector<BondChange> outward(std::span<const BondChange> changes) const;
+  /// Of changes in the whole body those with both ends here.
+  std::vector<BondChange> inward(std::span<const BondChange> changes) const;
+  /// Of the bonds that any rank names those with both ends here, ascending. All ranks must call it.
+  std::vector<BondId> of_all(std::span<const BondId> bonds) const;
+  /// Marks the groups of eight points that hold points of groups which any rank has marked among its own. All ranks must call it.
+  void mark(GroupMarks& marks) const;
+
+ private:
+  bool part() const noexcept { return !body_.places().place.empty(); }
+  std::vector<BondChange> merged(std::span<const BondChange> mine) const;
+  void find_here() const;
+
+  const Body& body_;
+  mutable std::vector<std::int32_t> here_;  ///< internal index by place in the whole body, -1: not here; made when asked for
+};
+
+}  // namespace perikit

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""Kalthoff and Winkler's plate (configs/fracture/kalthoff_winkler.toml): angle, start and speed of the upper crack by kinematics, kernel,
+horizon and orientation of the lattice. A Markdown table is printed; it is that of framework/docs/fracture.md, "Kernels that follow the lattice".
+
+    kalthoff_winkler.py PERIKIT OUT [--spacing 1e-3] [--threads 1]
+
+Runs that are done are kept: a stopped command goes on where it was. Needs numpy and h5py.
+
+Angle: of the line through the mean heights of the points with damage above 0.35, from 2 mm to 30 mm above the notch (of the fitted x over y,
+so that a vertical crack has 90 degrees). Start: the first frame in which the crack is 2 mm long. Speed: of its tip from there to 30 mm.
+"""
+
+import argparse
+import math
+import pathlib
+import subprocess
+
+import h5py
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SCENE = ROOT / "configs/fracture/kalthoff_winkler.toml"
+KINEMATICS = {
+    "bond_based": "bond_based",
+    "ordinary": "ordinary",
+    "baqp": "baqp",
+    "conventional, silling": '{type="conventional",stabilization={type="silling",coefficient=1.0}}',
+}
+
+
+def turned_lattice(file, spacing, degrees):
+    """Points of a lattice that is turned, within the plate."""
+    turn = math.radians(degrees)
+    n = int(0.3 / spacing)
+    i, j = numpy.meshgrid(numpy.arange(-n, n) + 0.5, numpy.arange(-n, n) + 0.5)
+    x = spacing * (math.cos(turn) * i - math.sin(turn) * j).ravel()
+    y = spacing * (math.sin(turn) * i + math.cos(turn) * j).ravel()
+    inside = (x > 0) & (x < 0.1) & (abs(y) < 0.1)
+    numpy.savetxt(file, numpy.column_stack([x[inside], y[inside], numpy.full(inside.sum(), spacing**2)]), delimiter=",", header="x,y,volume", comments="")
+
+
+def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
+    log = folder / "run.log"
+    if log.exists() and ("speed  " in log.read_text() or "failed: " in log.read_text()):
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    text = SCENE.read_text()
+    if degrees:
+        points = folder.with_suffix(".csv")
+        turned_lattice(points, spacing, degrees)
+        begin, end = text.index("[body.lattice]"), text.index("[sets]")
+        text = text[:begin] + '[body.points]\nfile = "%s"\n\n' % points.name + text[end:]
+    scene = folder.with_suffix(".toml")
+    scene.write_text(text)
+    settings = ["kinematics=" + kinematics, "family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
+                "output.frames=50"] + ([] if degrees else ["body.lattice.spacing=%g" % spacing])
+    command = [perikit, "run", str(scene), "-o", str(folder), "--force", "--quiet", "--threads", str(threads)]
+    subprocess.run(command + [word for setting in settings for word in ("--set", setting)], check=False)
+
+
+def measured(folder):
+    with h5py.File(folder / "reference.h5") as file:
+        x = file["position"][:]
+    tips, last = [], None
+    for frame in sorted((folder / "frames").glob("*.h5")):
+        with h5py.File(frame) as file:
+            damage, time = file["damage"][:], float(file.attrs["time"])
+        crack = (damage > 0.35) & (x[:, 1] > 0.027) & (x[:, 0] > 0.02)
+        tips.append((time, x[crack, 1].max() - 0.025 if crack.any() else 0.0))
+        last = crack
+    within = last & (x[:, 1] < 0.055)
+    if within.sum() < 20:
+        return "no crack", "", ""
+    slope = numpy.polyfit(x[within, 1], x[within, 0], 1)[0]
+    angle = math.degrees(math.atan2(1.0, slope))
+    started = [k for k, (_, height) in enumerate(tips) if height > 0.002]
+    passed = [k for k, (_, height) in enumerate(tips) if height > 0.03]
+    start = "%.0f us" % (1e6 * tips[started[0]][0])
+    if not passed:
+        return "%.0f" % angle, start, "stops at %.0f mm" % (1e3 * tips[-1][1])
+    way, time = tips[passed[0]][1] - tips[started[0]][1], tips[passed[0]][0] - tips[started[0]][0]
+    return "%.0f" % angle, start, "%.0f m/s" % (way / math.sin(math.radians(angle)) / time if time > 0 else 0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("perikit")
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--spacing", type=float, default=1e-3)
+    parser.add_argument("--threads", type=int, default=1)
+    options = parser.parse_args()
+    cases = [(3.015, 0), (4.015, 0), (3.015, 30)]
+    print("| kinematics | kernel | " + " | ".join("horizon %g%s" % (round(r), ", turned by %d degrees" % d if d else "") for r, d in cases) + " |")
+    print("|" + "---|" * (2 + len(cases)))
+    for name, kinematics in KINEMATICS.items():
+        for kernel in ("constant", "gaussian", "cubic_spline"):
+            cells = []
+            for ratio, degrees in cases:
+                folder = options.out / ("%s_%s_%d_%d" % (name.replace(", ", "_"), kernel, round(ratio), degrees))
+                run(options.perikit, folder, options.spacing, kinematics, kernel, ratio, degrees, options.threads)
+                cells.append(", ".join(word for word in measured(folder) if word))
+            print("| `%s` | `%s` | %s |" % (name, kernel, " | ".join(cells)), flush=True)
+
+
+main()

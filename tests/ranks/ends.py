@@ -1,0 +1,142 @@
+"""Runs on several ranks that do not come to their end: one message, the right status, soon, and results that a run goes on from.
+
+usage: ends.py PROGRAM LIBRARY WORK FOLDER_OF_THE_FAILING_INTEGRATOR
+"""
+
+import glob
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+from scenes import ENVIRONMENT, command, differences, need, run, scene
+
+PROGRAM, LIBRARY, WORK, FAILING = sys.argv[1:]
+LIMIT = 10.0   # seconds
+failed = []
+
+
+def check(condition, what):
+    print(("ok      " if condition else "FAILED  ") + what, flush=True)
+    if not condition:
+        failed.append(what)
+
+
+def perikit_lines(text, message):
+    return sum(message in line for line in text.splitlines())
+
+
+def without_velocity(text):
+    return text.replace("quantity = \"velocity\"", "quantity = \"displacement\"").replace("\"velocity\", ", "")
+
+
+def throws():
+    """One rank throws, the others wait for it."""
+    messages = {"input": (2, "thrown on purpose: input"), "run": (1, "the run failed: thrown on purpose: run"),
+                "memory": (1, "the run failed: not enough memory"), "other": (1, "internal error: thrown on purpose: other")}
+    for rank, place, error in ((2, "construction", "input"), (0, "plan", "other"), (1, "step", "run"), (2, "step", "memory"), (0, "step", "run")):
+        text = scene('type = "conventional"', integrator='type = "failing"\nrank = %d\nat = "%s"\nerror = "%s"' % (rank, place, error))
+        text = without_velocity(text)
+        status, message = messages[error]
+        began = time.time()
+        done = run(PROGRAM, text, WORK + "/throws", 3, 1, ("--plugin-path", FAILING))
+        spent = time.time() - began
+        check(done.returncode == status and perikit_lines(done.stderr, message) == 1 and spent < LIMIT,
+              "rank %d throws at %s: %s; status %d after %.1f s" % (rank, place, error, done.returncode, spent))
+        if done.returncode != status:
+            print(done.stderr)
+
+
+def refusals():
+    """What all ranks refuse, one says."""
+    conventional = 'type = "conventional"'
+    for what, text, words in (
+            ("a scene with a mistake", scene('type = "conventonal"'), "did you mean"),
+            ("newton", without_velocity(scene(conventional, integrator='type = "newton"')), 'found "newton" on 3 ranks'),
+            ("a plane of symmetry", scene(conventional, extra='[[symmetry]]\naxis = "y"\n'), "found a plane of symmetry on 3 ranks"),
+            ("periodic sides", scene(conventional, extra='[[periodic]]\naxis = "y"\n'), "found periodic sides on 3 ranks"),
+            ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
+            ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0\nallow_unstable = true'), "the run failed: step 1")):
+        began = time.time()
+        done = run(PROGRAM, text, WORK + "/refused", 3)
+        status = 1 if what == "a run that fails" else 2
+        check(done.returncode == status and perikit_lines(done.stderr, words) == 1 and time.time() - began < LIMIT,
+              "%s: status %d, said %d times" % (what, done.returncode, perikit_lines(done.stderr, words)))
+        if done.returncode != status or perikit_lines(done.stderr, words) != 1:
+            print(done.stderr)
+
+
+def other_commands():
+    done = subprocess.run(["mpirun", "--oversubscribe", "-np", "2", PROGRAM, "study", "none.toml"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+    check(done.returncode == 2 and perikit_lines(done.stderr, "found 2 processes (OMPI_COMM_WORLD_SIZE); allowed: one, but for `perikit run`") == 1, "perikit study on 2 ranks")
+
+
+def start(text, folder, ranks, options=()):
+    shutil.rmtree(folder, ignore_errors=True)
+    with open(folder + ".toml", "w") as out:
+        out.write(text)
+    return subprocess.Popen(command(PROGRAM, folder + ".toml", folder, ranks, 1, options), env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(folder, frames):
+    for _ in range(4000):
+        if len(glob.glob(folder + "/frames/*.h5")) >= frames and os.path.exists(folder + "/checkpoint.h5"):
+            return
+        time.sleep(0.05)
+    raise RuntimeError("no frames in " + folder)
+
+
+LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 12.0\ntime_step = 0.02', cells=[22, 18]).replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
+
+
+def output_fails():
+    """Rank 0 cannot write a frame; the others wait for it in the next step."""
+    folder = WORK + "/output"
+    process = start(LONG, folder, 3)
+    wait_for(folder, 2)
+    began = time.time()
+    os.rename(folder + "/frames", folder + "/earlier")
+    with open(folder + "/frames", "w"):
+        pass
+    _, err = process.communicate(timeout=300)
+    # Until the next frame is due the run goes on.
+    check(process.returncode == 1 and perikit_lines(err, "the run failed") == 1 and time.time() - began < 3 * LIMIT,
+          "no folder for frames: status %d after %.1f s" % (process.returncode, time.time() - began))
+    if process.returncode != 1:
+        print(err)
+
+
+def stops():
+    """A signal to one rank, to mpirun, and a rank that is killed: the run goes on from its checkpoint on another number of ranks."""
+    done = run(PROGRAM, LONG, WORK + "/whole", 0)
+    check(done.returncode == 0, "a run without a stop")
+    children = lambda process: [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()]
+    for name, target, number in (("SIGTERM to one rank", lambda p: children(p)[1], signal.SIGTERM), ("SIGTERM to mpirun", lambda p: p.pid, signal.SIGTERM),
+                                 ("kill -9 of one rank", lambda p: children(p)[2], signal.SIGKILL)):
+        folder = WORK + "/stopped"
+        process = start(LONG, folder, 3)
+        wait_for(folder, 3)
+        began = time.time()
+        os.kill(target(process), number)
+        _, err = process.communicate(timeout=60)
+        spent = time.time() - began
+        check(process.returncode != 0 and spent < LIMIT and os.path.exists(folder + "/checkpoint.h5"), "%s: all end after %.1f s with status %d" % (name, spent, process.returncode))
+        if number == signal.SIGTERM and name == "SIGTERM to one rank":
+            check(perikit_lines(err, "stopped by a signal") == 1 and process.returncode == 1, name + ": one message")
+        for ranks in ((2,) if name == "SIGTERM to one rank" else (1,)):
+            done = run(PROGRAM, LONG, folder, ranks, 1, ("--resume",))
+            found = differences(WORK + "/whole", folder) if done.returncode == 0 else [done.stderr]
+            check(not found, "%s, then --resume on %d ranks: %s" % (name, ranks, "; ".join(found) or "the run without a stop"))
+
+
+need(LIBRARY)
+os.makedirs(WORK, exist_ok=True)
+refusals()
+throws()
+other_commands()
+output_fails()
+stops()
+print("%d checks failed" % len(failed))
+sys.exit(1 if failed else 0)

@@ -1,0 +1,104 @@
+"""Explicit runs on several ranks give the files of one rank, bit for bit.
+
+usage: same_bits.py PROGRAM LIBRARY WORK small|all
+"""
+
+import itertools
+import sys
+
+from scenes import differences, need, run, scene
+
+KINEMATICS = {
+    "conventional": 'type = "conventional"',
+    "silling": 'type = "conventional"\nstabilization = { type = "silling", coefficient = 0.5 }',
+    "wan": 'type = "conventional"\nstabilization = { type = "wan" }',
+    "order 2": 'type = "conventional"\norder = 2',
+    "bond_based": 'type = "bond_based"',
+    "surface correction": 'type = "bond_based"\nsurface_correction = "energy"',
+    "ordinary": 'type = "ordinary"',
+    "baqp": 'type = "baqp"',
+    "baqp, order 2": 'type = "baqp"\norder = 2',
+    "projection": 'type = "projection"',
+    "bond_augmented": 'type = "bond_augmented"\nlambda = 0.7',
+    "non_spherical": 'type = "non_spherical"',
+    "sub_horizon": 'type = "sub_horizon"',
+    "bond_associated": 'type = "bond_associated"',
+    "selective projection": 'type = "selective"\nbase = { type = "projection" }',
+    "selective sub_horizon": 'type = "selective"\nbase = { type = "sub_horizon" }',
+}
+
+INCLUSION = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = "1 + x/100", bulk_modulus = 3.0 }\n'
+DAMAGE = {
+    "critical_stretch": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n',
+    "gradual": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\ngradual = true\n',
+    "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
+}
+HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
+CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
+
+
+def with_inclusion(text):
+    return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
+
+
+def torn(kinematics, damage, cloud):
+    """Pulled apart so fast that bonds fail, pieces among them."""
+    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 6.0\ntime_step = 0.05')
+    text = text.replace("[[boundary]]", 'velocity = ["0.15*(x - 16)/16", "0.1*sin(x/3)*(y - 13)/13"]\n[[boundary]]', 1)
+    return text.replace('"reaction"]', '"reaction", "damage"]') + CRACK + damage
+
+
+def cases(everything):
+    """Name, scene, numbers of ranks, numbers of threads."""
+    small = [("conventional", 3, False), ("baqp", 2, True), ("bond_based", 3, True), ("sub_horizon", 2, False)]
+    chosen = itertools.product(KINEMATICS, (1, 2, 3), (False, True)) if everything else small
+    ranks, threads = ((1, 2, 3, 4), (1, 2)) if everything else ((2, 3), (1,))
+    for name, dimension, cloud in chosen:
+        short = "end_time = 2.0" if dimension == 3 else "end_time = 6.0"
+        # Steps of a given length where families are too poor for the estimate to mean anything.
+        step = "\ntime_step = 0.02" if "order 2" in name and dimension == 3 else ""
+        yield "%s, %dD %s" % (name, dimension, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], dimension, cloud, 'type = "verlet"\n' + short + step), ranks, threads
+    for name in ("conventional", "projection", "ordinary", "bond_associated") if everything else ("projection",):
+        for cloud in (False, True) if everything else (False,):
+            text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
+            yield "%s, inclusion and pre-crack, %s" % (name, "cloud" if cloud else "lattice"), text + CRACK, ranks, threads
+    for name in KINEMATICS if everything else ("bond_based", "baqp"):
+        if name == "order 2" or "sub_horizon" in name or "selective" in name:
+            criteria = ("critical_stretch",)
+        else:
+            criteria = DAMAGE if everything else ("critical_stretch",)
+        for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
+            yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), torn(KINEMATICS[name], DAMAGE[criterion], cloud), ranks, threads
+    for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
+        for cloud in (False, True) if everything else (False,):
+            yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
+    hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
+    yield "conventional, body with a hole", hole, ranks, threads
+
+
+def main():
+    program, library, work, which = sys.argv[1:]
+    need(library)
+    failed, count = [], 0
+    for number, (name, text, ranks, threads) in enumerate(cases(which == "all")):
+        one = "%s/%d_one" % (work, number)
+        done = run(program, text, one, 0)
+        if done.returncode != 0:
+            failed.append(name)
+            print("FAILED  %s on one rank: %s" % (name, done.stderr.strip()))
+            continue
+        for r, t in itertools.product(ranks, threads):
+            several = "%s/%d_several" % (work, number)
+            done = run(program, text, several, r, t)
+            found = [done.stderr.strip()] if done.returncode != 0 else differences(one, several)
+            count += 1
+            if found:
+                failed.append(name)
+                print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
+        if name not in failed:
+            print("same    " + name, flush=True)
+    print("%d runs compared, %d cases failed" % (count, len(set(failed))))
+    sys.exit(1 if failed or count == 0 else 0)
+
+
+main()

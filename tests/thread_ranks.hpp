@@ -1,0 +1,116 @@
+#pragma once
+/// Ranks that are threads of one process: what a run on several ranks does, without MPI and its start.
+
+#include <algorithm>
+#include <barrier>
+#include <cstdlib>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "perikit/core/communicator.hpp"
+
+namespace perikit {
+
+/// What the ranks share: one slot each.
+struct Meeting {
+  explicit Meeting(int ranks)
+      : barrier(ranks),
+        numbers(static_cast<std::size_t>(ranks)),
+        messages(numbers.size()),
+        counts(numbers.size()),
+        bytes(numbers.size()) {}
+  std::barrier<> barrier;
+  std::vector<double> numbers;
+  std::vector<std::span<const Message>> messages;
+  std::vector<std::vector<std::int64_t>> counts;
+  std::vector<std::vector<std::byte>> bytes;
+};
+
+class ThreadRank final : public Communicator {
+ public:
+  ThreadRank(Meeting& meeting, int rank) : meeting_(meeting), rank_(rank) {}
+  int rank() const noexcept override { return rank_; }
+  int size() const noexcept override { return static_cast<int>(meeting_.numbers.size()); }
+
+  void sum(std::span<std::int64_t> numbers) override {
+    meeting_.counts[mine()].assign(numbers.begin(), numbers.end());
+    together([&] {
+      std::fill(numbers.begin(), numbers.end(), 0);
+      for (const auto& of_rank : meeting_.counts)
+        for (std::size_t k = 0; k < numbers.size(); ++k) numbers[k] += of_rank[k];
+    });
+  }
+  double largest(double value) override {
+    meeting_.numbers[mine()] = value;
+    together([&] {
+      for (const double other : meeting_.numbers) value = std::max(value, other);
+    });
+    return value;
+  }
+  /// A meeting of all ranks, though each names few.
+  void exchange(std::span<const Message> messages) override {
+    ++exchanges;
+    meeting_.messages[mine()] = messages;
+    together([&] {
+      for (const Message& message : messages)
+        for (const Message& theirs : meeting_.messages[static_cast<std::size_t>(message.rank)])
+          if (theirs.rank == rank_) std::copy(theirs.to.begin(), theirs.to.end(), message.from.begin());
+    });
+  }
+  std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override {
+    meeting_.bytes[mine()].assign(bytes.begin(), bytes.end());
+    std::vector<std::vector<std::byte>> all;
+    together([&] {
+      if (rank_ == 0) all = meeting_.bytes;
+    });
+    return all;
+  }
+  void broadcast(std::vector<std::byte>& bytes) override {
+    if (rank_ == 0) meeting_.bytes[0] = bytes;
+    together([&] { bytes = meeting_.bytes[0]; });
+  }
+  [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
+
+  int exchanges = 0;
+
+ private:
+  std::size_t mine() const noexcept { return static_cast<std::size_t>(rank_); }
+  /// Reads what all have written, before any writes again.
+  template <class Read>
+  void together(Read&& read) {
+    meeting_.barrier.arrive_and_wait();
+    read();
+    meeting_.barrier.arrive_and_wait();
+  }
+
+  Meeting& meeting_;
+  int rank_;
+};
+
+/// work(communicator) on so many ranks at once. What one of them throws is thrown again, the lowest one's where several do; the
+/// others must then throw, too, or meet no more.
+inline void on_ranks(int ranks, const std::function<void(ThreadRank&)>& work) {
+  Meeting meeting(ranks);
+  std::vector<std::exception_ptr> failures(static_cast<std::size_t>(ranks));
+  std::vector<std::thread> threads;
+  for (int r = 0; r < ranks; ++r)
+    threads.emplace_back([&, r] {
+      ThreadRank mine(meeting, r);
+      const CommunicatorScope scope(mine);
+      try {
+        work(mine);
+      } catch (...) {
+        failures[static_cast<std::size_t>(r)] = std::current_exception();
+        meeting.barrier.arrive_and_drop();
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace perikit
