@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 #include <sunlinsol/sunlinsol_spgmr.h>
 
-#include <cmath>
-#include <limits>
-
 #include "../shared/assembled_tangent.hpp"
+#include "mixed_equations.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -15,13 +13,9 @@ KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, s
     : problem_(problem),
       options_(options),
       preconditioner_(std::move(preconditioner)),
+      action_(problem, options.differences),
       right_(problem.make_field()),
-      u_(problem.make_field()),
       right_vector_(wrap(problem, right_, context_)) {
-  if (options.differences) {
-    moved_ = problem.make_field();
-    force_ = problem.make_field();
-  }
   // Preconditioned from the right: GMRES then watches the true residual.
   gmres_.reset(SUNLinSol_SPGMR(right_vector_.get(), preconditioner_ ? SUN_PREC_RIGHT : SUN_PREC_NONE, options.restart, context_));
   if (!gmres_) throw RunError("SUNDIALS gives no GMRES solver: not enough memory?");
@@ -31,37 +25,12 @@ KrylovEquations::KrylovEquations(Problem& problem, const JfnkOptions& options, s
 }
 
 bool KrylovEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
-  copy(u, u_);
-  return !preconditioner_ || preconditioner_->prepare(equilibrium, u_, failure);
+  action_.move_to(u);
+  return !preconditioner_ || preconditioner_->prepare(equilibrium, action_.state(), failure);
 }
 
 bool KrylovEquations::apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
-  if (options_.differences) return difference(equilibrium, w, Kw, failure);
-  if (equilibrium.tangent(u_, w, Kw)) return true;
-  failure = equilibrium.failure();
-  return false;
-}
-
-bool KrylovEquations::difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
-  // P 3.73-3.74: K w = -(f(u + eps w) - f(u - eps w))/(2 eps); eps w moves points by the cube root of the rounding unit times the
-  // spacing.
-  const double largest = largest_magnitude(w);
-  if (largest == 0) {
-    fill(0.0, Kw);
-    return true;
-  }
-  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.body().spacing() / largest;
-  for (const double sign : {1.0, -1.0}) {
-    combine(1, u_, sign * eps, w, moved_);
-    const EvaluationStatus status = problem_.evaluate_forces(moved_, sign > 0 ? Kw : FieldView(force_), nullptr);
-    if (!status.ok()) {
-      failure = status.description;
-      return false;
-    }
-  }
-  combine(0.5 / eps, force_, -0.5 / eps, Kw, Kw);
-  mask(equilibrium.free(), Kw);
-  return true;
+  return action_.apply(equilibrium, w, Kw, failure);
 }
 
 int KrylovEquations::multiply(void* self, N_Vector w, N_Vector Kw) {
@@ -99,7 +68,7 @@ bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double
   bool convex = preconditioner_ && preconditioner_->convex();
   bool solved = !convex && iterate(rhs, accuracy, doubtful ? 0 : options_.max_restarts, du, note);
   if (doubtful && !convex && (!solved || reached_ > accuracy || dot(du, rhs) <= 0)) {
-    if (!preconditioner_->renew(equilibrium, u_, failure)) return false;
+    if (!preconditioner_->renew(equilibrium, action_.state(), failure)) return false;
     convex = preconditioner_->convex();
     if (!convex) solved = iterate(rhs, accuracy, options_.max_restarts, du, note);
   }
@@ -117,10 +86,26 @@ bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double
 }
 
 void Jfnk::run(Problem& problem, Observer& observer) {
+  const bool asked = options_.preconditioner == "mixed";
+  if (asked || (options_.preconditioner == "auto" && mixed_pays(problem))) {
+    if (std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part()) {
+      observer.log("jfnk: preconditioner mixed");
+      MixedEquations equations(problem, options_, std::move(volumes));
+      return iterate(problem, observer, equations);
+    }
+    if (asked)
+      throw options_.values.error("preconditioner",
+                                  "found \"mixed\", which needs the point volumes of selective kinematics and the whole body on one "
+                                  "rank; allowed here: auto, none, jacobi, factorisation, companion");
+  }
   std::string chosen;
   auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
   observer.log("jfnk: preconditioner " + chosen);
   KrylovEquations equations(problem, options_, std::move(preconditioner));
+  iterate(problem, observer, equations);
+}
+
+void Jfnk::iterate(Problem& problem, Observer& observer, LinearisedProblem& equations) {
   NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);
   run_load_steps("jfnk", options_.load_steps, problem, observer, newton);
 }

@@ -5,7 +5,9 @@
 
 #include "../shared/field_vector.hpp"
 #include "../shared/preconditioner.hpp"
+#include "perikit/plugin/parameters.hpp"
 #include "perikit/sdk/newton_iteration.hpp"
+#include "tangent_action.hpp"
 
 namespace perikit {
 
@@ -16,7 +18,13 @@ struct JfnkOptions {
   int restart = 60;  ///< Krylov vectors before GMRES restarts
   int max_restarts = 20;
   bool line_search = true;
+  ParameterValues values;  ///< as the scene has them, for errors
 };
+
+struct KrylovDeleter {
+  void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
+};
+using KrylovSolver = std::unique_ptr<_generic_SUNLinearSolver, KrylovDeleter>;
 
 /// Krylov solution of the linearised equations: SUNDIALS' restarted GMRES on tangent actions.
 class KrylovEquations final : public LinearisedProblem {
@@ -32,22 +40,19 @@ class KrylovEquations final : public LinearisedProblem {
   }
 
  private:
-  struct SolverDeleter {
-    void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
-  };
   static int multiply(void* self, N_Vector w, N_Vector Kw);
   static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
   /// One run of GMRES on the exact tangent. False where it fails; failure_ then says why, if it knows.
   bool iterate(ConstFieldView rhs, double accuracy, int max_restarts, FieldView du, std::string& note);
-  bool difference(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure);
 
   Problem& problem_;
   JfnkOptions options_;
   std::unique_ptr<Preconditioner> preconditioner_;
+  TangentAction action_;
   SundialsContext context_;
-  Field right_, u_, moved_, force_;
+  Field right_;
   FieldVector right_vector_;
-  std::unique_ptr<_generic_SUNLinearSolver, SolverDeleter> gmres_;
+  KrylovSolver gmres_;
   Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
   int iterations_ = 0;                  ///< of the last run of GMRES
   double reached_ = 0;                  ///< linear residual over the right-hand side after it
@@ -65,6 +70,8 @@ class Jfnk final : public Integrator {
   void run(Problem& problem, Observer& observer) override;
 
  private:
+  void iterate(Problem& problem, Observer& observer, LinearisedProblem& equations);
+
   JfnkOptions options_;
 };
 

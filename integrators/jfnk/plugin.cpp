@@ -5,7 +5,7 @@ PERIKIT_PLUGIN(registrar) {
   using namespace perikit;
   ParameterTable table = load_step_parameters(25);
   table.choice("tangent", {"exact", "differences"}, "Tangent actions: exact directional derivatives, or central differences of forces.").by_default("\"exact\"");
-  add_preconditioner_key(table);
+  add_preconditioner_key(table, true);
   table.integer("restart", "Krylov vectors before GMRES restarts; each costs one field.").by_default("60").at_least(2).at_most(1000);
   table.integer("max_restarts", "Restarts of GMRES before a linear solve ends.").by_default("20").at_least(0).at_most(10000);
   table.boolean("line_search", "Halve steps that are inadmissible or do not lead on.").by_default("true");
@@ -26,6 +26,7 @@ PERIKIT_PLUGIN(registrar) {
         options.restart = static_cast<int>(values.integer("restart"));
         options.max_restarts = static_cast<int>(values.integer("max_restarts"));
         options.line_search = values.boolean("line_search");
+        options.values = values;
         return std::make_unique<Jfnk>(options);
       });
 }

@@ -1,7 +1,7 @@
 #include "assembled_tangent.hpp"
 
+#include "block_product.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "perikit/core/parallel.hpp"
 
 namespace perikit {
 
@@ -32,19 +32,7 @@ bool AssembledTangent::make(Equilibrium& equilibrium, ConstFieldView u, bool may
 }
 
 void AssembledTangent::multiply(ConstFieldView free, ConstFieldView w, FieldView Kw) const {
-  const int d = matrix_.dimension;
-  fill(0.0, Kw);
-  parallel_for(matrix_.rows(), [&](std::size_t r) {
-    double sum[3] = {};
-    for (std::int64_t b = matrix_.row_first[r]; b < matrix_.row_first[r + 1]; ++b) {
-      const double* block = &matrix_.values[static_cast<std::size_t>(b * d * d)];
-      const auto p =
-          static_cast<std::size_t>(matrix_.point[static_cast<std::size_t>(matrix_.column[static_cast<std::size_t>(b)])]);
-      for (int a = 0; a < d; ++a)
-        for (int c = 0; c < d; ++c) sum[a] += block[a * d + c] * w.component(c)[p];
-    }
-    for (int a = 0; a < d; ++a) Kw.component(a)[matrix_.point[r]] = sum[a];
-  });
+  perikit::multiply(matrix_, w, Kw);
   mask(free, Kw);
 }
 

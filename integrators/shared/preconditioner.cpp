@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "assembled_tangent.hpp"
 #include "multigrid.hpp"
@@ -104,7 +105,7 @@ class CompanionCycle final : public Preconditioner {
 
  private:
   bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
-    equilibrium.problem().assemble_companion(u, springs_);
+    equilibrium.problem().assemble_companion(u, springs_, std::numeric_limits<double>::infinity());
     multigrid_.make(springs_, equilibrium.free(), rigid_motions(equilibrium.problem().body(), u));
     return true;
   }
@@ -114,17 +115,22 @@ class CompanionCycle final : public Preconditioner {
   Multigrid multigrid_;
 };
 
+/// Largest ratio of bulk to shear modulus.
+double largest_bulk_ratio(const Problem& problem) {
+  double largest = 0;
+  for (const std::int32_t p : problem.body().owned()) {
+    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
+    if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
+  }
+  return largest;
+}
+
 /// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing of stiffness
 /// against changes of volume, would need too many of them (measured: framework/docs/performance.md).
 bool factorisation_pays(Problem& problem) {
   if (problem.dimension() == 3) return false;
-  double stiffest = 0;   // largest ratio of bulk to shear modulus
-  for (const std::int32_t p : problem.body().owned()) {
-    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
-    if (moduli.mu > 0) stiffest = std::max(stiffest, moduli.bulk() / moduli.mu);
-  }
   const bool few = problem.body().points() <= 4000;
-  const bool resists_volume = stiffest > 1000 && problem.body().space() != Space::plane_stress;
+  const bool resists_volume = largest_bulk_ratio(problem) > 1000 && problem.body().space() != Space::plane_stress;
   return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
 }
 
@@ -161,12 +167,19 @@ void Preconditioner::took(int iterations, double reduction) {
   if (at_first() == 0) at_first() = lately();
 }
 
-void add_preconditioner_key(ParameterTable& table) {
-  table
-      .choice("preconditioner", {"auto", "none", "jacobi", "factorisation", "companion"},
-              "Of Krylov solvers: the assembled tangent (its factors, or the blocks of its diagonal), or springs between nearest "
-              "neighbours (companion).")
+void add_preconditioner_key(ParameterTable& table, bool mixed) {
+  std::vector<std::string> names = {"auto", "none", "jacobi", "factorisation", "companion"};
+  if (mixed) names.push_back("mixed");
+  const std::string what =
+      "Of Krylov solvers: the assembled tangent (its factors, or the blocks of its diagonal), or springs between nearest "
+      "neighbours (companion)";
+  table.choice("preconditioner", names, what + (mixed ? "; mixed: those, and pressures as further unknowns, for selective kinematics." : "."))
       .by_default("\"auto\"");
+}
+
+bool mixed_pays(Problem& problem) {
+  constexpr double least_ratio = 200;
+  return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {

@@ -56,8 +56,12 @@ class Preconditioner {
   bool in_hand_ = false;
 };
 
-/// The key `preconditioner` of an integrator.
-void add_preconditioner_key(ParameterTable& table);
+/// The key `preconditioner` of an integrator. mixed: it has mixed systems (MixedSystem).
+void add_preconditioner_key(ParameterTable& table, bool mixed = false);
+
+/// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has the
+/// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere, and the factorisation does not pay.
+bool mixed_pays(Problem& problem);
 
 /// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"
 /// (a multigrid cycle on springs between nearest neighbours, never the tangent), "auto": the factorisation in 1D, and in 2D for at

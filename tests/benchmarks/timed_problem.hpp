@@ -41,8 +41,8 @@ class TimedProblem final : public contract::ForwardingProblem {
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override {
     return timed(assemblies, [&] { return of_.assemble_tangent(u, K); });
   }
-  void assemble_companion(ConstFieldView u, BlockMatrix& K) override {
-    timed(companions, [&] { return of_.assemble_companion(u, K), 0; });
+  void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override {
+    timed(companions, [&] { return of_.assemble_companion(u, K, most_bulk), 0; });
   }
 
  private:

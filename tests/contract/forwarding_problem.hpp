@@ -23,7 +23,8 @@ class ForwardingProblem : public Problem {
   }
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return of_.assemble_tangent(u, K); }
   AssembledSize assembled_size() override { return of_.assembled_size(); }
-  void assemble_companion(ConstFieldView u, BlockMatrix& K) override { of_.assemble_companion(u, K); }
+  void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override { of_.assemble_companion(u, K, most_bulk); }
+  std::unique_ptr<VolumetricPart> volumetric_part() override { return of_.volumetric_part(); }
   bool constant_stiffness() const noexcept override { return of_.constant_stiffness(); }
   bool advance(double time_step, FieldView velocity) override { return of_.advance(time_step, velocity); }
   std::vector<std::byte> bonds() const override { return of_.bonds(); }

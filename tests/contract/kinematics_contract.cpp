@@ -80,6 +80,42 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
   }
 }
 
+TEST_CASE("kinematics: the volumetric part is the derivative of the volumes of points, and its forces are the adjoint") {
+  for (const Case& c : cases()) {
+    INFO(c.label());
+    const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    const std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part();
+    if (!volumes) continue;
+    deform(body, problem.state().displacement(), 15, 0.02);
+    const ConstFieldView u = problem.state().displacement();
+    const Field w = random_direction(problem, 16);
+    Field q = body.make_field(1), Bw = body.make_field(1), BTq = problem.make_field();
+    Noise noise(17);
+    for (const std::int32_t p : body.internal()) q.data()[p] = noise();
+    REQUIRE(volumes->linearise(u).ok());
+    volumes->rates(w, Bw);
+    volumes->forces(q, BTq);
+    double left = 0, size = 0;
+    for (const std::int32_t p : body.internal()) {
+      left += q.data()[p] * Bw.data()[p];
+      size += std::abs(q.data()[p] * Bw.data()[p]);
+      CHECK(volumes->stiffness().data[p] >= 0);
+    }
+    CHECK_MESSAGE(std::abs(left - dot(body, BTq, w)) <= 1e-13 * size, "not adjoint: ", left, " against ", dot(body, BTq, w));
+    // Entries are of single precision.
+    const double h = 1e-4 * body.spacing();
+    Field slope = body.make_field(1);
+    for (const double sign : {1.0, -1.0}) {
+      REQUIRE(volumes->linearise(shifted(problem, u, w, sign * h)).ok());
+      for (const std::int32_t p : body.internal()) slope.data()[p] += sign / (2 * h) * volumes->logarithms().data[p];
+    }
+    for (const std::int32_t p : body.internal())
+      CHECK(std::abs(slope.data()[p] - Bw.data()[p]) <= 1e-5 * largest(body, Bw));
+  }
+}
+
 TEST_CASE("kinematics: linear and angular momentum") {
   Exceptions exceptions;
   for (const Case& c : cases()) {

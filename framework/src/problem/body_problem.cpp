@@ -164,9 +164,10 @@ AssembledSize BodyProblem::assembled_size() {
   return size;
 }
 
-void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K) {
+void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) {
   refuse_ranks(parts_);
   if (!companion_) companion_ = std::make_unique<Companion>(*parts_.families, laws());
+  companion_->limit_bulk(most_bulk);
   over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) { companion_->assemble(seen(u, seen_), of_terms); });
 }
 

@@ -50,7 +50,7 @@ FamilyLists merged(const FamilyLists& near, const FamilyLists& far, const std::v
 }  // namespace
 
 Companion::Companion(const Families& families, const Laws& laws)
-    : families_(families), body_(families.body()), dimension_(body_.dimension()) {
+    : families_(families), laws_(laws), body_(families.body()), dimension_(body_.dimension()) {
   const Body& body = body_;
   for (std::size_t p = 0; p < body.stride(); ++p) {
     if (!body.alive(p)) continue;
@@ -59,6 +59,11 @@ Companion::Companion(const Families& families, const Laws& laws)
     rows_.insert(rows_.end(), {x[0], x[1], x[2], body.volume(p)});
   }
   find_pattern();
+}
+
+void Companion::limit_bulk(double most) {
+  if (most == most_bulk_) return;
+  most_bulk_ = most;
   stretch_.resize(point_.size());
   slide_.resize(point_.size());
   for (std::size_t i = 0; i < point_.size(); ++i) {
@@ -68,9 +73,11 @@ Companion::Companion(const Families& families, const Laws& laws)
       const double xi2 = squared(&rows_[4 * i], other);
       m += influence(xi2) * xi2 * other[3];
     }
-    const SpringModuli moduli = spring_moduli(body.space(), laws.moduli(static_cast<std::size_t>(point_[i])));
+    Moduli of_point = laws_.moduli(static_cast<std::size_t>(point_[i]));
+    of_point.lambda = std::min(of_point.lambda, (most - 2.0 / 3) * of_point.mu);
+    const SpringModuli moduli = spring_moduli(body_.space(), of_point);
     // A point without a spring stands alone, as stiff as its like.
-    stretch_[i] = m > 0 ? moduli.stretch / m : moduli.stretch * rows_[4 * i + 3] / (body.spacing() * body.spacing());
+    stretch_[i] = m > 0 ? moduli.stretch / m : moduli.stretch * rows_[4 * i + 3] / (body_.spacing() * body_.spacing());
     slide_[i] = m > 0 ? moduli.slide / m : 0;
   }
 }

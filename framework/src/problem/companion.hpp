@@ -21,7 +21,10 @@ namespace perikit {
 /// bonds between their ends do, to a thousandth: what longer bonds still hold together stays so.
 class Companion {
  public:
+  /// Both must outlive it.
   Companion(const Families& families, const Laws& laws);
+  /// Bulk moduli count as at most so many shear moduli from now on.
+  void limit_bulk(double most);
   /// K at u, a pattern of nearest neighbours, with the bonds as they are. Deterministic for any number of threads.
   void assemble(ConstFieldView u, BlockMatrix& K) const;
 
@@ -32,7 +35,9 @@ class Companion {
   double influence(double xi2) const noexcept { return dimension_ == 3 ? 1 : 1 / xi2; }
 
   const Families& families_;
+  const Laws& laws_;
   const Body& body_;
+  double most_bulk_ = 0;                 ///< that stretch_ and slide_ know
   int dimension_;
   std::vector<std::int32_t> point_;      ///< field indices of live points, ascending
   std::vector<double> rows_;             ///< of them {x, y, z, V}

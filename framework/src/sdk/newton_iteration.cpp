@@ -54,6 +54,7 @@ class Iteration {
     fill(0.0, du_);
     if (!equations_.solve(equilibrium_, r_, accuracy, du_, note, failure)) return false;
     if (gap_ > 0) combine(1, du_, 1, missing_, du_);
+    equations_.refine(equilibrium_, u_, du_, note);
     return true;
   }
 

@@ -106,6 +106,11 @@ std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const 
   });
 }
 
+std::unique_ptr<VolumetricRows> Mechanics::make_volumetric_rows() const {
+  const Formulation& f = parts_.formulation;
+  return f.selective() && f.force_state == ForceState::variational ? perikit::make_volumetric_rows(parts_) : nullptr;
+}
+
 void Mechanics::report(ModelReport& report) const {
   space_->report(report);
   if (history_) report.bytes += history_->bytes();

@@ -1,4 +1,5 @@
 #pragma once
+#include "assembly/volumetric_rows.hpp"
 #include "perikit/operators/law_history.hpp"
 #include "spaces/consistency.hpp"
 #include "spaces/evaluation_space.hpp"
@@ -31,6 +32,8 @@ class Mechanics final : public Term {
   /// A constant stress is in equilibrium from now on, where the body is whole.
   void balance(std::shared_ptr<CloudConsistency> consistency);
   void history_restored() { space_->history_restored(); }
+  /// Null where volumes are not those of point gradients.
+  std::unique_ptr<VolumetricRows> make_volumetric_rows() const;
 
  private:
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;

@@ -130,6 +130,8 @@ EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
   return status(bad);
 }
 
+std::unique_ptr<VolumetricRows> Terms::volumetric_rows() const { return mechanics_ ? mechanics_->make_volumetric_rows() : nullptr; }
+
 Terms::Assemblies& Terms::assemblies() {
   if (!assemblies_) {
     assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});

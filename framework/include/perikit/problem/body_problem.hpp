@@ -48,7 +48,8 @@ class BodyProblem final : public Problem {
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
   AssembledSize assembled_size() override;
-  void assemble_companion(ConstFieldView u, BlockMatrix& K) override;
+  void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override;
+  std::unique_ptr<VolumetricPart> volumetric_part() override;
   /// Of the present state.
   EvaluationStatus sample(PointSamples& samples);
   bool constant_stiffness() const noexcept override;

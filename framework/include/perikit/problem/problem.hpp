@@ -2,6 +2,7 @@
 /// What an integrator runs: values, which it may read and change, and operations, which the terms of the problem do for it.
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "perikit/core/block_matrix.hpp"
@@ -11,6 +12,7 @@
 #include "perikit/problem/loads.hpp"
 #include "perikit/problem/masses.hpp"
 #include "perikit/problem/state.hpp"
+#include "perikit/problem/volumetric_part.hpp"
 
 namespace perikit {
 
@@ -61,8 +63,12 @@ class Problem {
   /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
   virtual AssembledSize assembled_size() = 0;
   /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap, spectrally
-  /// close to the tangent. For preconditioners. Pattern and values as with assemble_tangent.
-  virtual void assemble_companion(ConstFieldView u, BlockMatrix& K) = 0;
+  /// close to the tangent. For preconditioners. Pattern and values as with assemble_tangent. Bulk moduli count as at most so many
+  /// shear moduli.
+  virtual void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) = 0;
+  /// What of the tangent resists changes of the volumes of points; null where volumes are not those of points. The problem must
+  /// outlive it.
+  virtual std::unique_ptr<VolumetricPart> volumetric_part() = 0;
   /// False where the stiffness can change during the run (nonlinear laws, failing bonds): estimates of it do not last.
   virtual bool constant_stiffness() const noexcept = 0;
 

@@ -19,6 +19,8 @@ class LinearisedProblem {
   virtual bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) = 0;
   /// True where solve() is as good as exact.
   virtual bool exact() const noexcept = 0;
+  /// du, prescribed components included, is about to be added to u: it may become better than linear equations can be. Adds to `note`.
+  virtual void refine(Equilibrium&, ConstFieldView /*u*/, FieldView /*du*/, std::string& /*note*/) {}
   /// See EquilibriumSolver.
   virtual void bonds_changed() {}
 };

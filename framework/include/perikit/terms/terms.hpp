@@ -24,6 +24,7 @@ class Families;
 class Mechanics;
 struct CloudConsistency;
 class Term;
+class VolumetricRows;
 
 /// What the terms of a formulation are made of. families, laws and damage must outlive them.
 struct TermParts {
@@ -53,6 +54,10 @@ class Terms {
   /// no more points.
   AssembledSize assembled_size();
   EvaluationStatus sample(ConstFieldView u, PointSamples& samples);
+  /// The volumetric part of the tangent where the map is selective, else null. The terms must outlive it.
+  std::unique_ptr<VolumetricRows> volumetric_rows() const;
+  /// That evaluation met this inadmissible point (field index), or none (-1).
+  EvaluationStatus status(std::int64_t bad) const;
 
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
@@ -83,7 +88,6 @@ class Terms {
  private:
   struct Assemblies;
   struct Failing;
-  EvaluationStatus status(std::int64_t bad) const;
   void bonds_changed(std::span<const std::int32_t> points);
   Assemblies& assemblies();
 

@@ -1,0 +1,73 @@
+#include "mixed_equations.hpp"
+
+#include <fmt/format.h>
+#include <sunlinsol/sunlinsol_spfgmr.h>
+
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+MixedEquations::MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes)
+    : max_restarts_(options.max_restarts),
+      restart_(options.restart),
+      action_(problem, options.differences),
+      system_(problem, std::move(volumes)),
+      right_(system_.make_vector()),
+      solution_(system_.make_vector()),
+      right_vector_(wrap(problem, right_, context_)),
+      solution_vector_(wrap(problem, solution_, context_)) {
+  gmres_.reset(SUNLinSol_SPFGMR(right_vector_.get(), SUN_PREC_RIGHT, options.restart, context_));
+  if (!gmres_) throw RunError("SUNDIALS gives no GMRES solver: not enough memory?");
+  SUNLinSolSetATimes(gmres_.get(), this, multiply);
+  SUNLinSolSetPreconditioner(gmres_.get(), this, nullptr, precondition);
+  SUNLinSolInitialize(gmres_.get());
+}
+
+bool MixedEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  action_.move_to(u);
+  return system_.linearise(equilibrium, action_.state(), failure);
+}
+
+bool MixedEquations::apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) {
+  return action_.apply(equilibrium, w, Kw, failure);
+}
+
+int MixedEquations::multiply(void* self, N_Vector x, N_Vector y) {
+  auto& own = *static_cast<MixedEquations*>(self);
+  const auto K = [&](ConstFieldView w, FieldView Kw) { return own.apply(*own.equilibrium_, w, Kw, own.failure_); };
+  return own.system_.multiply(K, field_of(x), field_of(y)) ? 0 : -1;
+}
+
+int MixedEquations::precondition(void* self, N_Vector r, N_Vector z, realtype, int) {
+  static_cast<MixedEquations*>(self)->system_.precondition(field_of(r), field_of(z));
+  return 0;
+}
+
+bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
+                           std::string& failure) {
+  equilibrium_ = &equilibrium;
+  failure_.clear();
+  fill(0.0, right_);
+  fill(0.0, solution_);
+  copy(rhs, system_.displacement(right_));
+  const double size = norm(rhs);
+  SUNLinSol_SPFGMRSetMaxRestarts(gmres_.get(), max_restarts_);
+  SUNLinSolSetup(gmres_.get(), nullptr);
+  const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution_vector_.get(), right_vector_.get(), accuracy * size);
+  copy(system_.displacement(solution_), du);
+  const int iterations = SUNLinSolNumIters(gmres_.get());
+  const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
+  note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
+  if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;
+  failure = !failure_.empty() ? failure_
+                              : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})",
+                                            reached, iterations, restart_);
+  return false;
+}
+
+void MixedEquations::refine(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
+  const auto [before, after] = system_.correct(u, 0.1 * equilibrium.tolerance() * equilibrium.reference(), du);
+  if (after < before) note += fmt::format("  volumes {:.1e} to {:.1e}", before, after);
+}
+
+}  // namespace perikit

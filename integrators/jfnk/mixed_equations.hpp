@@ -1,0 +1,34 @@
+#pragma once
+#include "../shared/mixed_system.hpp"
+#include "jfnk.hpp"
+
+namespace perikit {
+
+/// The linearised equations of nearly incompressible bodies: displacements and pressures by SUNDIALS' flexible GMRES (the inner
+/// iterations make each product with the preconditioner a little different).
+class MixedEquations final : public LinearisedProblem {
+ public:
+  MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes);
+  bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
+  bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
+  bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
+             std::string& failure) override;
+  void refine(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) override;
+  bool exact() const noexcept override { return false; }
+
+ private:
+  static int multiply(void* self, N_Vector x, N_Vector y);
+  static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
+
+  int max_restarts_, restart_;
+  TangentAction action_;
+  MixedSystem system_;
+  SundialsContext context_;
+  Field right_, solution_;
+  FieldVector right_vector_, solution_vector_;
+  KrylovSolver gmres_;
+  Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
+  std::string failure_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,151 @@
+#include "volume_equations.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "block_product.hpp"
+#include "perikit/core/field_operations.hpp"
+
+namespace perikit {
+
+namespace {
+
+constexpr double schur_accuracy = 0.1;  // of the two solves with L: a better one saves few iterations of the outer method
+constexpr double correction_accuracy = 0.05;
+constexpr int most_products = 200, most_corrections = 3;
+
+}  // namespace
+
+VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
+    : problem_(problem), volumes_(std::move(volumes)) {
+  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &scaled_, &direction_, &product_,
+                        &first_, &second_})
+    *scalar = problem.body().make_field(1);
+  for (Field* vector : {&inverse_D_, &force_, &action_}) *vector = problem.make_field();
+}
+
+EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix& companion, ConstFieldView free) {
+  companion_ = &companion;
+  free_ = free;
+  EvaluationStatus status = volumes_->linearise(u);
+  if (!status.ok()) return status;
+  const auto d = static_cast<std::size_t>(companion.dimension);
+  parallel_for(companion.rows(), [&](std::size_t r) {
+    for (std::int64_t b = companion.row_first[r]; b < companion.row_first[r + 1]; ++b) {
+      const auto block = static_cast<std::size_t>(b);
+      if (static_cast<std::size_t>(companion.column[block]) != r) continue;
+      for (std::size_t a = 0; a < d; ++a) {
+        const auto p = static_cast<std::size_t>(companion.point[r]);
+        const double stiffness = companion.values[(block * d + a) * d + a];  // images have none
+        inverse_D_.component(static_cast<int>(a))[p] =
+            stiffness > 0 && free.component(static_cast<int>(a))[p] != 0 ? 1 / stiffness : 0.0;
+      }
+    }
+  });
+  fill(1.0, force_);
+  volumes_->squares(force_, row_norms_);
+  volumes_->squares(inverse_D_, inverse_diagonal_);
+  for (Field* scalar : {&W_, &inverse_W_, &active_}) fill(0.0, *scalar);
+  for (const std::int32_t index : problem_.body().owned()) {
+    const auto p = static_cast<std::size_t>(index);
+    const double excess = volumes_->stiffness().data[p] - ordinary * problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    row_norms_.data()[p] = std::sqrt(row_norms_.data()[p]);
+    if (excess <= 0) continue;
+    W_.data()[p] = excess;
+    inverse_W_.data()[p] = 1 / excess;
+    active_.data()[p] = 1;
+    inverse_diagonal_.data()[p] = 1 / (inverse_diagonal_.data()[p] + 1 / excess);
+  }
+  mask(active_, inverse_diagonal_);
+  return status;
+}
+
+void VolumeEquations::rates(ConstFieldView w, FieldView q) const {
+  volumes_->rates(w, q);
+  mask(active_, q);
+}
+
+void VolumeEquations::forces(ConstFieldView q, FieldView f) const {
+  volumes_->forces(q, f);
+  mask(free_, f);
+}
+
+void VolumeEquations::multiply(ConstFieldView p, FieldView Lp) {
+  forces(p, force_);
+  mask(inverse_D_, force_);
+  rates(force_, Lp);
+  over_blocks(p.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) Lp.data[k] += inverse_W_.data()[k] * p.data[k];
+  });
+}
+
+void VolumeEquations::multiply_commutator(ConstFieldView p, FieldView Mp) {
+  forces(p, force_);
+  mask(inverse_D_, force_);
+  perikit::multiply(*companion_, force_, action_);
+  mask(inverse_D_, action_);
+  rates(action_, Mp);
+  over_blocks(p.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) Mp.data[k] += inverse_W_.data()[k] * p.data[k];
+  });
+}
+
+void VolumeEquations::solve(ConstFieldView b, double accuracy, FieldView x) {
+  fill(0.0, x);
+  copy(b, residual_);
+  const auto scale = [&] {
+    copy(residual_, scaled_);
+    mask(inverse_diagonal_, scaled_);
+    return dot(residual_, scaled_);
+  };
+  double size = scale();
+  const double target = accuracy * accuracy * size;
+  copy(scaled_, direction_);
+  for (int k = 0; k < most_products && size > target; ++k) {
+    multiply(direction_, product_);
+    const double step = size / dot(direction_, product_), last = size;
+    combine(1, x, step, direction_, x);
+    combine(1, residual_, -step, product_, residual_);
+    size = scale();
+    combine(1, scaled_, size / last, direction_, direction_);
+  }
+}
+
+void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
+  solve(r, schur_accuracy, first_);
+  multiply_commutator(first_, second_);
+  solve(second_, schur_accuracy, p);
+}
+
+std::pair<double, double> VolumeEquations::correct(ConstFieldView u, double enough, FieldView du) {
+  Field target = problem_.body().make_field(1), error = problem_.body().make_field(1), moved = problem_.make_field();
+  volumes_->rates(du, target);
+  combine(1, target, 1, volumes_->logarithms(), target);
+  double before = 0, last = 0;
+  for (int round = 0;; ++round) {
+    combine(1, u, 1, du, moved);
+    const bool admissible = volumes_->linearise(moved).ok();
+    if (!admissible && round == 0) return {0, 0};  // the line search will look into it
+    combine(1, volumes_->logarithms(), -1, target, error);
+    mask(active_, error);
+    const double size = admissible ? norm(error) : std::numeric_limits<double>::infinity();
+    if (round == 0) before = size;
+    if (round > 0 && !(size < last)) {
+      combine(1, du, 1, action_, du);  // the last correction was none
+      return {before, last};
+    }
+    last = size;
+    copy(error, second_);
+    mask(W_, second_);
+    forces(second_, force_);
+    if (round == most_corrections || norm(force_) <= enough) return {before, size};
+    // The least motion z in the norm of D with B z = -error: z = -D^-1 B^T (B D^-1 B^T)^-1 error.
+    solve(error, correction_accuracy, first_);
+    forces(first_, action_);
+    mask(inverse_D_, action_);
+    combine(1, du, -1, action_, du);
+  }
+}
+
+}  // namespace perikit

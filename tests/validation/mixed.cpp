@@ -1,0 +1,124 @@
+/// Mixed systems of displacements and pressures: nearly incompressible bodies at about the cost of compressible ones.
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+#include "perikit/core/parallel.hpp"
+#include "tests/validation/quasi_static.hpp"
+
+using namespace perikit;
+using namespace perikit::validation;
+
+namespace {
+
+/// A rubber block of cells^d points on three held layers, pulled and sheared by its other end. more: further keys.
+std::string scene(int dimension, int cells, double ratio, const std::string& integrator, const std::string& jitter = "0",
+                  const std::string& more = "") {
+  const bool solid = dimension == 3;
+  return fmt::format(
+      "format = 1\n[body]\ndimension = {0}\n{1}[body.lattice]\nspacing = {2:.17g}\nlower = [{3}{4:.17g}]\nupper = [{5}1]\njitter "
+      "= {6}\n"
+      "[sets]\nheld = \"{7} < 0\"\nend = \"{7} > 1 - {2:.17g}\"\n[family]\nhorizon_ratio = 2.015\ninfluence = \"cubic_spline\"\n"
+      "[kinematics]\ntype = \"selective\"\nbase = \"baqp\"\n"
+      "[material]\ntype = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = {8}\n"
+      "[[boundary]]\nset = \"held\"\ndisplacement = [{9}]\n[[load]]\nset = \"end\"\nforce = [{10}]\n{11}[integrator]\n{12}\n",
+      dimension, solid ? "" : "plane = \"strain\"\n", 1.0 / cells, solid ? "0, 0, " : "0, ", -3.0 / cells,
+      solid ? "1, 1, " : "1, ", jitter, solid ? "z" : "y", ratio, solid ? "0, 0, 0" : "0, 0",
+      solid ? "0.05, 0, 0.1" : "0.05, 0.1", more, integrator);
+}
+
+std::string jfnk(const std::string& preconditioner, double tolerance = 1e-8) {
+  return fmt::format("type = \"jfnk\"\nsteps = 1\ntolerance = {}\npreconditioner = \"{}\"", tolerance, preconditioner);
+}
+const std::string newton = "type = \"newton\"\nsteps = 1\ntolerance = 1e-10";
+
+std::unique_ptr<Simulation> make(const std::string& text) {
+  registry();
+  return contract::build(text);
+}
+
+/// Iterations of GMRES of a whole run.
+int krylov_iterations(const Protocol& protocol) {
+  int sum = 0;
+  for (std::size_t at = protocol.text.find("gmres"); at != std::string::npos; at = protocol.text.find("gmres", at + 1))
+    sum += std::stoi(protocol.text.substr(at + 5));
+  return sum;
+}
+
+double distance(Simulation& a, Simulation& b) {
+  double most = 0;
+  for (const std::int32_t p : a.problem().body().internal())
+    for (int c = 0; c < a.problem().dimension(); ++c)
+      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] -
+                                     b.problem().state().displacement().component(c)[p]));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("Krylov iterations hardly grow with the bulk modulus") {
+  const Protocol soft = run(*make(scene(3, 8, 5, jfnk("auto")))), hard = run(*make(scene(3, 8, 1e4, jfnk("auto"))));
+  MESSAGE(krylov_iterations(soft), " iterations with kappa/mu = 5, ", krylov_iterations(hard), " with 1e4");
+  CHECK(soft.text.find("preconditioner companion") != std::string::npos);
+  CHECK(hard.text.find("preconditioner mixed") != std::string::npos);
+  CHECK(hard.reports.back().residual <= 1e-8);
+  CHECK(krylov_iterations(hard) <= 3 * krylov_iterations(soft));
+  CHECK(hard.iterations() <= soft.iterations() + 1);
+}
+
+TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D, with differences too") {
+  struct Variant {
+    int dimension, cells;
+    std::string jitter, more, keys;
+  };
+  const std::string symmetric = "[[symmetry]]\naxis = \"x\"\n";
+  for (const auto& [dimension, cells, jitter, more, keys] :
+       {Variant{3, 4, "0", "", ""}, Variant{3, 4, "0.1", "", ""}, Variant{2, 9, "0", "", "\ntangent = \"differences\""},
+        Variant{2, 9, "0", symmetric, ""}, Variant{2, 9, "0.1", symmetric, ""}}) {
+    for (const double ratio : {5.0, 1e4}) {
+      INFO(dimension, "D, kappa/mu = ", ratio, ", jitter ", jitter, " ", more);
+      const auto exact = make(scene(dimension, cells, ratio, newton, jitter, more)),
+                 found = make(scene(dimension, cells, ratio, jfnk("mixed", 1e-9) + keys, jitter, more));
+      run(*exact);
+      run(*found);
+      CHECK(mean(*exact, "end", dimension - 1) > 1e-3);
+      CHECK(distance(*exact, *found) < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("bonds that fail: newton's solution and newton's bonds") {
+  const std::string damage = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n";
+  const auto exact = make(scene(2, 9, 1000, newton, "0", damage)),
+             found = make(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
+  run(*exact);
+  run(*found);
+  CHECK(!exact->problem().terms().changed_bonds().empty());
+  CHECK(exact->problem().terms().changed_bonds().size() == found->problem().terms().changed_bonds().size());
+  CHECK(distance(*exact, *found) < 1e-6);
+}
+
+TEST_CASE("bitwise the same for any number of threads") {
+  std::vector<std::unique_ptr<Simulation>> found;
+  const int before = thread_count();
+  for (const int threads : {1, 3}) {
+    set_thread_count(threads);
+    found.push_back(make(scene(3, 5, 1e4, jfnk("mixed"))));
+    run(*found.back());
+  }
+  set_thread_count(before);
+  CHECK(distance(*found[0], *found[1]) == 0);
+}
+
+TEST_CASE("mixed is refused without point volumes, and by kinsol") {
+  std::string plain = scene(3, 3, 5, jfnk("mixed"));
+  plain.replace(plain.find("\"selective\"\nbase = \"baqp\""), std::strlen("\"selective\"\nbase = \"baqp\""), "\"baqp\"");
+  Protocol protocol;
+  CHECK_THROWS_WITH(make(plain)->run(protocol),
+                    doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective"));
+  CHECK_THROWS_WITH(make(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
+}
