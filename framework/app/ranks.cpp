@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/serial_communicator.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace perikit::app {
@@ -16,17 +17,11 @@ namespace perikit::app {
 namespace {
 
 /// A rank without others: it sets itself up as if they were there.
-class LoneRank final : public Communicator {
+class LoneRank final : public SerialCommunicator {
  public:
   LoneRank(int rank, int size) : rank_(rank), size_(size) {}
   int rank() const noexcept override { return rank_; }
   int size() const noexcept override { return size_; }
-  void sum(std::span<std::int64_t>) override {}
-  double largest(double value) override { return value; }
-  void exchange(std::span<const Message>) override {}
-  std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override { return {{bytes.begin(), bytes.end()}}; }
-  void broadcast(std::vector<std::byte>&) override {}
-  [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
 
  private:
   int rank_, size_;

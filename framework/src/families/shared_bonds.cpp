@@ -8,6 +8,33 @@
 
 namespace perikit {
 
+namespace {
+
+/// On rank 0 what all ranks have, rank by rank.
+template <class T>
+std::vector<T> gathered(std::span<const T> mine) {
+  std::vector<T> all;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(mine))) {
+    const std::size_t before = all.size();
+    all.resize(before + of_rank.size() / sizeof(T));
+    if (!of_rank.empty()) std::memcpy(all.data() + before, of_rank.data(), of_rank.size());
+  }
+  return all;
+}
+
+/// What rank 0 has.
+template <class T>
+std::vector<T> told_to_all(const std::vector<T>& mine) {
+  const auto own = std::as_bytes(std::span(mine));
+  std::vector<std::byte> bytes(own.begin(), own.end());
+  communicator().broadcast(bytes);
+  std::vector<T> told(bytes.size() / sizeof(T));
+  if (!bytes.empty()) std::memcpy(told.data(), bytes.data(), bytes.size());
+  return told;
+}
+
+}  // namespace
+
 /// On rank 0 those of all ranks, by places in the whole body.
 std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) const {
   const auto place = body_.places().place;
@@ -15,12 +42,7 @@ std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) co
   // Points have the order here that they have in the whole body: the smaller index stays the smaller one.
   for (const auto& [bond, integrity] : mine)
     named.push_back({{place[static_cast<std::size_t>(bond.point)], place[static_cast<std::size_t>(bond.far)]}, integrity});
-  std::vector<BondChange> all;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(named)))) {
-    const std::size_t before = all.size();
-    all.resize(before + of_rank.size() / sizeof(BondChange));
-    if (!of_rank.empty()) std::memcpy(&all[before], of_rank.data(), of_rank.size());
-  }
+  std::vector<BondChange> all = gathered<BondChange>(named);
   std::ranges::sort(all, {}, &BondChange::bond);
   const auto rest = std::ranges::unique(all, {}, &BondChange::bond);
   all.erase(rest.begin(), rest.end());
@@ -39,14 +61,8 @@ void SharedBonds::mark(GroupMarks& marks) const {
   std::vector<std::int32_t> mine;
   for (const std::int32_t p : body_.owned())
     if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
-  std::vector<std::byte> bytes;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine))))
-    bytes.insert(bytes.end(), of_rank.begin(), of_rank.end());
-  communicator().broadcast(bytes);
-  std::vector<std::int32_t> all(bytes.size() / sizeof(std::int32_t));
-  if (!bytes.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
   find_here();
-  for (const std::int32_t place : all)
+  for (const std::int32_t place : told_to_all(gathered<std::int32_t>(mine)))
     if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
 }
 
@@ -73,13 +89,8 @@ std::vector<BondId> SharedBonds::of_all(std::span<const BondId> bonds) const {
   if (!part()) return {bonds.begin(), bonds.end()};
   std::vector<BondChange> mine;
   for (const BondId bond : bonds) mine.push_back({bond, 0.0});
-  const std::vector<BondChange> all = merged(mine);
-  std::vector<std::byte> bytes(std::as_bytes(std::span(all)).begin(), std::as_bytes(std::span(all)).end());
-  communicator().broadcast(bytes);
-  std::vector<BondChange> told(bytes.size() / sizeof(BondChange));
-  if (!bytes.empty()) std::memcpy(told.data(), bytes.data(), bytes.size());
   std::vector<BondId> here;
-  for (const BondChange& change : inward(told)) here.push_back(change.bond);
+  for (const BondChange& change : inward(told_to_all(merged(mine)))) here.push_back(change.bond);
   return here;
 }
 

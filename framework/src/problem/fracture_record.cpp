@@ -48,21 +48,9 @@ void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   }
 }
 
-void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
-  in.value<std::int64_t>();  // updates that gained energy, and what they gained
-  in.value<double>();
-  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
-    BondChange b;
-    b.bond.point = in.value<std::int32_t>();
-    b.bond.far = in.value<std::int32_t>();
-    b.integrity = in.value<double>();
-    bonds.push_back(b);
-  }
-}
+namespace {
 
-void FractureRecord::read(Terms& terms, ByteReader& in) {
-  gains_ = in.value<std::int64_t>();
-  gained_ = in.value<double>();
+std::vector<BondChange> read_changes(ByteReader& in) {
   std::vector<BondChange> bonds;
   for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
     BondChange b;
@@ -71,7 +59,21 @@ void FractureRecord::read(Terms& terms, ByteReader& in) {
     b.integrity = in.value<double>();
     bonds.push_back(b);
   }
-  terms.restore_bonds(bonds);
+  return bonds;
+}
+
+}  // namespace
+
+void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
+  in.value<std::int64_t>();  // updates that gained energy, and what they gained
+  in.value<double>();
+  bonds = read_changes(in);
+}
+
+void FractureRecord::read(Terms& terms, ByteReader& in) {
+  gains_ = in.value<std::int64_t>();
+  gained_ = in.value<double>();
+  terms.restore_bonds(read_changes(in));
 }
 
 }  // namespace perikit
