@@ -60,7 +60,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   text += fmt::format("[sets]\npart = \"x < {:.17g}\"\n", 0.4 * o.scale * cells[0]) + o.sets;
   text += fmt::format("[family]\nhorizon_ratio = {}\ninfluence = {}\n", o.horizon_ratio,
                       o.influence.find('=') == std::string::npos ? "\"" + o.influence + "\"" : "{ " + o.influence + " }");
-  if (o.consistent) text += "consistent = true\n";
+  if (o.cloud) text += fmt::format("consistent = {}\n", o.consistent);
   text += "[kinematics]\n" + kinematics + "\n[material]\n" + o.material + "\n";
   if (o.two_materials) {
     text += fmt::format("[[region]]\nset = \"part\"\nmaterial = {{ type = \"neo_hookean\", density = 2.0, shear_modulus = {:.17g}, bulk_modulus = {:.17g} }}\n",

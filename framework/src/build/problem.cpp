@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "build/conditions.hpp"
@@ -102,28 +103,48 @@ std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& 
   }
 }
 
-/// What is asked of a cloud with consistent = true; null where it is not.
-std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const ProblemParts& parts,
-                                                    const Formulation& formulation) {
-  if (!scene.consistent.value_or(false)) return nullptr;
-  const auto refuse = [&](const std::string& found, const std::string& allowed) {
-    throw InputError(scene.consistent_position, "family.consistent", fmt::format("found true {}; allowed: {}", found, allowed));
-  };
+/// Why no weights or gradients balance a constant stress on this body: what it is, and what there is instead. Nothing where some do.
+struct Unbalanced {
+  std::string found, allowed;
+};
+std::optional<Unbalanced> unbalanced(const Scene& scene, const ProblemParts& parts, const Formulation& formulation) {
   if (parts.body->lattice())
-    refuse("on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0");
-  if (parts.partition) refuse("with several ranks", "one rank");
+    return Unbalanced{"on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0"};
   const auto of = [&](const char* what) { return fmt::format("with kinematics \"{}\"{}", scene.kinematics->type, what); };
   if (formulation.pairs)
-    refuse(of(", a pair law, which has neither weights nor gradients to choose"), "kinematics with gradients");
+    return Unbalanced{of(", a pair law, which has neither weights nor gradients to choose"), "kinematics with gradients"};
   if (formulation.force_state == ForceState::local)
-    refuse("with force_state = \"local\", whose forces are not -dE/du", "force_state = \"variational\"");
+    return Unbalanced{of(" and force_state = \"local\", whose forces are not -dE/du"), "force_state = \"variational\""};
   const bool moves_gradients = formulation.point || formulation.selective();
-  if (moves_gradients && formulation.order > 1) refuse(of(" of order 2 or more"), "order = 1");
+  if (moves_gradients && formulation.order > 1) return Unbalanced{of(" of order 2 or more"), "order = 1"};
   if (formulation.selective() && formulation.weighted)
-    refuse(of(" over this base"), "a base with a point gradient in its bonds: baqp, projection, bond_augmented");
+    return Unbalanced{of(" over this base"), "a base with a point gradient in its bonds: baqp, projection, bond_augmented"};
   if (formulation.weighted && formulation.parts(parts.body->dimension()) == 1)
-    refuse(of(" and one part"), "several parts, or kinematics \"conventional\"");
+    return Unbalanced{of(" and one part"), "several parts, or kinematics \"conventional\""};
+  return std::nullopt;
+}
+
+/// What is asked of points that lie at random, unless the scene says consistent = false; null where nothing is. Where nothing
+/// can be, a scene that says true is refused, and others get a warning.
+std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const ProblemParts& parts, const Formulation& formulation,
+                                                    std::vector<std::string>& warnings) {
+  if (!scene.consistent.value_or(scene.random_points())) return nullptr;
+  if (const auto reason = unbalanced(scene, parts, formulation)) {
+    if (scene.consistent)
+      throw InputError(scene.consistent_position, "family.consistent",
+                       fmt::format("found true {}; allowed: {}", reason->found, reason->allowed));
+    warnings.push_back(
+        fmt::format("points that lie at random {}: a constant stress is not in equilibrium, and the body is too soft, however "
+                    "fine it is; consistent clouds need {}",
+                    reason->found, reason->allowed));
+    return nullptr;
+  }
   auto consistency = std::make_shared<CloudConsistency>();
+  if (parts.partition) {
+    const auto ghosts = std::make_shared<Ghosts>(*parts.partition, *parts.body, parts.body->dimension() + 1);
+    consistency->extend = consistency->copy_from_sources = [ghosts](FieldView values) { ghosts->forward(values); };
+    consistency->fold = [ghosts](FieldView force) { ghosts->clear(force); };
+  }
   if (const ImageMap* images = parts.images.get()) {
     consistency->extend = [images](FieldView u) { images->extend(u); };
     consistency->fold = [images](FieldView force) { images->fold(force); };
@@ -175,7 +196,8 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
   of_terms.damage = parts.fracture.damage();
   steps.begin("weights");
-  of_terms.consistency = build_consistency(scene, parts, of_terms.formulation);
+  std::vector<std::string> warnings;
+  of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   steps.begin("evaluation points");
   parts.terms = std::make_unique<Terms>(of_terms);
@@ -188,6 +210,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
+  parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};

@@ -32,8 +32,6 @@ void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const I
     if (scene.loads[k].type == LoadDescription::Type::pressure)
       refuse(scene.loads[k].position, fmt::format("load.{}.pressure", k), "a pressure",
              fmt::format("traction on a face, or {}", threads));
-  if (scene.consistent.value_or(false))
-    refuse(scene.consistent_position, "family.consistent", "true", fmt::format("false, or {}", threads));
   if (!scene.symmetries.empty()) refuse(scene.symmetries.front().position, "symmetry.0", "a plane of symmetry", threads);
   if (!scene.periodics.empty()) refuse(scene.periodics.front().position, "periodic.0", "periodic sides", threads);
 }

@@ -8,15 +8,11 @@ namespace perikit {
 
 std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) {
   std::vector<std::string> lines;
-  const Body& body = problem.body();
-  const bool random = scene.body.points_file || (scene.body.lattice && scene.body.lattice->jitter > 0);
-  if (random && !scene.consistent.value_or(false)) {
-    lines.push_back(problem.terms().has_gradients() ? "a cloud without consistent = true in [family]: a constant stress is not "
-                                                      "in equilibrium on points that lie at random, and the body is too "
-                                                      "soft by 1 to 12 %, however fine it is"
-                                                    : "a pair law on a cloud: a constant stress is not in equilibrium on points "
-                                                      "that lie at random, and the body is too soft, however fine it is");
-  }
+  const Body& body = problem.whole();
+  if (scene.random_points() && !scene.consistent.value_or(true) && problem.terms().has_gradients())
+    lines.push_back(
+        "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
+        "the body is too soft by 1 to 12 %, however fine it is");
   for (int a = 0; a < body.dimension(); ++a) {
     const auto c = static_cast<std::size_t>(a);
     double low = body.position(static_cast<std::size_t>(body.internal()[0]))[c],

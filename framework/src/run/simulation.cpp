@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <string_view>
 
 #include "perikit/build/problem.hpp"
 #include "perikit/core/communicator.hpp"
@@ -99,6 +101,17 @@ void Simulation::run(Observer& observer) {
 
 namespace {
 
+/// On rank 0 those of the lines that all ranks have. All of them must call it.
+std::vector<std::string> said_by_all(const std::vector<std::string>& lines) {
+  const std::string mine = fmt::format("{}\n", fmt::join(lines, "\n"));
+  std::vector<std::string> left = lines;
+  for (const std::vector<std::byte>& bytes : communicator().gather(std::as_bytes(std::span(mine)))) {
+    const std::string other = fmt::format("\n{}", std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    std::erase_if(left, [&](const std::string& line) { return other.find(fmt::format("\n{}\n", line)) == std::string::npos; });
+  }
+  return left;
+}
+
 /// How the body lies on ranks. All of them must call it.
 std::string ranks_summary(const BodyProblem& problem) {
   const Partition& partition = *problem.partition();
@@ -129,18 +142,27 @@ std::string Simulation::summary() {
   if (problem_->images())
     text +=
         fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
-  if (problem_->partition()) return text + ranks_summary(*problem_) + plan();
+  std::int64_t singular = static_cast<std::int64_t>(report.singular_families);
+  communicator().sum({&singular, 1});
+  std::vector<std::string> lines;
+  if (singular > 0)
+    lines.push_back(
+        fmt::format("warning       {} points have {}", singular,
+                    problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds"));
+  for (const std::string& warning : problem_->warnings()) lines.push_back(fmt::format("warning       {}", warning));
+  for (const auto& [label, note] : report.notes) lines.push_back(fmt::format("{:<13} {}", label, note));
+  for (const std::string& warning : doubts(scene_, *problem_)) lines.push_back(fmt::format("warning       {}", warning));
+  for (const std::string& warning : report.warnings) lines.push_back(fmt::format("warning       {}", warning));
+  if (problem_->partition()) {
+    text += ranks_summary(*problem_);
+    // Counts of bonds and of evaluation points are of each rank, with its ghosts.
+    for (const std::string& line : said_by_all(lines)) text += line + "\n";
+    return text + plan();
+  }
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds,
                       static_cast<double>(report.bonds) / static_cast<double>(body.points()));
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
-  if (report.singular_families > 0) {
-    text += fmt::format("warning       {} points have {}\n", report.singular_families,
-                        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds");
-  }
-  for (const std::string& warning : problem_->warnings()) text += fmt::format("warning       {}\n", warning);
-  for (const auto& [label, note] : report.notes) text += fmt::format("{:<13} {}\n", label, note);
-  for (const std::string& warning : doubts(scene_, *problem_)) text += fmt::format("warning       {}\n", warning);
-  for (const std::string& warning : report.warnings) text += fmt::format("warning       {}\n", warning);
+  for (const std::string& line : lines) text += line + "\n";
   if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
   if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
     text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";

@@ -101,7 +101,8 @@ ParameterTable family_parameters() {
       .by_default("false");
   table.boolean(
       "consistent",
-      "Clouds: weights of evaluation points with which a constant stress is in equilibrium inside of the body, as on a lattice.");
+      "Clouds: weights of evaluation points, or point gradients, with which a constant stress is in equilibrium inside of the body, as on a "
+      "lattice. true unless given for [body.points] and lattices with jitter, where the kinematics allow it.");
   table.exactly(1, {"horizon_ratio", "horizon"});
   return table;
 }

@@ -13,38 +13,45 @@ namespace perikit {
 
 /// Residuals below this are rounding.
 inline constexpr double rounding_residual = 2e-13;
+/// Residuals below this change the stiffness of a body by less than 0.1 %.
+inline constexpr double enough_residual = 5e-3;
 
-/// As many iterations as small clouds need to come to rounding; large ones get by with a smaller residual.
-inline int most_iterations(std::size_t points) {
-  return static_cast<int>(std::clamp(4e6 / static_cast<double>(points), 300.0, 4000.0));
-}
+/// How long a balance is sought for: until its residual is rounding, but no longer than `polish` iterations once it is enough,
+/// and never longer than `most`.
+struct BalanceEffort {
+  int polish, most;
+  bool ends(double residual, int iterations) const noexcept {
+    return residual <= rounding_residual || iterations >= (residual <= enough_residual ? polish : most);
+  }
+};
 
 /// x with A x = b, from the x that is there, to a residual of `wanted`; the number of iterations. Ends where the residual no
 /// longer falls, too.
 template <class System>
-int solve(System& system, const Field& b, double wanted, int most, Field& x) {
+int solve(System& system, const Field& b, double wanted, const BalanceEffort& effort, Field& x) {
   Field r = system.make(), z = r, direction = r, image = r;
   int iterations = 0;
   double best = 0;
   for (int restart = 0; restart < 4; ++restart) {
     system.apply(x, r);
     combine(1, b, -1, r, r);
-    const double now = system.largest(r);
-    if (now <= wanted || (restart > 0 && now > 0.5 * best)) break;
-    best = now;
+    double residual = system.largest(r);
+    if (residual <= wanted || (restart > 0 && residual > 0.5 * best)) break;
+    best = residual;
     system.precondition(r, z);
     copy(z, direction);
     double product = dot(r, z);
     const double start = product;
     int since = 0;
-    for (double least = product; iterations < most && product > 0; ++iterations) {
+    for (double least = product; !effort.ends(residual, iterations) && product > 0; ++iterations) {
       system.apply(direction, image);
       const double curvature = dot(direction, image);
       if (!(curvature > 0)) break;
       const double step = product / curvature;
       combine(1, x, step, direction, x);
       combine(1, r, -step, image, r);
-      if (system.largest(r) <= 0.5 * wanted) break;
+      residual = system.largest(r);
+      if (residual <= 0.5 * wanted) break;
       system.precondition(r, z);
       const double next = dot(r, z);
       since = next < 0.5 * least ? 0 : since + 1;

@@ -3,9 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "body/voronoi.hpp"
 #include "families/cloud_families.hpp"
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
@@ -22,14 +24,24 @@ struct Box {
 };
 
 Box box_of(const Body& body, std::span<const std::int32_t> points) {
-  const Point first = body.position(static_cast<std::size_t>(points.front()));
-  Box box{first, first};
+  constexpr double none = std::numeric_limits<double>::infinity();
+  Box box{{none, none, none}, {-none, -none, -none}};
   for (const std::int32_t p : points) box.add(body.position(static_cast<std::size_t>(p)));
   return box;
 }
 
+/// Of all ranks.
+Box whole_box_of(const Body& body, std::span<const std::int32_t> points) {
+  Box box = box_of(body, points);
+  for (std::size_t c = 0; c < 3; ++c) {
+    box.lower[c] = -communicator().largest(-box.lower[c]);
+    box.upper[c] = communicator().largest(box.upper[c]);
+  }
+  return box;
+}
+
 /// By point: 1 where its cell is open, 2 where its bonds are cut as well or its family is too poor; of images what their sources
-/// are.
+/// are, of points of other ranks what these say.
 Field open_cells(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {
   const Body& body = families.body();
   Box box = box_of(body, body.internal());
@@ -55,40 +67,45 @@ Field open_cells(const Families& families, const std::function<void(FieldView)>&
 class Normals {
  public:
   Normals(const CloudFamilies& families, const std::function<void(FieldView)>& copy_from_sources)
-      : families_(families), body_(families.body()), sides_(body_.make_field(3)) {
-    const Box own = box_of(body_, body_.owned()), all = box_of(body_, body_.internal());
+      : body_(families.body()), sides_(body_.make_field(3)), away_(sides_) {
+    const Box own = whole_box_of(body_, body_.owned()), all = whole_box_of(body_, body_.internal());
     for (const std::int32_t p : body_.owned()) {
-      const Point x = body_.position(static_cast<std::size_t>(p));
-      const double h = spacing_of(body_, static_cast<std::size_t>(p));
-      for (std::size_t c = 0; c < static_cast<std::size_t>(body_.dimension()); ++c) {
+      const auto at = static_cast<std::size_t>(p);
+      const Point x = body_.position(at);
+      const double h = spacing_of(body_, at);
+      for (int c = 0; c < body_.dimension(); ++c) {
+        const auto axis = static_cast<std::size_t>(c);
         // Sides with images beyond are none.
-        const bool below = x[c] < own.lower[c] + 0.75 * h && all.lower[c] == own.lower[c];
-        const bool above = x[c] > own.upper[c] - 0.75 * h && all.upper[c] == own.upper[c];
-        sides_.component(static_cast<int>(c))[p] = below || above;
+        const bool below = x[axis] < own.lower[axis] + 0.75 * h && all.lower[axis] == own.lower[axis];
+        const bool above = x[axis] > own.upper[axis] - 0.75 * h && all.upper[axis] == own.upper[axis];
+        sides_.component(c)[p] = below || above;
+      }
+      for (const std::int32_t j : families.neighbours(at)) {
+        const Point far = body_.position(static_cast<std::size_t>(j));
+        for (int c = 0; c < body_.dimension(); ++c) {
+          const auto axis = static_cast<std::size_t>(c);
+          away_.component(c)[p] += body_.volume(static_cast<std::size_t>(j)) * (far[axis] - x[axis]);
+        }
       }
     }
-    if (copy_from_sources) copy_from_sources(sides_);
+    if (!copy_from_sources) return;
+    copy_from_sources(sides_);
+    copy_from_sources(away_);
   }
 
   Eigen::Matrix3d of(std::size_t p) const {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     for (int c = 0; c < body_.dimension(); ++c) sum(c, c) = sides_.component(c)[p];
     if (!sum.isZero()) return sum;
-    const Point x = body_.position(p);
-    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-    for (const std::int32_t j : families_.neighbours(p)) {
-      const Point far = body_.position(static_cast<std::size_t>(j));
-      for (std::size_t c = 0; c < 3; ++c)
-        moment[static_cast<Eigen::Index>(c)] += body_.volume(static_cast<std::size_t>(j)) * (far[c] - x[c]);
-    }
-    moment.normalize();
+    const Eigen::Vector3d moment =
+        Eigen::Vector3d(away_.component(0)[p], away_.component(1)[p], away_.component(2)[p]).normalized();
     return moment * moment.transpose();
   }
 
  private:
-  const CloudFamilies& families_;
   const Body& body_;
   Field sides_;  ///< by component: whether the point is near a side of the box across that axis
+  Field away_;   ///< from the surface: first moment of the family's volumes
 };
 
 }  // namespace
@@ -117,18 +134,39 @@ void ClosedComponents::project(FieldView y) const {
     for (std::size_t c = 0; c < d; ++c) y.component(static_cast<int>(c))[closed_.at_surfaces[k].point] = kept[k][c];
 }
 
+double ClosedComponents::magnitude(ConstFieldView y, std::size_t p) const {
+  double square = 0;
+  for (int c = 0; c < body_.dimension(); ++c) square += y.component(c)[p] * y.component(c)[p];
+  return std::sqrt(square) * spacing_of(body_, p) / body_.volume(p);
+}
+
 double ClosedComponents::largest(ConstFieldView y, Point* where) const {
   double most = 0;
+  std::size_t worst = 0;
   for (const std::int32_t p : body_.owned()) {
-    const auto at = static_cast<std::size_t>(p);
-    double square = 0;
-    for (int c = 0; c < body_.dimension(); ++c) square += y.component(c)[p] * y.component(c)[p];
-    const double value = std::sqrt(square) * spacing_of(body_, at) / body_.volume(at);
+    const double value = magnitude(y, static_cast<std::size_t>(p));
     if (value <= most) continue;
     most = value;
-    if (where) *where = body_.position(at);
+    worst = static_cast<std::size_t>(p);
   }
-  return most;
+  const double of_all = communicator().largest(most);
+  if (where)
+    for (std::size_t c = 0; c < 3; ++c)
+      (*where)[c] = communicator().largest(most == of_all ? body_.position(worst)[c] : -std::numeric_limits<double>::infinity());
+  return of_all;
+}
+
+std::size_t ClosedComponents::let_go(ConstFieldView y, double above) {
+  const auto blamed = [&](std::int32_t p) { return magnitude(y, static_cast<std::size_t>(p)) > above; };
+  std::int64_t gone = static_cast<std::int64_t>(
+      std::erase_if(closed_.at_surfaces, [&](const ClosedPoints::AtSurface& surface) { return blamed(surface.point); }));
+  communicator().sum({&gone, 1});
+  if (gone > 0) return static_cast<std::size_t>(gone);
+  for (const std::int32_t p : closed_.whole)
+    if (blamed(p)) whole_[static_cast<std::size_t>(p)] = 0;
+  gone = static_cast<std::int64_t>(std::erase_if(closed_.whole, [&](std::int32_t p) { return blamed(p); }));
+  communicator().sum({&gone, 1});
+  return static_cast<std::size_t>(gone);
 }
 
 ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {

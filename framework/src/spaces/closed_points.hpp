@@ -36,8 +36,15 @@ class ClosedComponents {
   void project(FieldView y) const;
   /// Largest |y| of a point over volume and spacing, and where it is.
   double largest(ConstFieldView y, Point* where = nullptr) const;
+  /// Asks for nothing any more at points where |y| over volume and spacing is above this: at those near surfaces or, where there
+  /// are none, at whole ones. How many there were.
+  std::size_t let_go(ConstFieldView y, double above);
+  const ClosedPoints& points() const noexcept { return closed_; }
 
  private:
+  /// |y| of a point over volume and spacing.
+  double magnitude(ConstFieldView y, std::size_t p) const;
+
   ClosedPoints closed_;
   const Body& body_;
   std::vector<std::uint8_t> whole_;  ///< by point

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "families/cloud_families.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/dimension.hpp"
 #include "spaces/balance_solver.hpp"
 #include "spaces/closed_points.hpp"
@@ -15,33 +17,49 @@ namespace perikit {
 
 namespace {
 
-constexpr int most_rounds = 12;
-/// Where it is still open which evaluation points are at the bound.
-constexpr double rough_residual = 1e-3;
+constexpr int most_rounds = 40;
+/// Of the residual that a round of Newton's method begins with: what its linear system may leave.
+constexpr double forcing = 0.3;
 /// What is left of the unbalanced force where nobody needs to be warned.
 constexpr double acceptable_residual = 1e-2;
+
+/// f with phi'(f) = (f - 1/f)/2 = y, and its derivative.
+double factor_of(double y) noexcept {
+  const double root = std::sqrt(1 + y * y);
+  return y < 0 ? 1 / (root - y) : root + y;
+}
+double slope_of(double f) noexcept { return 2 * f * f / (1 + f * f); }
+
+std::size_t of_all_ranks(std::size_t count) {
+  auto sum = static_cast<std::int64_t>(count);
+  communicator().sum({&sum, 1});
+  return static_cast<std::size_t>(sum);
+}
 
 /// The system for x = (lambda, mu), components 0 ... d - 1 and d.
 class WeightSystem {
  public:
-  WeightSystem(const SpaceParts& parts, EvaluationSpace& space, const ClosedPoints& closed, const CloudConsistency& images)
+  WeightSystem(EvaluationSpace& space, const SpaceParts& parts, const ClosedPoints& closed, const CloudConsistency& beyond)
       : body_(parts.families.body()),
         space_(space),
         laws_(parts.laws),
         selective_(parts.formulation.selective()),
-        images_(images),
+        beyond_(beyond),
         closed_(closed, body_),
-        counted_(body_.stride(), 0),
+        counted_(storing_points(parts)),
+        owned_(body_.make_field(1)),
         scale_(make()),
-        shown_(body_.make_field(body_.dimension())),
-        out_(shown_) {
-    for (const std::int32_t p : body_.owned()) counted_[static_cast<std::size_t>(p)] = 1;
+        shown_(make()),
+        out_(body_.make_field(body_.dimension())) {
+    for (const std::int32_t p : body_.owned()) owned_.data()[p] = 1;
     set_scale();
   }
 
   int d() const noexcept { return body_.dimension(); }
   Field make() const { return body_.make_field(body_.dimension() + 1); }
   double largest(const Field& r, Point* where = nullptr) const { return closed_.largest(r, where); }
+  std::size_t let_go(const Field& r, double above) { return closed_.let_go(r, above); }
+  const ClosedPoints& closed() const noexcept { return closed_.points(); }
 
   /// y <- (sum_q W_q s_q g_qk, sum of W_q s_q over the q of a point), s_q = constant + tr H_q[lambda] + mu, with the weights that
   /// the space has.
@@ -67,17 +85,14 @@ class WeightSystem {
     fill_with_noise(everywhere, 1, body_.places(), probe);
     closed_.project(probe);
     apply(probe, image);
-    double sum = 0, reference = 0;
     const auto unit = [&](std::int32_t p) {
       const double h = spacing_of(body_, static_cast<std::size_t>(p));
       return body_.volume(static_cast<std::size_t>(p)) / (h * h);
     };
+    const double sum = dot(probe, image);
     for (const std::int32_t p : body_.owned())
-      for (int c = 0; c < d(); ++c) {
-        sum += probe.component(c)[p] * image.component(c)[p];
-        reference += probe.component(c)[p] * probe.component(c)[p] * unit(p);
-      }
-    const double multiple = sum > 0 ? reference / sum : 1;
+      for (int c = 0; c < d(); ++c) image.component(c)[p] = probe.component(c)[p] * unit(p);
+    const double multiple = sum > 0 ? dot(probe, image) / sum : 1;
     for (const std::int32_t p : body_.owned()) {
       for (int c = 0; c < d(); ++c) scale_.component(c)[p] = multiple / unit(p);
       scale_.component(d())[p] = 1 / body_.volume(static_cast<std::size_t>(p));
@@ -85,19 +100,22 @@ class WeightSystem {
   }
 
   void pass(const Field& x, double constant, Field& y, double* factors) {
-    for (int c = 0; c < d(); ++c) std::copy_n(x.component(c), body_.stride(), shown_.component(c));
-    if (images_.extend) images_.extend(shown_);
+    copy(x, shown_);
+    const FieldView lambda{shown_.data(), body_.stride(), d()}, mu{shown_.component(d()), body_.stride(), 1};
+    if (beyond_.extend) beyond_.extend(lambda);
+    if (beyond_.copy_from_sources) beyond_.copy_from_sources(mu);
     out_.fill(0);
     double* const sums = factors ? nullptr : y.component(d());
     if (sums) std::fill_n(sums, body_.stride(), 0.0);
-    const Balance balance{constant, x.component(d()), counted_.data(), sums, factors};
+    const Balance balance{constant, mu.data, counted_.data(), sums, factors};
     const BatchWork work(laws_, Work::force, false, selective_, nullptr, &balance);
-    Pass pass{work, shown_, {}, out_, nullptr, nullptr, -1, {}};
+    Pass pass{work, lambda, {}, out_, nullptr, nullptr, -1, {}};
     space_.run(pass);
     if (factors) return;
-    if (images_.fold) images_.fold(out_);
+    if (beyond_.fold) beyond_.fold(out_);
     for (int c = 0; c < d(); ++c)  // forces are the negative of the adjoint
       for (std::size_t p = 0; p < body_.stride(); ++p) y.component(c)[p] = -out_.component(c)[p];
+    mask(owned_, FieldView{sums, body_.stride(), 1});
     closed_.project(y);
   }
 
@@ -105,61 +123,97 @@ class WeightSystem {
   EvaluationSpace& space_;
   const Laws& laws_;
   bool selective_;
-  const CloudConsistency& images_;
+  const CloudConsistency& beyond_;
   ClosedComponents closed_;
   std::vector<std::uint8_t> counted_;
-  Field scale_, shown_, out_;
+  Field owned_, scale_, shown_, out_;
 };
 
-/// C W f = c with f = fixed + kept (C^T x): fixed is 1 or the bound, kept 1 or 0.
-void find_weights(const SpaceParts& parts, EvaluationSpace& space, const ClosedPoints& closed, CloudConsistency& out) {
-  const Body& body = parts.families.body();
-  space.set_factors({});
-  WeightSystem system(parts, space, closed, out);
-  Field x = system.make(), none = x, b = x, volumes = x;
-  system.apply(none, 1, volumes);  // sum of W_q g_qk, and of W_q
-  Balanced& result = out.weights;
-  result.before = system.largest(volumes);
-  AlignedVector<double> fixed(space.factors(), 1.0), kept(space.factors(), 1.0), found;
-  const auto bound_more = [&] {
-    std::size_t more = 0;
-    for (std::size_t q = 0; q < found.size(); ++q) {
-      if (kept[q] == 0 || 1 + found[q] >= lowest_factor) continue;
-      fixed[q] = lowest_factor;
-      kept[q] = 0;
-      ++more;
+/// Newton's method for y, f = factor_of(y), y_q = tr H_q[lambda] + mu_i: a round solves C W f' C^T dx = c - C W f for dx =
+/// (lambda, mu) roughly. Where evaluation points are too few for the conditions on them, as may be near surfaces, the residual
+/// no longer falls, and the points there are let go.
+class WeightSearch {
+ public:
+  WeightSearch(const SpaceParts& parts, EvaluationSpace& space, const ClosedPoints& closed, CloudConsistency& out)
+      : body_(parts.families.body()),
+        space_(space),
+        system_(without_factors(space), parts, closed, out),
+        none_(system_.make()),
+        volumes_(none_),
+        rest_(none_),
+        effort_(effort_of_balance(parts)),
+        out_(out) {
+    system_.apply(none_, 1, volumes_);  // sum of W_q g_qk, and of W_q
+    out_.weights.before = system_.largest(volumes_);
+  }
+
+  void run() {
+    while (!search()) {
     }
-    out.bounded += more;
-    return more;
-  };
-  const int most = most_iterations(body.points());
-  bool rough = true;
-  for (out.rounds = 1;; ++out.rounds) {
-    space.set_factors(fixed);
-    system.apply(none, 1, b);
-    combine(-1, b, 0, b, b);
-    for (const std::int32_t p : body.owned()) b.component(system.d())[p] += volumes.component(system.d())[p];
-    space.set_factors(kept);
-    result.iterations += solve(system, b, rough ? rough_residual : rounding_residual, most, x);
-    system.factors(x, found);
-    if (out.rounds < most_rounds && bound_more() > 0) continue;
-    if (!rough) break;
-    rough = false;
+    space_.set_factors(out_.factors);
+    out_.weights.after = left(&out_.weights.worst);
+    if (!(out_.weights.after <= out_.weights.before)) {  // the constraints contradict each other
+      out_.factors.assign(space_.factors(), 1.0);
+      out_.weights.after = left(&out_.weights.worst);
+    }
+    const auto [low, high] = std::minmax_element(out_.factors.begin(), out_.factors.end());
+    out_.smallest = -communicator().largest(-*low);
+    out_.largest = communicator().largest(*high);
+    out_.at_surfaces = of_all_ranks(system_.closed().at_surfaces.size());
+    out_.unbalanced = out_.whole - of_all_ranks(system_.closed().whole.size());
   }
-  out.factors.assign(space.factors(), 1.0);
-  for (std::size_t q = 0; q < found.size(); ++q) out.factors[q] = std::max(lowest_factor, fixed[q] + kept[q] * found[q]);
-  space.set_factors(out.factors);
-  system.apply(none, 1, b);
-  result.after = system.largest(b, &result.worst);
-  if (!(result.after <= result.before)) {  // the constraints contradict each other
-    out.factors.assign(space.factors(), 1.0);
-    out.bounded = 0;
-    result.after = system.largest(volumes, &result.worst);
+
+ private:
+  static EvaluationSpace& without_factors(EvaluationSpace& space) {
+    space.set_factors({});
+    return space;
   }
-  const auto [low, high] = std::minmax_element(out.factors.begin(), out.factors.end());
-  out.smallest = *low;
-  out.largest = *high;
-}
+
+  /// rest_ <- c - C W f with the factors that the space has.
+  double left(Point* where = nullptr) {
+    system_.apply(none_, 1, rest_);
+    combine(-1, rest_, 0, rest_, rest_);
+    for (const std::int32_t p : body_.owned()) rest_.component(system_.d())[p] += volumes_.component(system_.d())[p];
+    return system_.largest(rest_, where);
+  }
+
+  /// From f = 1. False: points were let go, so that it is to be begun again.
+  bool search() {
+    AlignedVector<double> y(space_.factors(), 0.0), step;
+    AlignedVector<double>& f = out_.factors;
+    f.assign(space_.factors(), 1.0);
+    std::vector<double> residuals;
+    for (out_.rounds = 1;; ++out_.rounds) {
+      space_.set_factors(f);
+      const double residual = residuals.emplace_back(left());
+      if (effort_.ends(residual, out_.weights.iterations) || out_.rounds > most_rounds) return true;
+      const bool stuck = residuals.size() > 3 && residual > 0.5 * residuals[residuals.size() - 4];
+      if (stuck && residual <= enough_residual) return true;  // rounding
+      if (stuck) return system_.let_go(rest_, forcing * residual) == 0;
+      AlignedVector<double> slopes(f);
+      for (double& slope : slopes) slope = slope_of(slope);
+      space_.set_factors(slopes);
+      Field x = system_.make();
+      const BalanceEffort rest{std::max(effort_.polish - out_.weights.iterations, 1), std::max(effort_.most - out_.weights.iterations, 1)};
+      out_.weights.iterations += solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
+      system_.factors(x, step);
+      double longest = 0;
+      for (const double s : step) longest = std::max(longest, std::abs(s));
+      const double part = std::min(1.0, 2 / communicator().largest(longest));
+      for (std::size_t q = 0; q < y.size(); ++q) {
+        y[q] += part * step[q];
+        f[q] = factor_of(y[q]);
+      }
+    }
+  }
+
+  const Body& body_;
+  EvaluationSpace& space_;
+  WeightSystem system_;
+  Field none_, volumes_, rest_;
+  BalanceEffort effort_;
+  CloudConsistency& out_;
+};
 
 void describe(const char* label, const Balanced& result, const std::string& what, ModelReport& report) {
   report.notes.emplace_back(
@@ -175,28 +229,49 @@ void describe(const char* label, const Balanced& result, const std::string& what
 
 }  // namespace
 
+BalanceEffort effort_of_balance(const SpaceParts& parts) {
+  const Formulation& formulation = parts.formulation;
+  const bool own_family = formulation.weighted && formulation.parts(parts.families.body().dimension()) == 0;
+  std::int64_t work = 0;  // of a product, in bonds
+  for (const std::int32_t p : parts.families.body().owned()) {
+    const auto bonds = static_cast<std::int64_t>(parts.families.cloud()->neighbours(static_cast<std::size_t>(p)).size());
+    work += own_family ? bonds * bonds / 4 : bonds;
+  }
+  communicator().sum({&work, 1});
+  const double products = 5e7 / static_cast<double>(std::max<std::int64_t>(work, 1));
+  return {static_cast<int>(std::min(products, 4000.0)), 4000};
+}
+
+std::vector<std::uint8_t> storing_points(const SpaceParts& parts) {
+  const Body& body = parts.families.body();
+  const auto& ids = body.material_ids();
+  std::vector<std::uint8_t> stores(body.stride(), 0);
+  for (std::size_t p = 0; p < body.points(); ++p) stores[p] = ids.empty() || !parts.laws.records()[ids[p]].silent;
+  return stores;
+}
+
 void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudConsistency& out) {
   const auto begin = std::chrono::steady_clock::now();
   ClosedPoints closed = find_closed_points(parts.families, out.copy_from_sources);
   const auto find = [&] {
     out.gradients = out.weights = {};
-    out.bounded = 0;
+    out.whole = of_all_ranks(closed.whole.size());
+    out.unbalanced = 0;
+    out.at_surfaces = of_all_ranks(closed.at_surfaces.size());
     if (parts.formulation.point || parts.formulation.selective()) {
       out.shift = with_dimension(parts.families.body().dimension(),
-                                 [&](auto d) { return find_shift<d>(*parts.families.cloud(), closed, out, out.gradients); });
+                                 [&](auto d) { return find_shift<d>(parts, closed, out, out.gradients); });
       space.shift_gradients(out.shift);
     }
-    if (space.factors() > 0) find_weights(parts, space, closed, out);
+    if (space.factors() > 0) WeightSearch(parts, space, closed, out).run();
   };
   find();
-  if (std::max(out.gradients.after, out.weights.after) > acceptable_residual && !closed.at_surfaces.empty()) {
+  if (std::max(out.gradients.after, out.weights.after) > acceptable_residual && of_all_ranks(closed.at_surfaces.size()) > 0) {
     // Evaluation points near surfaces may be too few: then the inside alone.
     closed.at_surfaces.clear();
     find();
   }
-  out.whole = closed.whole.size();
-  out.at_surfaces = closed.at_surfaces.size();
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  out.seconds = communicator().largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   out.found = true;
 }
 
@@ -207,11 +282,16 @@ void CloudConsistency::report(ModelReport& report) const {
   if (shift.components() > 0) describe("", gradients, "point gradients moved", report);
   if (!factors.empty())
     describe("", weights,
-             fmt::format("weights in {} rounds, w/W {:.3g} to {:.3g}, {} evaluation points at the bound", rounds, smallest,
-                         largest, bounded),
+             fmt::format("weights in {} rounds, w/W {:.3g} to {:.3g}", rounds, smallest, largest),
              report);
+  if (unbalanced > 0)
+    report.warnings.push_back(
+        fmt::format("{} of {} points inside of the cloud have too few evaluation points around them to balance a constant stress; "
+                    "allowed: more parts, a larger horizon, or points that lie more evenly",
+                    unbalanced, whole));
   if (whole + at_surfaces == 0)
-    report.warnings.push_back("consistent = true changes nothing: every point has bonds to two sides of the body or more");
+    report.warnings.push_back(
+        "the cloud cannot be made consistent: every point has bonds to two sides of the body or more; allowed: more points across");
 }
 
 }  // namespace perikit

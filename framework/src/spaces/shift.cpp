@@ -13,17 +13,20 @@ namespace {
 template <int D>
 class ShiftSystem {
  public:
-  ShiftSystem(const CloudFamilies& families, const ClosedPoints& closed, const CloudConsistency& images)
-      : families_(families),
-        body_(families.body()),
-        images_(images),
+  ShiftSystem(const SpaceParts& parts, const ClosedPoints& closed, const CloudConsistency& beyond)
+      : families_(*parts.families.cloud()),
+        body_(families_.body()),
+        beyond_(beyond),
         closed_(closed, body_),
-        gradient_(families),
+        gradient_(families_),
         position_(reinterpret_cast<const Row*>(body_.rows().data())),
         weight_(body_.stride(), 0.0),
         gradients_(D * body_.points()) {
-    for (const std::int32_t p : body_.owned())
-      weight_[static_cast<std::size_t>(p)] = 1 - families.damage(static_cast<std::size_t>(p));
+    const std::vector<std::uint8_t> stores = storing_points(parts);
+    for (const std::int32_t p : body_.internal()) {
+      const auto at = static_cast<std::size_t>(p);
+      if (stores[at]) weight_[at] = 1 - parts.families.damage(at);
+    }
   }
 
   Field make() const { return body_.make_field(D); }
@@ -85,11 +88,11 @@ class ShiftSystem {
   void show(const Field& x) {
     out_ = body_.make_field(D);
     copy(x, out_);
-    if (images_.extend) images_.extend(out_);
+    if (beyond_.extend) beyond_.extend(out_);
     mirror_rows(out_, body_.points(), rows_);
   }
   void finish(Field& y) {
-    if (images_.fold) images_.fold(out_);
+    if (beyond_.fold) beyond_.fold(out_);
     copy(out_, y);
     closed_.project(y);
   }
@@ -108,11 +111,11 @@ class ShiftSystem {
 
   const CloudFamilies& families_;
   const Body& body_;
-  const CloudConsistency& images_;
+  const CloudConsistency& beyond_;
   ClosedComponents closed_;
   CloudGradient<D> gradient_;
   const Row* position_;         ///< {x, y, z, V}
-  std::vector<double> weight_;  ///< W/V; 0 of images
+  std::vector<double> weight_;  ///< W/V; 0 of points that store nothing
   Field out_;
   AlignedVector<Row> rows_, gradients_;
 };
@@ -120,13 +123,13 @@ class ShiftSystem {
 }  // namespace
 
 template <int D>
-Field find_shift(const CloudFamilies& families, const ClosedPoints& closed, const CloudConsistency& images, Balanced& result) {
-  ShiftSystem<D> system(families, closed, images);
+Field find_shift(const SpaceParts& parts, const ClosedPoints& closed, const CloudConsistency& beyond, Balanced& result) {
+  ShiftSystem<D> system(parts, closed, beyond);
   Field x = system.make(), b = x, r = x;
   system.unshifted(b);
   result.before = system.largest(b);
   combine(-1, b, 0, b, b);
-  result.iterations = solve(system, b, rounding_residual, most_iterations(families.body().points()), x);
+  result.iterations = solve(system, b, rounding_residual, effort_of_balance(parts), x);
   system.apply(x, r);
   combine(1, b, -1, r, r);
   result.after = system.largest(r, &result.worst);
@@ -158,8 +161,8 @@ void shift_gradient(const FamilyArrays& family, std::size_t p, ConstFieldView la
     }
 }
 
-template Field find_shift<1>(const CloudFamilies&, const ClosedPoints&, const CloudConsistency&, Balanced&);
-template Field find_shift<2>(const CloudFamilies&, const ClosedPoints&, const CloudConsistency&, Balanced&);
-template Field find_shift<3>(const CloudFamilies&, const ClosedPoints&, const CloudConsistency&, Balanced&);
+template Field find_shift<1>(const SpaceParts&, const ClosedPoints&, const CloudConsistency&, Balanced&);
+template Field find_shift<2>(const SpaceParts&, const ClosedPoints&, const CloudConsistency&, Balanced&);
+template Field find_shift<3>(const SpaceParts&, const ClosedPoints&, const CloudConsistency&, Balanced&);
 
 }  // namespace perikit

@@ -17,7 +17,7 @@ namespace perikit {
 
 /// lambda by point (images included), and what was achieved.
 template <int D>
-Field find_shift(const CloudFamilies& families, const ClosedPoints& closed, const CloudConsistency& images, Balanced& result);
+Field find_shift(const SpaceParts& parts, const ClosedPoints& closed, const CloudConsistency& beyond, Balanced& result);
 
 /// g of the bonds of a loaded family, without -> with lambda: g[k * dimension + e].
 void shift_gradient(const FamilyArrays& family, std::size_t p, ConstFieldView lambda, std::vector<double>& g);

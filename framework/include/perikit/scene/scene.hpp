@@ -133,7 +133,7 @@ struct Scene {
   std::vector<SetDescription> sets;
   double horizon = 0;              ///< [m]; 0: horizon_ratio given
   double horizon_ratio = 0;        ///< to the lattice spacing (or mean spacing of a cloud)
-  std::optional<bool> consistent;  ///< nullopt where the scene does not say
+  std::optional<bool> consistent;  ///< nullopt where the scene does not say: as random_points()
   bool partial_volume = false;
   SourcePosition consistent_position, partial_volume_position, horizon_position;
   std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
@@ -156,6 +156,9 @@ struct Scene {
   SourcePosition weak_springs_position;
   std::optional<int> threads;
   std::int64_t seed = 1;
+
+  /// Whether points lie at random: [body.points], or a lattice with jitter.
+  bool random_points() const noexcept { return body.points_file || (body.lattice && body.lattice->jitter > 0); }
 };
 
 struct SceneOptions {
