@@ -40,7 +40,6 @@ TEST_CASE("the stiffness of a bar on a cloud is that of its material") {
     std::string kinematics;
     std::vector<double> jitters;
   };
-  // With four evaluation points a point, sub_horizon has too few near surfaces where points almost line up.
   for (const auto& [kinematics, jitters] :
        {Cloud{"\"baqp\"", {0.1, 0.3}}, Cloud{"\"projection\"", {0.1, 0.3}}, Cloud{"\"bond_augmented\"", {0.1, 0.3}},
         Cloud{"\"bond_associated\"", {0.1, 0.3}}, Cloud{"\"non_spherical\"", {0.1, 0.3}}, Cloud{"\"sub_horizon\"", {0.3}},
@@ -52,4 +51,17 @@ TEST_CASE("the stiffness of a bar on a cloud is that of its material") {
       CHECK(std::abs(before) > 5e-4);
       CHECK(std::abs(after) < 1e-6);
     }
+}
+
+TEST_CASE("points that lie at random are consistent unless a scene says otherwise, and a pair law on them is doubted") {
+  const auto summary = [](const std::vector<std::string>& keys) {
+    std::vector<std::string> all = {"body.lattice.spacing=0.1", "run.threads=1"};
+    all.insert(all.end(), keys.begin(), keys.end());
+    return load("clouds/bar.toml", all)->summary();
+  };
+  CHECK(summary({}).find("weights in ") != std::string::npos);
+  CHECK(summary({}).find("too soft") == std::string::npos);
+  CHECK(summary({"family.consistent=false"}).find("too soft by 1 to 12 %") != std::string::npos);
+  CHECK(summary({"kinematics=bond_based"}).find("a pair law") != std::string::npos);
+  CHECK(summary({"body.lattice.jitter=0.0"}).find("consistency") == std::string::npos);
 }
