@@ -102,6 +102,10 @@ ParameterTable family_parameters() {
   table.boolean(
       "consistent",
       "Clouds: weights of evaluation points with which a constant stress is in equilibrium inside of the body, as on a lattice.");
+  table
+      .choice("interfaces", {"laminate", "parallel"},
+              "Evaluation points that two materials share: a laminate of both, or each law with its share of the weight.")
+      .by_default("\"laminate\"");
   table.exactly(1, {"horizon_ratio", "horizon"});
   return table;
 }
