@@ -151,7 +151,7 @@ std::vector<Crossing> find_crossings(const Body& body, const Boxes& boxes, std::
     if (!differing[n]) return;
     const Point& x = boxes.place(n);
     boxes.near(x, horizon, [&](std::size_t m, double square) {
-      if (material[m] == material[n] || body.cut(x, boxes.place(m))) return;
+      if (material[m] == material[n]) return;
       const auto known = std::ranges::find(nearest[n], material[m], &Nearest::material);
       const Nearest found{material[m], square, static_cast<std::int32_t>(m)};
       if (known == nearest[n].end())
@@ -166,7 +166,7 @@ std::vector<Crossing> find_crossings(const Body& body, const Boxes& boxes, std::
     for (const Nearest& other : nearest[n]) {
       if (other.material < material[n]) continue;
       boxes.near(x, std::sqrt(other.square * equal_squares), [&](std::size_t m, double square) {
-        if (material[m] != other.material || body.cut(x, boxes.place(m))) return;
+        if (material[m] != other.material) return;
         const Nearest* const back = nearest_of(nearest[m], material[n]);
         if (!back || square > back->square * equal_squares) return;
         Crossing c{material[n], material[m], static_cast<std::int32_t>(n), static_cast<std::int32_t>(m), std::sqrt(square), {}, {}, {}, {}};

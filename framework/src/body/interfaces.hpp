@@ -1,6 +1,7 @@
 #pragma once
 /// Where materials meet. The surface between two of them goes through the midpoints of the bonds between nearest points of
-/// either side; each point near it knows its distance from it, and where its counterpart lies.
+/// either side; each point near it knows its distance from it, and where its counterpart lies. Cracks do not move it: what they
+/// part has no stencil that sees both sides.
 
 #include <cstdint>
 #include <memory>
