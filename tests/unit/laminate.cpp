@@ -83,10 +83,12 @@ struct Case {
 
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0; }
 
+/// Stretches and shears: of a thin soft layer no law keeps what is left when its stiff neighbours are squeezed to half.
 std::vector<double> gradient(std::mt19937_64& random, Space space, double size) {
   const int d = dimension(space);
   std::vector<double> H(static_cast<std::size_t>(d * d));
   for (double& h : H) h = size * uniform(random) / d;
+  for (int a = 0; a < d; ++a) H[static_cast<std::size_t>(a * d + a)] = size * std::abs(uniform(random));
   return H;
 }
 
@@ -94,7 +96,7 @@ std::vector<double> gradient(std::mt19937_64& random, Space space, double size) 
 std::vector<std::vector<MaterialRecord>> pairs(double contrast, double first_poisson, double second_poisson) {
   return {{record<NeoHookean>(1.0, first_poisson), record<NeoHookean>(contrast, second_poisson)},
           {record<LinearElastic>(1.0, first_poisson), record<NeoHookean>(contrast, second_poisson)},
-          {record<Hencky>(1.0, first_poisson), record<LinearElastic>(contrast, second_poisson)}};
+          {record<NeoHookean>(1.0, first_poisson), record<LinearElastic>(contrast, second_poisson)}};
 }
 
 const std::vector<std::uint16_t> ids{0, 1, 0, 0, 0, 0, 0, 0};
@@ -186,13 +188,13 @@ TEST_CASE("laminates: tractions are continuous, and no jump near it stores less"
     }
     CHECK(least == doctest::Approx(best).epsilon(1e-10));
     CHECK(best < 0.999 * stored({0, 0, 0}));
+    stored(a);
     for (std::size_t i = 0; i < 3; ++i) {
       double jump = 0, size = 0;
       for (std::size_t e = 0; e < 3; ++e) {
         jump += (one->stress(static_cast<int>(3 * i + e)) - other->stress(static_cast<int>(3 * i + e))) * n[e];
         size += std::abs(one->stress(static_cast<int>(3 * i + e)));
       }
-      stored(a);
       CHECK(std::abs(jump) <= 1e-3 * (size + 1e-3));
     }
   }
@@ -230,6 +232,12 @@ TEST_CASE("laminates: at rest nothing is stored, bitwise; what is turned over is
   CHECK(made->evaluate() == 3);
   made->set({std::nan(""), 0, 0, 0});
   CHECK(made->evaluate() == 3);
+  // A law that softens in tension: a thin soft layer takes all of the stretch.
+  std::vector<MaterialRecord> softening{record<Hencky>(1.0, 0.0), record<LinearElastic>(100.0, 0.0)};
+  const Laws open(Space::line_stress, std::move(softening), ids, 8);
+  const auto layer = std::make_unique<Case>(open, laminate(1, 0.01, {1, 0, 0}));
+  const double energy = layer->energy({0.5});
+  CHECK(energy < 0.01 * 0.5 * std::log(51.0) * std::log(51.0));
 }
 
 TEST_CASE("a stencil that sees a corner or both sides of a layer is no laminate") {
