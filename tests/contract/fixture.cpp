@@ -103,6 +103,9 @@ std::vector<Case> cases() {
           body.crack = true;
           body.two_materials = true;
           all.push_back({example, body});
+        } else {
+          body.two_materials = true;
+          all.push_back({example, body});
         }
         if (d == 2 && !cloud && !selective) {
           body.crack = body.two_materials = false;

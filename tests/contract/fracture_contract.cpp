@@ -196,7 +196,7 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
       for (const int d : {2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
-        BodyOptions options{.dimension = d, .cloud = cloud};
+        BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = !formulation_of(example).selective()};
         const auto whole = build(scene_text(options, kinematics_table(example)));
         const double height = plane_height(whole->problem().body());
         options.conditions = limit;
@@ -237,7 +237,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
-        BodyOptions options{.dimension = d, .cloud = cloud};
+        BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = cloud == (d == 2)};
         const auto plain = build(scene_text(options, kinematics_table(example)));
         stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 11);
         const double most = quantile(stretches(plain->problem().body(), plain->problem().state().displacement()), 0.95);
@@ -294,7 +294,7 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!suits(example, d)) continue;
-        BodyOptions options{.dimension = d, .cloud = cloud};
+        BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = cloud == (d == 2)};
         const auto plain = build(scene_text(options, kinematics_table(example)));
         stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 17);
         const std::vector<Stretched> all = stretches(plain->problem().body(), plain->problem().state().displacement());

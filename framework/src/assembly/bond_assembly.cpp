@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "families/cloud_rows.hpp"
+#include "operators/laminates.hpp"
 #include "spaces/bond_shape.hpp"
 #include "spaces/shift.hpp"
 
@@ -29,6 +30,7 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
       shift_(parts.shift),
       far_share_(formulation_.far_share),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
+      interfaces_(parts.interfaces),
       colouring_(cloud_reach(rows.lists(), rows.size())) {
   read_bonds();
 }
@@ -73,6 +75,50 @@ void BondAssembly<D>::read_bonds() {
           static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(i)) - back.begin());
     }
   });
+  if (interfaces_) read_laminates();
+}
+
+template <int D>
+template <class Value>
+void BondAssembly<D>::gradient_of(std::size_t i, std::size_t k, const Value& value, double* g) const noexcept {
+  const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
+  const auto of_point = [&](std::size_t row, double* H) {
+    const double own = value(rows_.point(row));
+    const Bond* bond = bond_.data() + rows_.first(row);
+    for (const std::int32_t n : rows_.neighbours(row)) {
+      const double difference = value(rows_.point(static_cast<std::size_t>(n))) - own;
+      for (std::size_t e = 0; e < D; ++e) H[e] += bond->gradient[e] * difference;
+      ++bond;
+    }
+  };
+  double near[D] = {}, far[D] = {}, A[D];
+  of_point(i, near);
+  if (far_share_ > 0) of_point(j, far);
+  for (std::size_t e = 0; e < D; ++e) A[e] = far_share_ == 0 ? near[e] : (1 - far_share_) * near[e] + far_share_ * far[e];
+  double H[D];
+  bond_shape_row<D>(A, value(rows_.point(j)) - value(rows_.point(i)), bond_[k].xi, bond_[k].correction, H);
+  std::copy_n(H, D, g);
+}
+
+template <int D>
+void BondAssembly<D>::read_laminates() {
+  laminate_of_.assign(bond_.size(), -1);
+  laminate_.clear();
+  const std::size_t rows = rows_.size();
+  std::vector<std::vector<std::pair<std::size_t, LaminatePoint>>> found(rows);
+  over_rows(rows, [&](std::size_t i) {
+    const auto p = static_cast<std::int32_t>(rows_.point(i));
+    if (std::ranges::none_of(interfaces_->all, [&](const Interface& interface) { return interface.find(p) >= 0; })) return;
+    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) {
+      LaminatePoint point;
+      if (laminate_by_stencil(D, *interfaces_, p, [&](const auto& value, double* g) { gradient_of(i, k, value, g); }, point)) found[i].push_back({k, point});
+    }
+  });
+  for (const auto& of_row : found)
+    for (const auto& [k, point] : of_row) {
+      laminate_of_[k] = static_cast<std::int32_t>(laminate_.size());
+      laminate_.push_back(point);
+    }
 }
 
 template <int D>
@@ -103,6 +149,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const std::size_t p = rows_.point(i), q = rows_.point(j);
   const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
   const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i]);
+  if (interfaces_ && laminate_of_[k] >= 0) m.batch.add_laminate(laminate_[static_cast<std::size_t>(laminate_of_[k])]);
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
   const double* own = Hbar_.data() + entries * i;

@@ -2,6 +2,7 @@
 #include "assembly/assembly.hpp"
 #include "assembly/block_pattern.hpp"
 #include "assembly/tangent_batch.hpp"
+#include "body/interfaces.hpp"
 #include "families/blocks.hpp"
 #include "spaces/evaluation_space.hpp"
 
@@ -51,6 +52,11 @@ class BondAssembly final : public Assembly {
   void couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept;
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
 
+  void read_laminates();
+  /// of the bond k of row i with value(p) by point.
+  template <class Value>
+  void gradient_of(std::size_t i, std::size_t k, const Value& value, double* g) const noexcept;
+
   const BlockRows& rows_;
   const Laws& laws_;
   const Formulation& formulation_;
@@ -58,6 +64,9 @@ class BondAssembly final : public Assembly {
   ConstFieldView shift_;             ///< of point gradients; without data: none
   double far_share_;
   bool symmetric_;
+  std::shared_ptr<const Interfaces> interfaces_;
+  std::vector<std::int32_t> laminate_of_;          ///< by bond; -1: none. Empty without interfaces
+  std::vector<LaminatePoint> laminate_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
   AlignedVector<double> Hbar_;                     ///< by row

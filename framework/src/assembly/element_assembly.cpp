@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "families/cloud_rows.hpp"
+#include "operators/laminates.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -11,6 +12,7 @@ template <int D>
 ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& rows)
     : rows_(rows),
       laws_(parts.laws),
+      interfaces_(parts.interfaces),
       shape_{parts.formulation, parts.formulation.parts(D), parts.factors, parts.shift},
       colouring_(cloud_reach(rows.lists(), rows.size())) {
   for (std::size_t r = 0; r < rows.size() && !whole_; ++r) {
@@ -44,6 +46,14 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   for (int q = 0; q < element.points; ++q) {
     const int lane =
         m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().left(p));
+    const auto of_value = [&](const auto& value, double* to) {
+      const double own = value(p);
+      for (std::size_t k = 0; k < m.nodes.size(); ++k) {
+        const double difference = value(rows_.point(static_cast<std::size_t>(m.nodes[k]))) - own;
+        for (int e = 0; e < D; ++e) to[e] += element.row(owners + q, e)[k] * difference;
+      }
+    };
+    if (LaminatePoint point; interfaces_ && laminate_by_stencil(D, *interfaces_, static_cast<std::int32_t>(p), of_value, point)) m.batch.add_laminate(point);
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) {
         m.batch.H(lane, c * D + e) = gradient(owners + q, c, e);

@@ -4,6 +4,7 @@
 #include "assembly/assembly.hpp"
 #include "assembly/point_element.hpp"
 #include "assembly/tangent_batch.hpp"
+#include "body/interfaces.hpp"
 #include "families/blocks.hpp"
 #include "spaces/evaluation_space.hpp"
 
@@ -37,6 +38,7 @@ class ElementAssembly final : public Assembly {
 
   const BlockRows& rows_;
   const Laws& laws_;
+  std::shared_ptr<const Interfaces> interfaces_;
   ElementShape shape_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family
   Colouring colouring_;

@@ -91,6 +91,7 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
   batch.A = A_.data();
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
+  if (const int bad = evaluate_laminates(first, n); bad >= 0) return bad;
   const int all = laws_.components();
   for (int l = 0; l < n; ++l) {
     double* out = own_.data() + static_cast<std::size_t>(first + l) * entries;
@@ -100,6 +101,28 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
         out[r * components + c] = weight * A_[static_cast<std::size_t>((r * all + c) * batch_points + l)];
   }
   return -1;
+}
+
+/// The laminates among lanes first ... first + n - 1, in place of what one law gave there.
+template <int D>
+int TangentBatch<D>::evaluate_laminates(int first, int n) {
+  const auto begin = std::ranges::lower_bound(laminates_, first, {}, &Laminate::lane);
+  const auto end = std::ranges::lower_bound(laminates_, first + n, {}, &Laminate::lane);
+  if (begin == end) return -1;
+  if (!laminate_scratch_) laminate_scratch_ = std::make_unique<LaminateScratch>(laws_);
+  int lane[batch_points];
+  const LaminatePoint* point[batch_points];
+  LaminateBatch batch;
+  for (auto at = begin; at != end; ++at) {
+    if (laws_.record_of(static_cast<std::size_t>(owner(at->lane))).silent) continue;
+    lane[batch.n] = at->lane - first;
+    point[batch.n++] = &at->point;
+  }
+  batch.lane = lane;
+  batch.laminate = point;
+  batch.H = &H(first, 0);
+  batch.A = A_.data();
+  return laminate_scratch_->evaluate(batch);
 }
 
 template <int D>

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "operators/laminate.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
@@ -16,10 +17,15 @@ class TangentBatch {
   static constexpr int components = D * D, entries = components * components;
 
   TangentBatch(const Laws& laws, bool selective);
-  void clear() noexcept { lanes_ = 0; }
+  void clear() noexcept {
+    lanes_ = 0;
+    laminates_.clear();
+  }
   int lanes() const noexcept { return lanes_; }
   /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. share: c of the selective map.
   int add(std::int32_t owner, double weight, double share);
+  /// The last lane is a laminate.
+  void add_laminate(const LaminatePoint& point) { laminates_.push_back({lanes_ - 1, point}); }
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
@@ -39,6 +45,7 @@ class TangentBatch {
   }
   int evaluate_plain(int first, int n);
   int evaluate_selective(int first, int n);
+  int evaluate_laminates(int first, int n);
   void remove_negative_curvature(int lane);
 
   const Laws& laws_;
@@ -51,6 +58,12 @@ class TangentBatch {
   AlignedVector<double> A_, P_, mapped_, growth_, inverse_, volume_;
   std::vector<std::int64_t> volume_group_;
   LawScratch scratch_;
+  struct Laminate {
+    int lane;
+    LaminatePoint point;
+  };
+  std::vector<Laminate> laminates_;   ///< ascending by lane
+  std::unique_ptr<LaminateScratch> laminate_scratch_;
 };
 
 }  // namespace perikit

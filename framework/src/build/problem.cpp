@@ -9,6 +9,7 @@
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
 #include "build/image_planes.hpp"
+#include "build/interfaces.hpp"
 #include "build/materials.hpp"
 #include "build/questionable.hpp"
 #include "build/several_ranks.hpp"
@@ -28,6 +29,7 @@ std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint1
 struct Beyond {
   Images images;
   std::vector<FaceMotion> motions;
+  std::shared_ptr<const Interfaces> interfaces;   ///< null: no laminates
 };
 
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
@@ -43,7 +45,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
     const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? any : *of_part;
     throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
   }
-  return {std::move(images), std::move(planes.motions)};
+  return {std::move(images), std::move(planes.motions), nullptr};
 }
 
 /// How far the forces of a formulation reach (partition.hpp).
@@ -53,11 +55,18 @@ Partition::Reach reach_of(const Formulation& formulation) {
 }
 
 /// The bodies of this rank and, where there are several, of all of them.
-Beyond place_points(const Scene& scene, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
+Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   Body whole = build_body(scene);
+  const Interfaces interfaces = build_interfaces(scene, factory, formulation, whole);
+  // By input number: what images and parts keep of the points.
+  const std::optional<Body> original = interfaces.empty() ? std::nullopt : std::optional<Body>(whole);
   Beyond beyond = place_images(scene, whole, quasi_static);
+  const auto know_interfaces = [&](const Images* images) {
+    beyond.interfaces = std::make_shared<const Interfaces>(original ? interfaces_on(*parts.body, *original, images, interfaces) : interfaces);
+  };
   if (communicator().size() == 1) {
     parts.body = std::make_unique<const Body>(std::move(whole));
+    know_interfaces(beyond.images.size() > 0 ? &beyond.images : nullptr);
     if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     return beyond;
   }
@@ -67,6 +76,7 @@ Beyond place_points(const Scene& scene, const Formulation& formulation, ProblemP
     throw InputError(scene.body.position, "body", error.what());
   }
   parts.body = std::make_unique<const Body>(parts.partition->part(image_material(scene)));
+  know_interfaces(nullptr);
   return beyond;
 }
 
@@ -180,7 +190,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
       .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
   refuse_on_ranks(scene, of_terms.formulation, integrator);
   steps.begin("points");
-  Beyond beyond = place_points(scene, of_terms.formulation, parts, quasi_static);
+  Beyond beyond = place_points(scene, factory, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
   const bool others = partition || parts.images;  // points that store nothing
@@ -192,6 +202,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
+  of_terms.interfaces = beyond.interfaces;
   if (scene.damage) steps.begin("limits of bonds");
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
   of_terms.damage = parts.fracture.damage();

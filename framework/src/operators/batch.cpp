@@ -9,12 +9,15 @@
 
 namespace perikit {
 
-void ScratchPool::prepare(const Laws& laws) {
+void ScratchPool::prepare(const Laws& laws, bool laminates) {
+  for (const auto& scratch : scratch_)
+    if (laminates && !scratch->laminate) scratch->laminate = std::make_unique<LaminateScratch>(laws);
   while (scratch_.size() < static_cast<std::size_t>(thread_count())) {
     // Value-initialised: components that no kernel writes (lateral H) stay zero.
     scratch_.push_back(std::make_unique<BatchScratch>());
     BatchScratch& s = *scratch_.back();
     laws.prepare(s.law, false);
+    if (laminates) s.laminate = std::make_unique<LaminateScratch>(laws);
     for (auto* state : {&s.old_state, &s.new_state}) state->assign(static_cast<std::size_t>(laws.state_components()) * batch_points, 0.0);
   }
 }
@@ -48,7 +51,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
-  batch.confined = !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain);
+  batch.confined = confined();
   batch.points = points;
   if (energy_ || screen_ || work_ == Work::sample) batch.psi = s.psi;
   batch.P = P;
@@ -77,11 +80,57 @@ double weighted_energy(int n, const double* weight, const double* psi) noexcept 
 
 }  // namespace
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P,
-                    double* energy) const noexcept {
+/// Laminates among n lanes, by the numbers that the space gave them.
+void BatchWork::find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept {
+  for (int l = 0; l < n; ++l) {
+    if (!laminates_->near(s.owner[l]) || (!both_ends && laws_.record_of(static_cast<std::size_t>(s.owner[l])).silent)) continue;
+    std::int64_t number = s.first_number >= 0 ? s.first_number + l : s.number[l];
+    if (number < 0) continue;
+    // Both ends of a bond that is evaluated once see the same.
+    if (s.far_number > 0 && number >= s.far_number) number -= s.far_number;
+    const LaminatePoint* const point = laminates_->at(number);
+    if (!point) continue;
+    lanes.lane[lanes.n] = l;
+    lanes.point[lanes.n++] = point;
+  }
+}
+
+/// A laminate carries the weights of both ends at once; those that store nothing add none.
+void BatchWork::merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept {
+  for (int k = 0; k < lanes.n; ++k) {
+    const int l = lanes.lane[k];
+    const auto silent = [&](std::int32_t p) { return laws_.record_of(static_cast<std::size_t>(p)).silent; };
+    s.weight[l] = (silent(s.owner[l]) ? 0.0 : s.weight[l]) + (silent(s.far[l]) ? 0.0 : s.far_weight[l]);
+    s.far_weight[l] = 0;
+  }
+}
+
+/// Laminates in place of what one law gave on their lanes.
+int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept {
+  LaminateBatch batch;
+  batch.n = lanes.n;
+  batch.lane = lanes.lane;
+  batch.laminate = lanes.point;
+  batch.H = s.H;
+  batch.confined = confined();
+  if (energy_ || screen_ || work_ == Work::sample) batch.psi = s.psi;
+  batch.P = P;
+  if (dP) batch.dH = s.dH;
+  batch.dP = dP;
+  if (work_ == Work::sample) batch.lateral = s.lateral;
+  const int bad = s.laminate->evaluate(batch);
+  if (bad >= 0) return bad;
+  for (int k = 0; k < lanes.n && screen_; ++k) s.highest[lanes.lane[k]] = s.psi[lanes.lane[k]];
+  return -1;
+}
+
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, double* energy,
+                    const LaminateLanes* laminates) const noexcept {
   const int d = dimension(laws_.space());
   const bool tangent = work_ == Work::tangent;
-  const int bad = evaluate_laws(n, s, points, numbers, tangent ? nullptr : P, tangent ? P : nullptr);
+  int bad = evaluate_laws(n, s, points, numbers, tangent ? nullptr : P, tangent ? P : nullptr);
+  if (bad >= 0) return bad;
+  if (laminates && laminates->n > 0) bad = evaluate_laminates(s, tangent ? nullptr : P, tangent ? P : nullptr, *laminates);
   if (bad >= 0) return bad;
   if (energy_) *energy += weighted_energy(n, weight, s.psi);
   if (work_ == Work::sample) return -1;
@@ -163,12 +212,24 @@ void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
 }
 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
+  if (finder_) {
+    finder_->add(n, s);
+    return -1;
+  }
   if (balance_) return balance_pass(n, s, both_ends);
   if (both_ends && laws_.any_far()) leave_out_far(n, s);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
+  if (!laminates_) return evaluate_plain(n, s, both_ends, energy, nullptr);
+  LaminateLanes laminates;
+  find_laminates(n, s, both_ends, laminates);
+  if (laminates.n > 0 && both_ends) merge_weights(s, laminates);
+  return evaluate_plain(n, s, both_ends, energy, &laminates);
+}
+
+int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept {
   const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
-  if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy);
+  if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
   bool differ = false;
   if (laws_.single()) {
@@ -183,9 +244,10 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
       }
     }
   }
-  int bad = pass(n, s, owners, 0, s.weight, s.P, energy);
+  int bad = pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   if (bad >= 0 || !differ) return bad;
-  bad = pass(n, s, s.far, s.far_number, s.far_weight, s.other, energy);
+  // Laminates have no weight left here.
+  bad = pass(n, s, s.far, s.far_number, s.far_weight, s.other, energy, nullptr);
   const int d = dimension(laws_.space());
   for (int c = 0; c < d * d; ++c)
     for (int l = 0; l < n; ++l) s.P[c * batch_points + l] += s.other[c * batch_points + l];
@@ -230,6 +292,7 @@ void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)
 }
 
 void Pass::add_samples(int n, const BatchScratch& s) {
+  if (work.finds()) return;
   if (bonds)
     bonds->add(n, s);
   else

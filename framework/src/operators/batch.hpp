@@ -9,6 +9,7 @@
 
 #include "maps/selective_map.hpp"
 #include "operators/bond_screen.hpp"
+#include "operators/laminates.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/operators/law_history.hpp"
 #include "perikit/operators/laws.hpp"
@@ -60,6 +61,7 @@ struct BatchScratch {
   std::int32_t owner[batch_points];
   std::int32_t far[batch_points];
   LawScratch law;
+  std::unique_ptr<LaminateScratch> laminate;     ///< where there are interfaces between materials
   // Laws with history: the stable numbers of the lanes, to be filled in by the space where history is kept.
   std::int64_t first_number = -1;                ///< of lane 0 where those of all lanes, padding included, follow each other; else -1, and
   std::int64_t number[batch_points];             ///< by lane; -1: fresh, and not kept
@@ -83,7 +85,7 @@ struct SampleSums {
 class ScratchPool {
  public:
   /// Before a parallel loop: memory for every thread, with room for the constants of the laws.
-  void prepare(const Laws& laws);
+  void prepare(const Laws& laws, bool laminates = false);
   BatchScratch& mine() noexcept { return *scratch_[static_cast<std::size_t>(thread_index())]; }
   std::size_t bytes() const noexcept { return scratch_.size() * sizeof(BatchScratch); }
 
@@ -101,8 +103,18 @@ class BatchWork {
   /// history: null where no law has one.
   /// screen: null where bonds are not screened.
   BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr,
-            BondScreen* screen = nullptr)
-      : laws_(laws), work_(work), energy_(energy), selective_(selective), history_(history), balance_(balance), screen_(screen) {}
+            BondScreen* screen = nullptr, const Laminates* laminates = nullptr)
+      : laws_(laws),
+        work_(work),
+        energy_(energy),
+        selective_(selective),
+        history_(history),
+        balance_(balance),
+        screen_(screen),
+        laminates_(laminates) {}
+  /// Gradients are collected, and no law is evaluated.
+  BatchWork(const Laws& laws, LaminateFinder& finder)
+      : laws_(laws), work_(Work::sample), energy_(false), selective_(false), history_(nullptr), balance_(nullptr), screen_(nullptr), finder_(&finder) {}
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
@@ -112,7 +124,10 @@ class BatchWork {
   /// The same where the first `lanes` lanes belong to `count` points in turn, every eighth to the same one. From any thread.
   void screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept;
   /// Whether the numbers of lanes are asked for.
-  bool history() const noexcept { return history_ != nullptr; }
+  bool numbered() const noexcept { return history_ || laminates_ || finder_; }
+  /// Some evaluation points are laminates.
+  bool laminates() const noexcept { return laminates_ != nullptr; }
+  bool finds() const noexcept { return finder_ != nullptr; }
   /// What is done in place of laws; null: laws are.
   const Balance* balance() const noexcept { return balance_; }
 
@@ -125,8 +140,20 @@ class BatchWork {
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
  private:
-  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P,
-           double* energy) const noexcept;
+  /// The lanes of a batch that are laminates.
+  struct LaminateLanes {
+    int n = 0;
+    int lane[batch_points];
+    const LaminatePoint* point[batch_points];
+  };
+
+  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, double* energy,
+           const LaminateLanes* laminates) const noexcept;
+  void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
+  void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;
+  int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
+  bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
+  int evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
@@ -143,6 +170,8 @@ class BatchWork {
   LawHistory* history_;
   const Balance* balance_;
   BondScreen* screen_;
+  const Laminates* laminates_ = nullptr;
+  LaminateFinder* finder_ = nullptr;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.

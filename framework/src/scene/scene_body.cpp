@@ -147,6 +147,8 @@ void SceneReader::read_family(const toml::table& root) {
     if (values.has(key)) scene_.horizon_position = values.position(key);
   if (values.has("partial_volume")) scene_.partial_volume = values.boolean("partial_volume");
   scene_.partial_volume_position = values.position("partial_volume");
+  if (values.given("interfaces")) scene_.laminates = values.text("interfaces") == "laminate";
+  scene_.laminates_position = values.position("interfaces");
   if (values.has("consistent")) scene_.consistent = values.boolean("consistent");
   scene_.consistent_position = values.position("consistent");
   if (values.has("influence")) scene_.influence = values.shared_part("influence");

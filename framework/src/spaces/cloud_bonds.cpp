@@ -31,7 +31,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
     scale_[p] = normaliser > 0 ? position_[p][3] / normaliser : 0.0;
   }
-  if (parts.history()) number_bonds();
+  if (parts.numbered()) number_bonds();
   if (!selective_) return;
   volume_.resize(points_);
   pressure_.resize(points_);
@@ -150,7 +150,7 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, do
     const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
     bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
     if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, dH);
-    if (pass.work.history()) number(p, begin, n, lanes, s);
+    if (pass.work.numbered()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
     const auto owner = static_cast<std::int32_t>(p);
@@ -258,7 +258,7 @@ void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
 
 template <int D>
 void CloudBonds<D>::run(Pass& pass) {
-  scratch_.prepare(laws_);
+  scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   const bool tangent = pass.work.tangent();
   mirror_rows(pass.u, points_, u_);

@@ -75,7 +75,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
 
 template <int D>
 void CloudPoints<D>::run(Pass& pass) {
-  scratch_.prepare(laws_);
+  scratch_.prepare(laws_, pass.work.laminates());
   mirror_rows(pass.u, points_, u_);
   if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
   if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });

@@ -67,8 +67,12 @@ struct SpaceParts {
   std::span<const double> factors = {};  ///< of the weights, as set_factors takes them; for assemblies
   bool fails = false;                    ///< bonds may fail
 
+  std::shared_ptr<const Interfaces> interfaces = {};  ///< null: no laminates
+
   ConstFieldView shift = {};  ///< of point gradients, as shift_gradients takes it; for assemblies
   bool history() const noexcept { return laws.state_components() > 0; }
+  /// Evaluation points need numbers.
+  bool numbered() const noexcept { return history() || interfaces; }
   QuietBlocks local_blocks(const BlockReach& reach) const { return fails ? QuietBlocks(reach) : QuietBlocks(); }
   QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }
 };

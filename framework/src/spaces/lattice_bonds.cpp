@@ -202,7 +202,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
       s.far[k * chunk_points + l] = static_cast<std::int32_t>((mask >> l & 1) ? p + shifts[k] + l : p + l);
     }
   }
-  if (pass.work.history()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
+  if (pass.work.numbered()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
   const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
   pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
@@ -264,7 +264,7 @@ void LatticeBonds<D>::divergence(Pass& pass, int number) const {
 
 template <int D>
 void LatticeBonds<D>::run(Pass& pass) {
-  scratch_.prepare(laws_);
+  scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
   if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });

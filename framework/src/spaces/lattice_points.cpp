@@ -37,7 +37,7 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
       }
     }
   }
-  if (pass.work.history()) {
+  if (pass.work.numbered()) {
     s.first_number = index[n - 1] - index[0] == n - 1 ? std::int64_t{index[0]} * chunk_points : -1;
     for (int l = 0; l < n * chunk_points; ++l) s.number[l] = std::int64_t{index[l / chunk_points]} * chunk_points + l % chunk_points;
   }
@@ -162,7 +162,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
 
 template <int D>
 void LatticePoints<D>::run(Pass& pass) {
-  scratch_.prepare(laws_);
+  scratch_.prepare(laws_, pass.work.laminates());
   if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
   if (pass.alone() || pass.nearby || pass.work.tangent())
     quiet_.wake();

@@ -102,7 +102,7 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
   const Place& place = place_[static_cast<std::size_t>(p)];
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
-  if (pass.work.history() || factor_)
+  if (pass.work.numbered() || factor_)
     find_numbers(p, groups_[place.group], m);
   else
     m.original.clear();
@@ -317,7 +317,7 @@ void Weighted<D>::block(std::size_t b, Pass& pass) {
 
 template <int D>
 void Weighted<D>::run(Pass& pass) {
-  scratch_.prepare(laws_);
+  scratch_.prepare(laws_, pass.work.laminates());
   while (memory_.size() < static_cast<std::size_t>(thread_count())) memory_.push_back(std::make_unique<Memory>());
   const std::size_t stride = body_.stride();
   if (singles_) {

@@ -21,7 +21,7 @@ Weighted<D>::Weighted(const SpaceParts& parts)
   quiet_ = parts.quiet_blocks(reach);
   local_ = parts.local_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
-  if (parts.history()) number_groups();
+  if (parts.numbered()) number_groups();
 }
 
 template <int D>

@@ -87,6 +87,7 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   const Row x = position_[p], own = u_[p], own_w = rate ? w_[p] : Row{}, own_moduli = moduli_.empty() ? Row{} : moduli_[p];
+  const bool crosses = fields_.crosses(p);
   const std::int32_t* neighbour = lists_.neighbour.data() + begin;
   const double *omega = families_.whole_omegas(), *integrity = families_.integrities();
   for (int l = 0; l < n; ++l) {
@@ -112,7 +113,8 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     if constexpr (!sums) {
       if (dilatation_) g.q[l] = own[3] + u_[j][3];
       if (!moduli_.empty()) {
-        const Row mean = 0.5 * (own_moduli + moduli_[j]);
+        Row mean = 0.5 * (own_moduli + moduli_[j]);
+        if (crosses) mean[3] = fields_.of_bond(p, j);
         double factor = 0;
         for (int c = 0; c < D; ++c) factor += mean[c] * xi[c] * xi[c];
         s.modulus[l] = fields_.correction.size() > 0 ? mean[3] * factor / square : mean[3];

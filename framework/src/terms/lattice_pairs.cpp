@@ -98,7 +98,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   const bool screened = work == PairWork::force && pass.screen,
              energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
   Pack highest[packs];  // energy of a bond, over its share where that is asked for
-  const bool uniform = fields_.modulus.size() == 0;
+  const bool uniform = fields_.modulus.size() == 0, crosses = fields_.crosses(static_cast<std::size_t>(p));
   alignas(64) PairScratch s;
   if constexpr (!sums) {
     if (uniform)
@@ -161,6 +161,13 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
           }
           if (!uniform) {
             Pack c = Pack(0.5) * (Pack::load(fields_.modulus.data() + p + l) + Pack::load(fields_.modulus.data() + far + l));
+            if (crosses) {
+              alignas(64) double of_lane[pack_width];
+              c.store(of_lane);
+              for (int i = 0; i < pack_width; ++i)
+                if (bits >> i & 1) of_lane[i] = fields_.of_bond(static_cast<std::size_t>(p + l + i), static_cast<std::size_t>(far + l + i));
+              c = Pack::load(of_lane);
+            }
             if (fields_.correction.size() > 0) {
               Pack g(0.0);
               for (int a = 0; a < D; ++a) {

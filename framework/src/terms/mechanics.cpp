@@ -1,5 +1,9 @@
 #include "terms/mechanics.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
 #include "perikit/core/dimension.hpp"
@@ -8,6 +12,10 @@ namespace perikit {
 
 Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
   space_ = with_dimension(parts.families.body().dimension(), [&](auto d) { return make_space<d>(parts_); });
+  if (parts_.interfaces) {
+    laminates_ = std::make_unique<Laminates>(parts_.interfaces, parts.families.body().stride(), space_->numbers());
+    find_laminates(laminates_->near(), false);
+  }
   if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
 }
 
@@ -19,10 +27,89 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
   if (consistency_->shift.components() == 0) return;
   parts_.shift = consistency_->shift;
   space_->shift_gradients(parts_.shift);
+  if (laminates_) find_laminates(laminates_->near(), true);
 }
 
 BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
-  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen};
+  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen, laminates_.get()};
+}
+
+void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
+  space_->bonds_changed(points);
+  if (!laminates_) return;
+  // Gradients at the far ends of bonds change as well.
+  GroupMarks marks(parts_.families.body().stride() / padding, 0);
+  parts_.families.mark(points, marks);
+  find_laminates(std::move(marks), true);
+}
+
+/// Of the rows of these displacements, where those of the first `keep` components are not zero.
+std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near) {
+  LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep);
+  const BatchWork work(parts_.laws, finder);
+  Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
+  space_->run(pass);
+  return finder.take();
+}
+
+void Mechanics::find_laminates(GroupMarks marks, bool again) {
+  const Body& body = parts_.families.body();
+  const Interfaces& interfaces = laminates_->interfaces();
+  const int d = body.dimension();
+  std::vector<std::int32_t> points;
+  bool any = false;
+  for (std::size_t g = 0; g < marks.size(); ++g) {
+    marks[g] = marks[g] && laminates_->near()[g];
+    any |= marks[g] != 0;
+  }
+  if (!any) return;
+  for (std::size_t p = 0; p < body.stride(); ++p)
+    if (marks[p / padding] && body.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+  GroupMarks near(marks.size(), 0);
+  parts_.families.mark(points, near);
+  Field values = body.make_field(d);
+  if (again)
+    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) laminates_->clear(found.number);
+  // The gradients of the three values, as many of them at once as there are components.
+  for (std::size_t k = 0; k < interfaces.all.size(); ++k) {
+    std::vector<LaminateFinder::Found> of_value[interface_values];
+    for (int first = 0; first < interface_values; first += d) {
+      const int count = std::min(d, interface_values - first);
+      for (int c = 0; c < d; ++c) {
+        double* const to = values.component(c);
+        std::fill_n(to, body.stride(), 0.0);
+        for (const std::int32_t index : body.internal())
+          if (const auto p = static_cast<std::size_t>(index); c < count) to[p] = interface_value(interfaces, k, p, static_cast<InterfaceValue>(first + c));
+      }
+      // Both parts of the distance, where they come together.
+      const std::vector<LaminateFinder::Found> found = gradients_of(values, first == 0 ? std::min(count, 2) : 1, marks, near);
+      for (int c = 0; c < count; ++c) {
+        std::vector<LaminateFinder::Found>& to = of_value[first + c];
+        to = found;
+        for (LaminateFinder::Found& entry : to) std::copy_n(entry.gradient[c], 3, entry.gradient[0]);
+      }
+    }
+    const auto other = [&](InterfaceValue what, std::int64_t number) -> const double* {
+      const auto& all = of_value[static_cast<int>(what)];
+      const auto at = std::ranges::lower_bound(all, number, {}, &LaminateFinder::Found::number);
+      return at != all.end() && at->number == number ? at->gradient[0] : nullptr;
+    };
+    for (const LaminateFinder::Found& found : of_value[0]) {
+      const double* const minus = other(InterfaceValue::minus, found.number);
+      if (!minus || !sees(d, minus)) continue;
+      double gradient[interface_values][3] = {};
+      std::copy_n(found.gradient[0], 3, gradient[0]);
+      std::copy_n(minus, 3, gradient[1]);
+      if (const double* others = other(InterfaceValue::others, found.number)) std::copy_n(others, 3, gradient[2]);
+      LaminatePoint point;
+      if (!find_laminate(d, gradient, point)) {
+        ++laminates_->kept_parallel;
+        continue;
+      }
+      set_points(interfaces, k, found.owner, point);
+      laminates_->set(found.number, point);
+    }
+  }
 }
 
 /// Each block is one rank's.
@@ -115,6 +202,13 @@ void Mechanics::report(ModelReport& report) const {
   space_->report(report);
   if (history_) report.bytes += history_->bytes();
   if (consistency_) consistency_->report(report);
+  if (!laminates_) return;
+  report.bytes += laminates_->bytes();
+  report.notes.emplace_back("interfaces", fmt::format("{} evaluation points are laminates of two materials{}", laminates_->count(),
+                                                      laminates_->kept_parallel == 0 ? std::string()
+                                                                                     : fmt::format("; {} that see corners, thin layers or more than two materials "
+                                                                                                   "take each law by its share of the weight",
+                                                                                                   laminates_->kept_parallel)));
 }
 
 }  // namespace perikit

@@ -21,7 +21,7 @@ class Mechanics final : public Term {
   void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
   void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
-  void bonds_changed(std::span<const std::int32_t> points) override { space_->bonds_changed(points); }
+  void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
   void screen(BondScreen* screen) override { screen_ = screen; }
   void report(ModelReport& report) const override;
@@ -37,11 +37,15 @@ class Mechanics final : public Term {
 
  private:
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
+  /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
+  void find_laminates(GroupMarks marks, bool again);
+  std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near);
   void add_owned(const std::vector<double>& energies, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
+  std::unique_ptr<Laminates> laminates_;
   BondScreen* screen_ = nullptr;
   std::shared_ptr<const CloudConsistency> consistency_;
 };

@@ -51,7 +51,7 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
   return finite;
 }
 
-// c_ij = (c_i + c_j)/2, times the mean correction along the bond.
+// c_ij times the mean correction along the bond.
 template <int D>
 void PairAssembly<D>::moduli(std::size_t row, Memory& m) const {
   const PairFields& fields = points_.fields;
@@ -59,7 +59,7 @@ void PairAssembly<D>::moduli(std::size_t row, Memory& m) const {
   const std::size_t p = rows_.point(row);
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     const std::size_t q = rows_.point(static_cast<std::size_t>(neighbours[k]));
-    m.modulus[k] = fields.modulus.size() == 0 ? fields.uniform : 0.5 * (fields.modulus.data()[p] + fields.modulus.data()[q]);
+    m.modulus[k] = fields.of_bond(p, q);
     if (fields.correction.size() == 0) continue;
     double factor = 0;
     for (int c = 0; c < D; ++c) {

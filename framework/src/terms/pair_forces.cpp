@@ -71,7 +71,7 @@ FamilyArrays regular_family(const Families& families) {
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
-    : families_(parts.families), body_(families_.body()), laws_(parts.laws), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
+    : families_(parts.families), body_(families_.body()), laws_(parts.laws), interfaces_(parts.interfaces), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
   const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
   loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (formulation_.dilatation) {
@@ -89,6 +89,36 @@ PairForces<D>::PairForces(const PairParts& parts)
     fields_.modulus = std::move(modulus);
   }
   if (formulation_.pair_traits.surface_correction) set_correction();
+  if (interfaces_) set_sides();
+}
+
+template <int D>
+void PairForces<D>::set_sides() {
+  fields_.near.assign(body_.stride() / padding, 0);
+  fields_.sides = body_.make_field(PairFields::side_components);
+  for (const std::int32_t index : body_.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    fields_.sides.component(PairFields::material)[p] = interfaces_->material[p];
+    fields_.sides.component(PairFields::stores)[p] = laws_.record_of(p).silent ? 0.0 : 1.0;
+  }
+  for (const Interface& interface : interfaces_->all)
+    for (std::size_t k = 0; k < interface.point.size(); ++k) {
+      const auto p = static_cast<std::size_t>(interface.point[k]);
+      // Of several interfaces the nearest one.
+      double& distance = fields_.sides.component(PairFields::distance)[p];
+      const double found = std::abs(interface.distance[k]);
+      distance = distance > 0 ? std::min(distance, found) : found;
+      fields_.near[p / padding] = 1;
+    }
+  renew_sides();
+}
+
+/// Moduli have changed.
+template <int D>
+void PairForces<D>::renew_sides() {
+  double* const stiffness = fields_.sides.component(PairFields::stiffness);
+  for (const Interface& interface : interfaces_->all)
+    for (const std::int32_t p : interface.point) stiffness[p] = fields_.modulus.data()[interfaces_->source[static_cast<std::size_t>(p)]];
 }
 
 template <int D>
@@ -133,6 +163,7 @@ void PairForces<D>::bonds_changed(std::span<const std::int32_t> points) {
     families_.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
     set_moduli(family, {&p, 1}, fields_.modulus);
   }
+  if (interfaces_) renew_sides();
 }
 
 template <int D>
@@ -173,7 +204,7 @@ void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) co
     bonds.omega[k] = family.whole_omega(k);
     bonds.extension[k] = bond_stretch(family, k, p, u) * family.length[k];
     double& modulus = bonds.modulus[k];
-    modulus = fields_.modulus.size() == 0 ? fields_.uniform : 0.5 * (fields_.modulus.data()[p] + fields_.modulus.data()[far]);
+    modulus = fields_.of_bond(p, far);
     if (fields_.correction.size() == 0) continue;
     double factor = 0;
     for (int a = 0; a < D; ++a) {

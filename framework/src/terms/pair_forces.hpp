@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "body/interfaces.hpp"
 #include "terms/pair_loop.hpp"
 #include "terms/term.hpp"
 
@@ -12,6 +13,7 @@ struct PairParts {
   const Formulation& formulation;
   const Laws& laws;
   bool skip = true, share = true;
+  std::shared_ptr<const Interfaces> interfaces;   ///< across these bonds are springs in series; null: nowhere
 };
 
 /// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
@@ -50,6 +52,8 @@ class PairForces final : public Term {
   void set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus);
   void warn(const PairPoint& point, const MaterialRecord& record);
   void set_correction();
+  void set_sides();
+  void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
   /// density. only: groups of points to do, null for all.
@@ -59,6 +63,7 @@ class PairForces final : public Term {
   const Families& families_;
   const Body& body_;
   const Laws& laws_;
+  std::shared_ptr<const Interfaces> interfaces_;
   const Formulation& formulation_;
   const PairKinematics& law_;
   bool share_;

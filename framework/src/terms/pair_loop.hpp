@@ -41,6 +41,30 @@ struct PairFields {
   Field modulus;                  ///< c_i; empty where `uniform` holds
   double uniform = 0;
   Field correction;               ///< by axis; empty without surface correction
+  // Near interfaces between materials; else empty.
+  std::vector<std::uint8_t> near; ///< by group of eight points
+  Field sides;                    ///< see Side
+
+  /// What a bond that crosses an interface needs of its ends: the number of the material, the distance from the interface [m], c_i (of an
+  /// image that of its source), and whether the point stores something, 1 or 0.
+  enum Side { material, distance, stiffness, stores, side_components };
+  bool crosses(std::size_t p) const noexcept { return !near.empty() && near[p / padding]; }
+  /// c_ij of a bond without its correction: the mean of both ends; across an interface springs in series, each as long as the bond lies on
+  /// its side.
+  double of_bond(std::size_t p, std::size_t q) const noexcept {
+    if (modulus.size() == 0) return uniform;
+    const double series = crosses(p) ? in_series(p, q) : -1.0;
+    return series < 0 ? 0.5 * (modulus.data()[p] + modulus.data()[q]) : series;
+  }
+  /// Negative where the bond does not cross.
+  double in_series(std::size_t p, std::size_t q) const noexcept {
+    if (sides.component(material)[p] == sides.component(material)[q]) return -1;
+    const double c[2] = {sides.component(stiffness)[p], sides.component(stiffness)[q]};
+    double length[2] = {sides.component(distance)[p], sides.component(distance)[q]};
+    if (!(c[0] > 0 && c[1] > 0)) return -1;
+    if (length[0] + length[1] == 0) length[0] = length[1] = 1;
+    return 0.5 * (sides.component(stores)[p] + sides.component(stores)[q]) * (length[0] + length[1]) / (length[0] / c[0] + length[1] / c[1]);
+  }
 };
 
 struct PairLoopParts {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "assembly/block_pattern.hpp"
+#include "body/interfaces.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
 #include "perikit/core/communicator.hpp"
@@ -59,11 +60,12 @@ struct Terms::Failing {
 Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   const Formulation& formulation = parts_.formulation;
   const Families& families = *parts_.families;
+  const std::shared_ptr<const Interfaces> meeting = parts_.interfaces && !parts_.interfaces->empty() ? parts_.interfaces : nullptr;
   if (formulation.pairs) {
-    terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share}));
+    terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share, meeting}));
   } else {
     auto mechanics = std::make_unique<Mechanics>(
-        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr});
+        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr, meeting});
     mechanics_ = mechanics.get();
     if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
@@ -254,6 +256,7 @@ ModelReport Terms::report() const {
     report.warnings.push_back(
         "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
   if (parts_.damage) warn_of_energy(parts_, report);
+  for (const std::string& note : parts_.interfaces ? parts_.interfaces->notes : std::vector<std::string>()) report.notes.emplace_back("interfaces", note);
   for (const auto& term : terms_) term->report(report);
   return report;
 }

@@ -88,6 +88,10 @@ class Laws {
   /// Memory for evaluations; `tangents`: with LawBatch::A.
   void prepare(LawScratch& scratch, bool tangents) const;
   Status evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept;
+  /// One law on all lanes, whatever the materials of `points`, which say where constants that vary are taken.
+  Status evaluate_law(std::size_t id, const LawBatch& batch, LawScratch& scratch) const noexcept {
+    return evaluate_one(records_[id], batch, scratch);
+  }
 
  private:
   /// One law on all lanes, whose results at points that store nothing are made zero.

@@ -135,6 +135,8 @@ struct Scene {
   double horizon_ratio = 0;        ///< to the lattice spacing (or mean spacing of a cloud)
   std::optional<bool> consistent;  ///< nullopt where the scene does not say: as random_points()
   bool partial_volume = false;
+  std::optional<bool> laminates;   ///< [family] interfaces; nullopt where the scene does not say
+  SourcePosition laminates_position;
   SourcePosition consistent_position, partial_volume_position, horizon_position;
   std::shared_ptr<const PartValues> influence, kinematics, material, integrator;
   std::shared_ptr<const PartValues> stabilization, damage;   ///< null where the scene has none

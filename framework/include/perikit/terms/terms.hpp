@@ -23,6 +23,7 @@ class BondCriterion;
 class Families;
 class Mechanics;
 struct CloudConsistency;
+struct Interfaces;
 class Term;
 class VolumetricRows;
 
@@ -35,6 +36,7 @@ struct TermParts {
   bool skip = true;                                    ///< leave out work whose result is known; changes no bit
   bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
   const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
+  std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
   std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
 };
 

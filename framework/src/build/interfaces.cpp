@@ -1,0 +1,79 @@
+#include "build/interfaces.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "build/materials.hpp"
+#include "perikit/core/communicator.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// The same law with the same parameters; the density is no matter of it.
+bool alike(const PartValues& a, const PartValues& b) {
+  if (a.type != b.type) return false;
+  const auto keys = [](const PartValues& part) {
+    std::vector<std::string> keys = part.values.keys();
+    std::erase(keys, "density");
+    return keys;
+  };
+  const std::vector<std::string> of_a = keys(a);
+  return of_a == keys(b) && std::ranges::all_of(of_a, [&](const std::string& key) { return *a.values.find(key) == *b.values.find(key); });
+}
+
+bool varies(const PartValues& part, const Constants& constants) {
+  return std::ranges::any_of(part.values.keys(), [&](const std::string& key) {
+    const auto* const text = std::get_if<std::string>(part.values.find(key));
+    return text && part.values.is_expression(key) &&
+           Expression(*text, constants, false, part.values.position(key), part.values.path() + "." + key).depends_on_position();
+  });
+}
+
+/// Why points of this material take their laws side by side; empty: they are laminates.
+std::string obstacle(const Scene& scene, const PartFactory& factory, const PartValues& part, Space space) {
+  const std::shared_ptr<const Material> material = factory.material(part);
+  if (material->state_components(space) > 0) return fmt::format("\"{}\" has a history", part.type);
+  if (!material->traits().hyperelastic) return fmt::format("\"{}\" is no derivative of an energy", part.type);
+  if (communicator().size() > 1 && varies(part, scene.constants)) return fmt::format("\"{}\" varies in space, on several ranks", part.type);
+  return {};
+}
+
+}  // namespace
+
+Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body) {
+  Interfaces out;
+  const auto refuse = [&](const std::string& found, const std::string& allowed) {
+    throw InputError(scene.laminates_position, "family.interfaces",
+                     fmt::format("found \"{}\" {}; allowed: {}", *scene.laminates ? "laminate" : "parallel", found, allowed));
+  };
+  if (scene.laminates && scene.regions.empty()) refuse("in a body of one material", "with a [[region]]");
+  if (scene.laminates == true && formulation.selective())
+    refuse(fmt::format("with kinematics \"{}\", whose volume changes belong to points", scene.kinematics->type), "\"parallel\"");
+  if (scene.regions.empty() || !scene.laminates.value_or(true)) return out;
+  if (formulation.selective()) {
+    out.notes.push_back("the selective map takes each law by its share of the weight");
+    return out;
+  }
+  const auto parts = materials(scene);
+  std::vector<std::uint16_t> same(parts.size());
+  for (std::size_t id = 0; id < parts.size(); ++id) {
+    same[id] = static_cast<std::uint16_t>(id);
+    for (std::size_t other = 0; other < id && same[id] == id; ++other)
+      if (alike(*parts[id], *parts[other])) same[id] = static_cast<std::uint16_t>(other);
+  }
+  // Stencils of bond gradients reach two families from their owner, which lies no farther from the interface.
+  out = find_interfaces(body, same, 3 * body.horizon() * (1 + 1e-9));
+  if (formulation.pairs) return out;
+  for (std::size_t id = 0; id < parts.size(); ++id) {
+    const std::string why = obstacle(scene, factory, *parts[id], body.space());
+    if (why.empty()) continue;
+    const std::size_t kept = std::erase_if(out.all, [&](const Interface& of) { return of.first == id || of.second == id; });
+    if (kept > 0) out.notes.push_back(why + ": each law by its share of the weight");
+  }
+  return out;
+}
+
+}  // namespace perikit

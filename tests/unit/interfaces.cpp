@@ -1,0 +1,115 @@
+/// Where materials meet: distances from flat faces of lattices are exact, from round ones of second order, and independent of threads.
+
+#include "body/interfaces.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "perikit/core/parallel.hpp"
+
+using namespace perikit;
+
+namespace {
+
+/// A lattice of n cells along an edge of 1, with the materials that `of` gives.
+template <class Of>
+Body lattice_body(int dimension, int n, Of&& of, std::vector<Crack> cracks = {}) {
+  const double h = 1.0 / n;
+  const Space space = dimension == 1 ? Space::line_strain : dimension == 2 ? Space::plane_strain : Space::solid;
+  Point upper{};
+  for (int a = 0; a < dimension; ++a) upper[static_cast<std::size_t>(a)] = 1;
+  const Lattice lattice = make_lattice(dimension, h, {0, 0, 0}, upper, 3.015 * h);
+  std::vector<std::int32_t> cells;
+  const int ny = dimension > 1 ? n : 1, nz = dimension > 2 ? n : 1;
+  for (int z = 0; z < nz; ++z)
+    for (int y = 0; y < ny; ++y)
+      for (int x = 0; x < n; ++x) {
+        std::array<int, 3> k{x, y, z}, inner{};
+        for (std::size_t a = 0; a < 3; ++a) inner[a] = k[static_cast<std::size_t>(lattice.axis[a])];
+        cells.push_back(static_cast<std::int32_t>(lattice.index(inner[0], inner[1], inner[2])));
+      }
+  Body body({space, 1, h, 3.015 * h, std::move(cracks)}, lattice, cells);
+  std::vector<std::uint16_t> ids(body.stride(), 0);
+  for (const std::int32_t p : body.internal()) ids[static_cast<std::size_t>(p)] = of(body.position(static_cast<std::size_t>(p)));
+  body.set_materials(std::move(ids));
+  return body;
+}
+
+const std::vector<std::uint16_t> different{0, 1, 2};
+
+}  // namespace
+
+TEST_CASE("interfaces: half way between the layers of a lattice, along every axis and the diagonal") {
+  for (int d = 1; d <= 3; ++d)
+    for (int kind = 0; kind < (d == 1 ? 1 : 4); ++kind) {
+      const int n = d == 3 ? 10 : 20;
+      const double h = 1.0 / n, root = std::sqrt(2.0);
+      const auto value = [&](const Point& x) {
+        return kind < d ? x[static_cast<std::size_t>(kind)] - 0.5 : kind == 3 ? (x[0] + x[1] - 1 - 1.5 * h) / root : NAN;
+      };
+      if (kind == 2 && d == 2) continue;
+      // Diagonal layers lie half a spacing apart along x + y: that of x + y = 1 + h and that of 1 + 2 h are the last and the first.
+      const Body body = lattice_body(d, n, [&](const Point& x) { return static_cast<std::uint16_t>(value(x) > 0); });
+      const Interfaces found = find_interfaces(body, different, 9 * h);
+      INFO(d, "D, kind ", kind);
+      REQUIRE(found.all.size() == 1);
+      CHECK(found.all[0].first == 0);
+      double worst = 0;
+      std::size_t near = 0;
+      for (const std::int32_t p : body.internal()) near += std::abs(value(body.position(static_cast<std::size_t>(p)))) < 8 * h;
+      CHECK(found.all[0].point.size() >= near);
+      for (std::size_t k = 0; k < found.all[0].point.size(); ++k)
+        worst = std::max(worst, std::abs(found.all[0].distance[k] - value(body.position(static_cast<std::size_t>(found.all[0].point[k])))));
+      CHECK(worst <= 1e-10 * h);
+    }
+}
+
+TEST_CASE("interfaces: the distance from a circle, whatever the number of threads") {
+  for (const int n : {40, 80}) {
+    const double radius = 0.31, h = 1.0 / n;
+    const auto value = [&](const Point& x) { return std::hypot(x[0] - 0.5, x[1] - 0.5) - radius; };
+    const Body body = lattice_body(2, n, [&](const Point& x) { return static_cast<std::uint16_t>(value(x) > 0); });
+    const int threads = thread_count();
+    set_thread_count(1);
+    const Interfaces found = find_interfaces(body, different, 9 * h);
+    REQUIRE(found.all.size() == 1);
+    double sum = 0;
+    for (std::size_t k = 0; k < found.all[0].point.size(); ++k) {
+      const double error = found.all[0].distance[k] - value(body.position(static_cast<std::size_t>(found.all[0].point[k])));
+      sum += error * error;
+    }
+    // Stairs are h wide: what is left of them is a fraction of it.
+    CHECK(std::sqrt(sum / static_cast<double>(found.all[0].point.size())) <= 0.25 * h);
+    for (const int count : {2, 3}) {
+      set_thread_count(count);
+      const Interfaces again = find_interfaces(body, different, 9 * h);
+      CHECK(again.all[0].point == found.all[0].point);
+      CHECK(again.all[0].distance == found.all[0].distance);
+      CHECK(again.all[0].counterpart == found.all[0].counterpart);
+    }
+    set_thread_count(threads);
+  }
+}
+
+TEST_CASE("interfaces: none between equal materials; where they are whatever cracks; one for each pair") {
+  const auto halves = [](const Point& x) { return static_cast<std::uint16_t>(x[0] > 0.5); };
+  CHECK(find_interfaces(lattice_body(2, 10, halves), std::vector<std::uint16_t>{0, 0}, 1).empty());
+  const Interfaces whole = find_interfaces(lattice_body(2, 10, halves), different, 1),
+                   cut = find_interfaces(lattice_body(2, 10, halves, {Crack({{0.5, -1, 0}, {0.5, 2, 0}})}), different, 1);
+  CHECK(whole.all[0].distance == cut.all[0].distance);
+  const auto thirds = [](const Point& x) { return static_cast<std::uint16_t>(x[0] < 0.3 ? 0 : x[1] < 0.5 ? 1 : 2); };
+  const Interfaces found = find_interfaces(lattice_body(2, 20, thirds), different, 0.2);
+  REQUIRE(found.all.size() == 3);
+  for (const Interface& of : found.all) {
+    CHECK(of.first < of.second);
+    CHECK(std::ranges::is_sorted(of.point));
+    for (std::size_t k = 0; k < of.point.size(); ++k) {
+      const std::uint16_t own = found.material[static_cast<std::size_t>(of.point[k])], other = found.material[static_cast<std::size_t>(of.counterpart[k])];
+      CHECK((own == of.first ? other == of.second : own == of.second && other == of.first));
+      CHECK((own == of.first ? of.distance[k] <= 0 : of.distance[k] >= 0));
+    }
+  }
+}
