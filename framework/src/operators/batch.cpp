@@ -59,7 +59,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   batch.dP = dP;
   if (work_ == Work::sample) batch.lateral = s.lateral;
   if (history_) batch.state = begin_state(n, s, numbers);
-  const int bad = laws_.evaluate(batch, s.law).inadmissible;
+  const int bad = (s.one_law >= 0 ? laws_.evaluate_law(static_cast<std::size_t>(s.one_law), batch, s.law) : laws_.evaluate(batch, s.law)).inadmissible;
   if (history_ && bad < 0) end_state(n, s, numbers);
   if (screen_)
     for (int l = 0; l < n; ++l) s.highest[l] = std::max(s.highest[l], s.psi[l]);
@@ -147,7 +147,8 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
   const bool tangent = work_ == Work::tangent;
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
   selective_map(laws_.space(), batch, s.H, s.dH);
-  if (ends == 2 && !laws_.single()) std::copy_n(s.far, lanes, s.owner + lanes);
+  const bool one_law = this->one_law(s);
+  if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
   if (ends == 2 && history_) {
     for (int l = 0; l < lanes; ++l) {
       if (s.first_number >= 0) s.number[l] = s.first_number + l;
@@ -155,9 +156,9 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
     }
     s.first_number = -1;
   }
-  const int bad = evaluate_laws((ends - 1) * lanes + n, s, laws_.single() ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
+  const int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
   if (bad >= 0) return bad % lanes;
-  if (!laws_.single()) {
+  if (!one_law) {
     // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks for them.
     const auto tidy = [](double* x, int lanes_of) {
       for (int l = 0; l < lanes_of; l += pack_width) {
@@ -217,10 +218,10 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
     return -1;
   }
   if (balance_) return balance_pass(n, s, both_ends);
-  if (both_ends && laws_.any_far()) leave_out_far(n, s);
+  if (both_ends && s.one_law < 0 && laws_.any_far()) leave_out_far(n, s);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
-  if (!laminates_) return evaluate_plain(n, s, both_ends, energy, nullptr);
+  if (!laminates_ || s.one_law >= 0) return evaluate_plain(n, s, both_ends, energy, nullptr);
   LaminateLanes laminates;
   find_laminates(n, s, both_ends, laminates);
   if (laminates.n > 0 && both_ends) merge_weights(s, laminates);
@@ -228,11 +229,11 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
 }
 
 int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept {
-  const std::int32_t* owners = laws_.single() ? nullptr : s.owner;
+  const std::int32_t* owners = one_law(s) ? nullptr : s.owner;
   if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
   bool differ = false;
-  if (laws_.single()) {
+  if (one_law(s)) {
     for (int l = 0; l < n; ++l) s.weight[l] += s.far_weight[l];
   } else {
     for (int l = 0; l < n; ++l) {

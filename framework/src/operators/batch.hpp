@@ -60,6 +60,9 @@ struct BatchScratch {
   alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
   std::int32_t owner[batch_points];
   std::int32_t far[batch_points];
+  /// The law of both ends of all lanes, with the same constants, where the space knows it, and none is a laminate; else -1: owner and
+  /// far tell.
+  std::int32_t one_law = -1;
   LawScratch law;
   std::unique_ptr<LaminateScratch> laminate;     ///< where there are interfaces between materials
   // Laws with history: the stable numbers of the lanes, to be filled in by the space where history is kept.
@@ -127,6 +130,8 @@ class BatchWork {
   bool numbered() const noexcept { return history_ || laminates_ || finder_; }
   /// Some evaluation points are laminates.
   bool laminates() const noexcept { return laminates_ != nullptr; }
+  /// These eight points may own laminates.
+  bool laminates_near(std::int32_t first) const noexcept { return laminates_ && laminates_->near(first); }
   bool finds() const noexcept { return finder_ != nullptr; }
   /// What is done in place of laws; null: laws are.
   const Balance* balance() const noexcept { return balance_; }
@@ -152,6 +157,7 @@ class BatchWork {
   void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
   void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;
   int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
+  bool one_law(const BatchScratch& s) const noexcept { return laws_.single() || s.one_law >= 0; }
   bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
   int evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;

@@ -30,6 +30,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       far_share_(formulation_.far_share),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
+      roles_(families_, laws_),
       operator_(families_),
       slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
@@ -74,11 +75,12 @@ void LatticeBonds<D>::gradients(std::size_t b, Pass& pass) {
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     const LatticeChunk& chunk = tiles_.chunks[c];
-    if (!pass.gradient_wanted(chunk.first)) {
+    if (!pass.gradient_wanted(chunk.first) || !roles_.wants(c, &ChunkRole::gradient)) {
       ++c;
       continue;
     }
-    const int n = stencils_ || pass.near ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
+    int n = stencils_ || pass.near ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
+    while (n > 1 && !roles_.wants(c + static_cast<std::size_t>(n) - 1, &ChunkRole::gradient)) --n;
     if (stencils_) {
       stencils_->gradient(chunk, pass.u, gradient_);
       if (tangent) stencils_->gradient(chunk, pass.w, direction_);
@@ -197,7 +199,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
         if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
       }
     }
-    for (int l = 0; l < chunk_points && (!laws_.single() || sample); ++l) {
+    for (int l = 0; l < chunk_points && (sample || (!laws_.single() && s.one_law < 0)); ++l) {
       s.owner[k * chunk_points + l] = chunk.first + l;
       s.far[k * chunk_points + l] = static_cast<std::int32_t>((mask >> l & 1) ? p + shifts[k] + l : p + l);
     }
@@ -224,7 +226,8 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   double energy = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
-    if (!pass.wanted(chunk.first)) continue;
+    if (!pass.wanted(chunk.first) || !roles_.wants(c, &ChunkRole::bonds)) continue;
+    s.one_law = roles_.chunk.empty() || pass.work.laminates_near(chunk.first) ? ChunkRole::mixed : roles_.chunk[c].law;
     for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
       const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
       const int bad = bonds_of_chunk(c, slot, n, s, pass, &energy);
@@ -238,6 +241,7 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
   for (std::size_t c = tiles_.blocks[b].chunk_begin; c < tiles_.blocks[b].chunk_end; ++c) {
+    if (!roles_.wants(c, &ChunkRole::stress)) continue;
     const LatticeChunk& chunk = tiles_.chunks[c];
     double* const stress = flux_.data() + chunk.first;
     if (selective_) {
@@ -256,7 +260,8 @@ void LatticeBonds<D>::divergence(Pass& pass, int number) const {
     const LatticeBlock& block = tiles_.blocks[b];
     for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
     if (stencils_) return;
-    for (std::size_t r = block.row_begin; r < block.row_end; ++r) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
+    for (std::size_t r = block.row_begin; r < block.row_end; ++r)
+      if (roles_.wants_row(r)) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
     for (std::size_t c = block.chunk_begin; c < block.chunk_end && families_.any_broken(); ++c)
       operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, pass.out);
   });

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "families/lattice_families.hpp"
+#include "spaces/chunk_roles.hpp"
 #include "spaces/bond_shape.hpp"
 #include "spaces/lattice_gradient.hpp"
 #include "spaces/lattice_stencils.hpp"
@@ -52,6 +53,7 @@ class LatticeBonds final : public EvaluationSpace {
   double far_share_;
   bool pairs_;                                  ///< each bond evaluated once for both ends
   bool two_states_;                             ///< and yet with a history of its own for each
+  ChunkRoles roles_;
   LatticeOperator<D> operator_;                 ///< order 1
   std::optional<LatticeStencils<D>> stencils_;  ///< higher orders
   Field flux_;                                  ///< the stress on Hbar, then Q
