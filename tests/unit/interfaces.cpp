@@ -1,4 +1,5 @@
-/// Where materials meet: distances from flat faces of lattices are exact, from round ones of second order, and independent of threads.
+/// Where materials meet: distances from flat faces of lattices are exact, from round ones of second order, and independent of
+/// threads.
 
 #include "body/interfaces.hpp"
 
@@ -38,7 +39,11 @@ Body lattice_body(int dimension, int n, Of&& of, std::vector<Crack> cracks = {})
   return body;
 }
 
-const std::vector<std::uint16_t> different{0, 1, 2};
+Interfaces find(const Body& body, double reach) {
+  std::vector<std::uint16_t> material;
+  for (const std::int32_t p : body.internal()) material.push_back(body.material_ids()[static_cast<std::size_t>(p)]);
+  return find_interfaces(body, material, {}, reach);
+}
 
 }  // namespace
 
@@ -51,9 +56,10 @@ TEST_CASE("interfaces: half way between the layers of a lattice, along every axi
         return kind < d ? x[static_cast<std::size_t>(kind)] - 0.5 : kind == 3 ? (x[0] + x[1] - 1 - 1.5 * h) / root : NAN;
       };
       if (kind == 2 && d == 2) continue;
-      // Diagonal layers lie half a spacing apart along x + y: that of x + y = 1 + h and that of 1 + 2 h are the last and the first.
+      // Diagonal layers lie half a spacing apart along x + y: that of x + y = 1 + h and that of 1 + 2 h are the last and the
+      // first.
       const Body body = lattice_body(d, n, [&](const Point& x) { return static_cast<std::uint16_t>(value(x) > 0); });
-      const Interfaces found = find_interfaces(body, different, 9 * h);
+      const Interfaces found = find(body, 9 * h);
       INFO(d, "D, kind ", kind);
       REQUIRE(found.all.size() == 1);
       CHECK(found.all[0].first == 0);
@@ -62,9 +68,27 @@ TEST_CASE("interfaces: half way between the layers of a lattice, along every axi
       for (const std::int32_t p : body.internal()) near += std::abs(value(body.position(static_cast<std::size_t>(p)))) < 8 * h;
       CHECK(found.all[0].point.size() >= near);
       for (std::size_t k = 0; k < found.all[0].point.size(); ++k)
-        worst = std::max(worst, std::abs(found.all[0].distance[k] - value(body.position(static_cast<std::size_t>(found.all[0].point[k])))));
+        worst = std::max(
+            worst, std::abs(found.all[0].distance[k] - value(body.position(static_cast<std::size_t>(found.all[0].point[k])))));
       CHECK(worst <= 1e-10 * h);
     }
+}
+
+TEST_CASE("interfaces: both sides of a thin layer") {
+  for (const int width : {1, 2, 3}) {
+    const double h = 1.0 / 20, half = 0.5 * width * h, middle = 0.5 + half;
+    const Body body =
+        lattice_body(2, 20, [&](const Point& x) { return static_cast<std::uint16_t>(std::abs(x[0] - middle) > half); });
+    const Interfaces found = find(body, 5 * h);
+    REQUIRE(found.all.size() == 1);
+    double worst = 0;
+    for (std::size_t k = 0; k < found.all[0].point.size(); ++k)
+      worst = std::max(worst,
+                       std::abs(found.all[0].distance[k] -
+                                (std::abs(body.position(static_cast<std::size_t>(found.all[0].point[k]))[0] - middle) - half)));
+    INFO(width, " points");
+    CHECK(worst <= 1e-10 * h);
+  }
 }
 
 TEST_CASE("interfaces: the distance from a circle, whatever the number of threads") {
@@ -74,7 +98,7 @@ TEST_CASE("interfaces: the distance from a circle, whatever the number of thread
     const Body body = lattice_body(2, n, [&](const Point& x) { return static_cast<std::uint16_t>(value(x) > 0); });
     const int threads = thread_count();
     set_thread_count(1);
-    const Interfaces found = find_interfaces(body, different, 9 * h);
+    const Interfaces found = find(body, 9 * h);
     REQUIRE(found.all.size() == 1);
     double sum = 0;
     for (std::size_t k = 0; k < found.all[0].point.size(); ++k) {
@@ -85,7 +109,7 @@ TEST_CASE("interfaces: the distance from a circle, whatever the number of thread
     CHECK(std::sqrt(sum / static_cast<double>(found.all[0].point.size())) <= 0.25 * h);
     for (const int count : {2, 3}) {
       set_thread_count(count);
-      const Interfaces again = find_interfaces(body, different, 9 * h);
+      const Interfaces again = find(body, 9 * h);
       CHECK(again.all[0].point == found.all[0].point);
       CHECK(again.all[0].distance == found.all[0].distance);
       CHECK(again.all[0].counterpart == found.all[0].counterpart);
@@ -96,18 +120,19 @@ TEST_CASE("interfaces: the distance from a circle, whatever the number of thread
 
 TEST_CASE("interfaces: none between equal materials; where they are whatever cracks; one for each pair") {
   const auto halves = [](const Point& x) { return static_cast<std::uint16_t>(x[0] > 0.5); };
-  CHECK(find_interfaces(lattice_body(2, 10, halves), std::vector<std::uint16_t>{0, 0}, 1).empty());
-  const Interfaces whole = find_interfaces(lattice_body(2, 10, halves), different, 1),
-                   cut = find_interfaces(lattice_body(2, 10, halves, {Crack({{0.5, -1, 0}, {0.5, 2, 0}})}), different, 1);
+  CHECK(find(lattice_body(2, 10, [](const Point&) { return std::uint16_t{1}; }), 1).empty());
+  const Interfaces whole = find(lattice_body(2, 10, halves), 1),
+                   cut = find(lattice_body(2, 10, halves, {Crack({{0.5, -1, 0}, {0.5, 2, 0}})}), 1);
   CHECK(whole.all[0].distance == cut.all[0].distance);
   const auto thirds = [](const Point& x) { return static_cast<std::uint16_t>(x[0] < 0.3 ? 0 : x[1] < 0.5 ? 1 : 2); };
-  const Interfaces found = find_interfaces(lattice_body(2, 20, thirds), different, 0.2);
+  const Interfaces found = find(lattice_body(2, 20, thirds), 0.2);
   REQUIRE(found.all.size() == 3);
   for (const Interface& of : found.all) {
     CHECK(of.first < of.second);
     CHECK(std::ranges::is_sorted(of.point));
     for (std::size_t k = 0; k < of.point.size(); ++k) {
-      const std::uint16_t own = found.material[static_cast<std::size_t>(of.point[k])], other = found.material[static_cast<std::size_t>(of.counterpart[k])];
+      const std::uint16_t own = found.material[static_cast<std::size_t>(of.point[k])],
+                          other = found.material[static_cast<std::size_t>(of.counterpart[k])];
       CHECK((own == of.first ? other == of.second : own == of.second && other == of.first));
       CHECK((own == of.first ? of.distance[k] <= 0 : of.distance[k] >= 0));
     }

@@ -1,5 +1,5 @@
-/// One evaluation point that two materials share: the laminate stores least, its stress and tangent are derivatives, for contrasts up to
-/// 1e4, finite stretches, all shares and nearly incompressible laws; where there is no solution it says so.
+/// One evaluation point that two materials share: the laminate stores least, its stress and tangent are derivatives, for
+/// contrasts up to 1e4, finite stretches, all shares and nearly incompressible laws; where there is no solution it says so.
 
 #include "operators/laminate.hpp"
 
@@ -44,7 +44,8 @@ LaminatePoint laminate(int dimension, double share, const std::array<double, 3>&
 
 /// One point on lane 3.
 struct Case {
-  Case(const Laws& laws, LaminatePoint point) : scratch(std::make_unique<LaminateScratch>(laws)), point(point), components(laws.components()) {}
+  Case(const Laws& laws, LaminatePoint point)
+      : scratch(std::make_unique<LaminateScratch>(laws)), point(point), components(laws.components()) {}
 
   int evaluate() {
     const int lane = 3;
@@ -81,7 +82,9 @@ struct Case {
   std::vector<double> A = std::vector<double>(81 * batch_points);
 };
 
-double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0; }
+double uniform(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0;
+}
 
 /// Stretches and shears: of a thin soft layer no law keeps what is left when its stiff neighbours are squeezed to half.
 std::vector<double> gradient(std::mt19937_64& random, Space space, double size) {
@@ -124,7 +127,9 @@ TEST_CASE("laminates: P = dpsi/dF, A = dP/dF, symmetric, for contrasts up to 1e4
             return moved;
           };
           const double h = 1e-4;
-          const auto slope = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
+          const auto slope = [&](auto&& value) {
+            return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
+          };
           const double by_difference = slope([&](double s) { return c.energy(at(s)); });
           const double energy = c.energy(H);
           double work = 0, size = energy, stiffness = 0;
@@ -247,5 +252,6 @@ TEST_CASE("a stencil that sees a corner or both sides of a layer is no laminate"
   REQUIRE(make_laminate(2, one, other, point));
   CHECK(point.share == doctest::Approx(0.7));
   // What is tangential is left out: both directions lie along the normal, and their mean vanishes.
-  for (int e = 0; e < 2; ++e) CHECK(std::abs(point.share * point.direction[0][e] + (1 - point.share) * point.direction[1][e]) <= 1e-16);
+  for (int e = 0; e < 2; ++e)
+    CHECK(std::abs(point.share * point.direction[0][e] + (1 - point.share) * point.direction[1][e]) <= 1e-16);
 }

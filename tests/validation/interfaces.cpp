@@ -1,5 +1,5 @@
-/// Bodies of two materials against closed forms, as laminates and with the materials side by side: a bar, a field that is affine on either
-/// side, a round inclusion, layers, a wave that is reflected.
+/// Bodies of two materials against closed forms, as laminates and with the materials side by side: a bar, a field that is affine
+/// on either side, a round inclusion, layers, a wave that is reflected.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -17,7 +17,8 @@ using namespace perikit::validation;
 namespace {
 
 /// Relative distance of the displacement from what the columns of the history call exact.
-double error(const std::string& scene, int points, const std::string& kinematics, bool laminates, std::vector<std::string> more = {}) {
+double error(const std::string& scene, int points, const std::string& kinematics, bool laminates,
+             std::vector<std::string> more = {}) {
   more.push_back(fmt::format("constants.n={}", points));
   more.push_back("kinematics=" + kinematics);
   more.push_back(fmt::format("family.interfaces=\"{}\"", laminates ? "laminate" : "parallel"));
@@ -58,7 +59,8 @@ const std::vector<Expected> all{{"\"baqp\"", 30, 8, 4},
 
 TEST_CASE("interfaces: a bar of two materials, tension and shear across an interface, a round inclusion") {
   for (const Expected& expected : all)
-    for (const auto& [scene, factor] : {std::pair{"bar", expected.bar}, std::pair{"shear", expected.shear}, std::pair{"inclusion", expected.inclusion}}) {
+    for (const auto& [scene, factor] :
+         {std::pair{"bar", expected.bar}, std::pair{"shear", expected.shear}, std::pair{"inclusion", expected.inclusion}}) {
       const double before = error(scene, 20, expected.kinematics, false), after = error(scene, 20, expected.kinematics, true);
       MESSAGE(scene, ", ", expected.kinematics, ": ", before, " side by side, ", after, " as laminates");
       CHECK(after * factor <= before);
@@ -73,7 +75,9 @@ TEST_CASE("interfaces: errors of a round inclusion fall with the spacing") {
 
 TEST_CASE("interfaces: layers along the load are as stiff as side by side") {
   const auto energy = [](bool laminates) {
-    const auto simulation = load("interfaces/bar.toml", {"constants.n=40", "sets.stiff=\"y < 0.25\"", fmt::format("family.interfaces=\"{}\"", laminates ? "laminate" : "parallel"), "run.threads=1"});
+    const auto simulation = load("interfaces/bar.toml",
+                                 {"constants.n=40", "sets.stiff=\"y < 0.25\"",
+                                  fmt::format("family.interfaces=\"{}\"", laminates ? "laminate" : "parallel"), "run.threads=1"});
     contract::run(*simulation);
     double energy = 0;
     BodyProblem& problem = simulation->problem();
@@ -91,7 +95,8 @@ TEST_CASE("interfaces: a wave is reflected as impedances say, of second order; s
     // One modulus is not enough for the pair law in uniaxial strain.
     const std::vector<std::string> more = pairs ? std::vector<std::string>{"body.line=\"stress\""} : std::vector<std::string>{};
     const double coarse = error("wave", 100, kinematics, true, more), fine = error("wave", 200, kinematics, true, more);
-    const double order = std::log2(coarse / fine), before = std::log2(error("wave", 100, kinematics, false, more) / error("wave", 200, kinematics, false, more));
+    const double order = std::log2(coarse / fine),
+                 before = std::log2(error("wave", 100, kinematics, false, more) / error("wave", 200, kinematics, false, more));
     MESSAGE(kinematics, ": errors ", coarse, " and ", fine, ", order ", order, "; side by side order ", before);
     CHECK(order > 1.9);
     CHECK(before < 1.2);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "perikit/body/images.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/spectral.hpp"
 
@@ -12,8 +11,12 @@ namespace perikit {
 
 namespace {
 
-double dot(const Point& a, const Point& b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point operator-(const Point& a, const Point& b) noexcept { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Point& a, const Point& b) noexcept {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Point operator-(const Point& a, const Point& b) noexcept {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 
 /// Places in boxes of one size, box by box.
 class Boxes {
@@ -41,7 +44,8 @@ class Boxes {
   const Point& place(std::size_t n) const noexcept { return place_[n]; }
   std::size_t size() const noexcept { return place_.size(); }
 
-  /// By place: whether what lies in its box and those around it has different values. Different boxes are at least one size apart.
+  /// By place: whether what lies in its box and those around it has different values. Different boxes are at least one size
+  /// apart.
   std::vector<std::uint8_t> differing(std::span<const std::uint16_t> value) const {
     struct Range {
       std::int64_t box;
@@ -74,7 +78,8 @@ class Boxes {
     return of_place;
   }
 
-  /// visit(n, square of the distance) for all places no farther than `radius` from x, in an order that depends on the places alone.
+  /// visit(n, square of the distance) for all places no farther than `radius` from x, in an order that depends on the places
+  /// alone.
   template <class Visit>
   void near(const Point& x, double radius, Visit&& visit) const {
     if (place_.empty()) return;
@@ -89,8 +94,8 @@ class Boxes {
   }
 
  private:
-  /// visit(first, last) the boxes of each row that lies between two boxes, and `more` of them on every side: along the first axis they
-  /// follow each other.
+  /// visit(first, last) the boxes of each row that lies between two boxes, and `more` of them on every side: along the first axis
+  /// they follow each other.
   template <class Visit>
   void over_rows(std::array<std::int64_t, 3> first, std::array<std::int64_t, 3> last, std::int64_t more, Visit&& visit) const {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -105,9 +110,13 @@ class Boxes {
       }
   }
 
-  std::int64_t index(double x, std::size_t c) const noexcept { return static_cast<std::int64_t>(std::floor((x - lower_[c]) / size_)); }
+  std::int64_t index(double x, std::size_t c) const noexcept {
+    return static_cast<std::int64_t>(std::floor((x - lower_[c]) / size_));
+  }
   std::array<std::int64_t, 3> cell(const Point& x) const noexcept { return {index(x[0], 0), index(x[1], 1), index(x[2], 2)}; }
-  std::int64_t number(const std::array<std::int64_t, 3>& k) const noexcept { return k[0] + count_[0] * (k[1] + count_[1] * k[2]); }
+  std::int64_t number(const std::array<std::int64_t, 3>& k) const noexcept {
+    return k[0] + count_[0] * (k[1] + count_[1] * k[2]);
+  }
 
   std::vector<Point> place_;
   double size_;
@@ -127,9 +136,9 @@ struct Nearest {
 /// A bond between nearest points of two materials, and the plane through the midpoints around it.
 struct Crossing {
   std::uint16_t first, second;
-  std::int32_t of_first, of_second;   ///< points
+  std::int32_t of_first, of_second;  ///< points
   double length;
-  Point middle, along;                ///< along: a unit vector from the first material to the second
+  Point middle, along;  ///< along: a unit vector from the first material to the second
   Point normal, centre;
 };
 
@@ -169,7 +178,9 @@ std::vector<Crossing> find_crossings(const Body& body, const Boxes& boxes, std::
         if (material[m] != other.material) return;
         const Nearest* const back = nearest_of(nearest[m], material[n]);
         if (!back || square > back->square * equal_squares) return;
-        Crossing c{material[n], material[m], static_cast<std::int32_t>(n), static_cast<std::int32_t>(m), std::sqrt(square), {}, {}, {}, {}};
+        Crossing c{
+            material[n], material[m], static_cast<std::int32_t>(n), static_cast<std::int32_t>(m), std::sqrt(square), {}, {},
+            {},          {}};
         for (std::size_t a = 0; a < 3; ++a) {
           c.middle[a] = 0.5 * (x[a] + boxes.place(m)[a]);
           c.along[a] = (boxes.place(m)[a] - x[a]) / c.length;
@@ -185,17 +196,25 @@ std::vector<Crossing> find_crossings(const Body& body, const Boxes& boxes, std::
 }
 
 /// 1 at x = 0, 0 from x = 1 on.
-double falling(double x) noexcept { return x < 1 ? (1 - x * x) * (1 - x * x) : 0.0; }
+double falling(double x) noexcept {
+  return x < 1 ? (1 - x * x) * (1 - x * x) : 0.0;
+}
 
-/// The direction in which the midpoints around one vary least, and their centre. Where they leave it open, along the bonds.
+/// The direction in which the midpoints around one vary least, and their centre. Where they leave it open, along the bonds. The
+/// other side of a thin layer is another surface: bonds that lead the other way.
 void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& middles, std::size_t n, Crossing& own) {
-  constexpr double window = 3;          // bonds long
-  constexpr double undecided = 1e-12;   // weight of the directions of the bonds: below all variances but those that are zero
+  constexpr double window = 3, core = 1.2;  // bonds long
+  constexpr double undecided = 1e-12;       // weight of the directions of the bonds: below all variances but those that are zero
   const double radius = window * own.length;
+  Point side{};
+  middles.near(middles.place(n), core * own.length, [&](std::size_t m, double) {
+    for (std::size_t a = 0; a < 3 && dot(all[m].along, own.along) > -0.5; ++a) side[a] += all[m].along[a];
+  });
   double weight = 0;
   Point sum{}, along{};
   double moment[3][3] = {};
   middles.near(middles.place(n), radius, [&](std::size_t m, double square) {
+    if (dot(all[m].along, side) < 0) return;
     const double w = falling(std::sqrt(square) / radius);
     const Point x = middles.place(m) - own.middle;
     weight += w;
@@ -226,7 +245,8 @@ void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& mid
   }
 }
 
-/// Distance of x from the planes of the crossings nearest to it, and the point of the nearest one on the side that x does not lie on.
+/// Distance of x from the planes of the crossings nearest to it, and the point of the nearest one on the side that x does not lie
+/// on.
 struct Distance {
   double value = 0;
   std::int32_t counterpart = -1;
@@ -246,6 +266,7 @@ Distance distance_of(const Point& x, bool in_first, std::span<const Crossing> al
   const double from = std::sqrt(least), length = all[nearest].length;
   double weight = 0, sum = 0;
   middles.near(x, from + length, [&](std::size_t m, double square) {
+    if (dot(all[m].normal, all[nearest].normal) <= 0) return;
     const double w = falling(std::max(0.0, std::sqrt(square) - from) / length);
     weight += w;
     sum += w * dot(x - all[m].centre, all[m].normal);
@@ -262,18 +283,15 @@ std::ptrdiff_t Interface::find(std::int32_t p) const noexcept {
   return at != point.end() && *at == p ? at - point.begin() : -1;
 }
 
-Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> alike, double reach) {
+Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
+                           double reach) {
   Interfaces found;
-  const auto ids = body.material_ids();
-  if (ids.empty()) return found;
+  if (std::ranges::all_of(material, [&](std::uint16_t m) { return m == material.front(); })) return found;
   // By input number: an order that no layout of the points changes.
   std::vector<Point> places;
-  std::vector<std::uint16_t> material;
-  for (const std::int32_t p : body.internal()) {
-    places.push_back(body.position(static_cast<std::size_t>(p)));
-    material.push_back(alike[ids[static_cast<std::size_t>(p)]]);
-  }
-  if (std::ranges::all_of(material, [&](std::uint16_t m) { return m == material.front(); })) return found;
+  for (const std::int32_t p : body.internal()) places.push_back(body.position(static_cast<std::size_t>(p)));
+  const std::size_t real = places.size() - sources.size();
+  const auto source = [&](std::size_t n) { return n < real ? n : static_cast<std::size_t>(sources[n - real]); };
   const Boxes boxes(std::move(places), body.horizon() * (1 + 1e-9));
   std::vector<Crossing> crossings = find_crossings(body, boxes, material);
   found.length = body.horizon();
@@ -282,21 +300,24 @@ Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> alik
   const auto internal = body.internal();
   for (std::size_t n = 0; n < boxes.size(); ++n) {
     found.material[static_cast<std::size_t>(internal[n])] = material[n];
-    found.source[static_cast<std::size_t>(internal[n])] = internal[n];
+    found.source[static_cast<std::size_t>(internal[n])] = internal[source(n)];
   }
   for (auto begin = crossings.begin(); begin != crossings.end();) {
-    const auto end = std::find_if(begin, crossings.end(), [&](const Crossing& c) { return c.first != begin->first || c.second != begin->second; });
+    const auto end = std::find_if(begin, crossings.end(),
+                                  [&](const Crossing& c) { return c.first != begin->first || c.second != begin->second; });
     std::vector<Crossing> own(begin, end);
     std::vector<Point> middle;
     for (const Crossing& c : own) middle.push_back(c.middle);
     const Boxes middles(std::move(middle), reach);
     parallel_for(own.size(), [&](std::size_t n) { fit_plane(body.dimension(), own, middles, n, own[n]); });
     std::vector<Distance> distance(boxes.size());
-    parallel_for(boxes.size(), [&](std::size_t n) {
+    // What lies beyond a plane of symmetry is the image of what lies before it.
+    parallel_for(real, [&](std::size_t n) {
       if (material[n] == own.front().first || material[n] == own.front().second)
         distance[n] = distance_of(boxes.place(n), material[n] == own.front().first, own, middles, reach);
     });
     std::vector<std::int32_t> near;
+    for (std::size_t n = real; n < boxes.size(); ++n) distance[n] = distance[source(n)];
     for (std::size_t n = 0; n < boxes.size(); ++n)
       if (distance[n].counterpart >= 0) near.push_back(static_cast<std::int32_t>(n));
     std::ranges::sort(near, {}, [&](std::int32_t n) { return internal[static_cast<std::size_t>(n)]; });
@@ -307,43 +328,32 @@ Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> alik
       const Distance& of = distance[static_cast<std::size_t>(n)];
       interface.point.push_back(internal[static_cast<std::size_t>(n)]);
       interface.distance.push_back(of.value);
-      interface.counterpart.push_back(internal[static_cast<std::size_t>(of.counterpart)]);
+      interface.counterpart.push_back(internal[source(static_cast<std::size_t>(of.counterpart))]);
     }
     begin = end;
   }
   return found;
 }
 
-Interfaces interfaces_on(const Body& body, const Body& whole, const Images* images, const Interfaces& known) {
+Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known) {
   Interfaces found;
   found.notes = known.notes;
   if (known.empty()) return found;
   found.length = known.length;
-  // By internal index of the body: that of the point itself in `whole`.
-  std::vector<std::int32_t> original(body.stride(), -1), here(whole.stride(), -1);
-  const auto internal = body.internal();
-  const std::size_t real = internal.size() - (images ? images->size() : 0);
-  found.source.assign(body.stride(), -1);
-  for (std::size_t n = 0; n < internal.size(); ++n) {
-    const auto p = static_cast<std::size_t>(internal[n]);
-    const std::int32_t number = n < real ? body.number(p) : images->source[n - real];
-    original[p] = whole.internal()[static_cast<std::size_t>(number)];
-    if (n < real) here[static_cast<std::size_t>(original[p])] = internal[n];
-    found.source[p] = n < real ? internal[n] : internal[static_cast<std::size_t>(number)];
+  found.material.assign(part.stride(), 0);
+  found.source.assign(part.stride(), -1);
+  std::vector<std::int32_t> here(whole.stride(), -1);  // by internal index of the whole body
+  for (const std::int32_t index : part.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    const auto original = static_cast<std::size_t>(whole.internal()[static_cast<std::size_t>(part.number(p))]);
+    here[original] = index;
+    found.material[p] = known.material[original];
+    found.source[p] = index;
   }
-  found.material.assign(body.stride(), 0);
-  for (std::size_t p = 0; p < body.stride(); ++p)
-    if (original[p] >= 0) found.material[p] = known.material[static_cast<std::size_t>(original[p])];
-  // The points here of each point of `whole`: itself, and its images.
-  std::vector<std::pair<std::int32_t, std::int32_t>> all;
-  for (std::size_t p = 0; p < body.stride(); ++p)
-    if (original[p] >= 0) all.push_back({original[p], static_cast<std::int32_t>(p)});
-  std::ranges::sort(all);
   for (const Interface& from : known.all) {
     std::vector<std::pair<std::int32_t, std::size_t>> points;
     for (std::size_t at = 0; at < from.point.size(); ++at)
-      for (auto entry = std::ranges::lower_bound(all, std::pair(from.point[at], std::int32_t{-1})); entry != all.end() && entry->first == from.point[at]; ++entry)
-        points.push_back({entry->second, at});
+      if (const std::int32_t p = here[static_cast<std::size_t>(from.point[at])]; p >= 0) points.push_back({p, at});
     if (points.empty()) continue;
     std::ranges::sort(points);
     Interface& to = found.all.emplace_back();

@@ -15,10 +15,10 @@ namespace perikit {
 
 /// Of two materials: signed distances of their points near the surface between them.
 struct Interface {
-  std::uint16_t first = 0, second = 0;   ///< the distance is negative in the first material, positive in the second
-  std::vector<std::int32_t> point;       ///< internal indices, ascending
-  std::vector<double> distance;          ///< [m]
-  std::vector<std::int32_t> counterpart; ///< a point of the other material, of the nearest pair
+  std::uint16_t first = 0, second = 0;    ///< the distance is negative in the first material, positive in the second
+  std::vector<std::int32_t> point;        ///< internal indices, ascending
+  std::vector<double> distance;           ///< [m]
+  std::vector<std::int32_t> counterpart;  ///< a point of the other material, of the nearest pair
 
   /// Place of a point among them, or -1.
   std::ptrdiff_t find(std::int32_t p) const noexcept;
@@ -26,20 +26,21 @@ struct Interface {
 
 /// Of a body, or a rank's part of it, with its images.
 struct Interfaces {
-  std::vector<std::uint16_t> material;   ///< by internal index: also of images and ghosts the one of the point itself
-  std::vector<std::int32_t> source;      ///< by internal index: of images the point itself
+  std::vector<std::uint16_t> material;  ///< by internal index: also of images and ghosts the one of the point itself
+  std::vector<std::int32_t> source;     ///< by internal index: of images the point itself
   std::vector<Interface> all;
-  std::vector<std::string> notes;        ///< for run.log
-  double length = 0;                     ///< the horizon [m]
+  std::vector<std::string> notes;  ///< for run.log
+  double length = 0;               ///< the horizon [m]
 
   bool empty() const noexcept { return all.empty(); }
 };
 
-/// Those of a body without images. alike: by material, the first one that is the same law with the same constants. Distances are known up
-/// to `reach` [m].
-Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> alike, double reach);
+/// Those of a body. material: of its points, by input number, those of images after them; equal numbers where laws and constants
+/// are equal. sources: input numbers of what the images are images of. Distances are known up to `reach` [m].
+Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
+                           double reach);
 
-/// The same on another body with the points of `whole`: with images, or the part of a rank.
-Interfaces interfaces_on(const Body& body, const Body& whole, const Images* images, const Interfaces& known);
+/// The same on a rank's part of the body.
+Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known);
 
 }  // namespace perikit

@@ -21,7 +21,8 @@ bool alike(const PartValues& a, const PartValues& b) {
     return keys;
   };
   const std::vector<std::string> of_a = keys(a);
-  return of_a == keys(b) && std::ranges::all_of(of_a, [&](const std::string& key) { return *a.values.find(key) == *b.values.find(key); });
+  return of_a == keys(b) &&
+         std::ranges::all_of(of_a, [&](const std::string& key) { return *a.values.find(key) == *b.values.find(key); });
 }
 
 bool varies(const PartValues& part, const Constants& constants) {
@@ -37,13 +38,23 @@ std::string obstacle(const Scene& scene, const PartFactory& factory, const PartV
   const std::shared_ptr<const Material> material = factory.material(part);
   if (material->state_components(space) > 0) return fmt::format("\"{}\" has a history", part.type);
   if (!material->traits().hyperelastic) return fmt::format("\"{}\" is no derivative of an energy", part.type);
-  if (communicator().size() > 1 && varies(part, scene.constants)) return fmt::format("\"{}\" varies in space, on several ranks", part.type);
+  if (communicator().size() > 1 && varies(part, scene.constants))
+    return fmt::format("\"{}\" varies in space, on several ranks", part.type);
   return {};
 }
 
 }  // namespace
 
-Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body) {
+std::vector<std::uint16_t> materials_of_points(const Body& body) {
+  std::vector<std::uint16_t> material;
+  const auto ids = body.material_ids();
+  for (const std::int32_t p : body.internal())
+    material.push_back(ids.empty() ? std::uint16_t{0} : ids[static_cast<std::size_t>(p)]);
+  return material;
+}
+
+Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body,
+                            std::vector<std::uint16_t> material, std::span<const std::int32_t> sources) {
   Interfaces out;
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.laminates_position, "family.interfaces",
@@ -65,7 +76,9 @@ Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, cons
       if (alike(*parts[id], *parts[other])) same[id] = static_cast<std::uint16_t>(other);
   }
   // Stencils of bond gradients reach two families from their owner, which lies no farther from the interface.
-  out = find_interfaces(body, same, 3 * body.horizon() * (1 + 1e-9));
+  for (std::uint16_t& m : material) m = same[m];
+  for (const std::int32_t source : sources) material.push_back(material[static_cast<std::size_t>(source)]);
+  out = find_interfaces(body, material, sources, 3 * body.horizon() * (1 + 1e-9));
   if (formulation.pairs) return out;
   for (std::size_t id = 0; id < parts.size(); ++id) {
     const std::string why = obstacle(scene, factory, *parts[id], body.space());

@@ -1,6 +1,9 @@
 #pragma once
 /// From [family] interfaces to where evaluation points are laminates.
 
+#include <span>
+#include <vector>
+
 #include "body/interfaces.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/plugin/part.hpp"
@@ -8,8 +11,12 @@
 
 namespace perikit {
 
-/// Where the materials of a scene meet, on its whole body without images. Throws InputError for laminates where there is nothing that
-/// could be one.
-Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body);
+/// The materials of a body, by input number.
+std::vector<std::uint16_t> materials_of_points(const Body& body);
+
+/// Where the materials of a scene meet, on its whole body. material: of the points without images, whose sources are `sources`.
+/// Throws InputError for laminates where there is nothing that could be one.
+Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body,
+                            std::vector<std::uint16_t> material, std::span<const std::int32_t> sources);
 
 }  // namespace perikit

@@ -57,16 +57,12 @@ Partition::Reach reach_of(const Formulation& formulation) {
 /// The bodies of this rank and, where there are several, of all of them.
 Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   Body whole = build_body(scene);
-  const Interfaces interfaces = build_interfaces(scene, factory, formulation, whole);
-  // By input number: what images and parts keep of the points.
-  const std::optional<Body> original = interfaces.empty() ? std::nullopt : std::optional<Body>(whole);
+  std::vector<std::uint16_t> material = materials_of_points(whole);
   Beyond beyond = place_images(scene, whole, quasi_static);
-  const auto know_interfaces = [&](const Images* images) {
-    beyond.interfaces = std::make_shared<const Interfaces>(original ? interfaces_on(*parts.body, *original, images, interfaces) : interfaces);
-  };
+  beyond.interfaces = std::make_shared<const Interfaces>(
+      build_interfaces(scene, factory, formulation, whole, std::move(material), beyond.images.source));
   if (communicator().size() == 1) {
     parts.body = std::make_unique<const Body>(std::move(whole));
-    know_interfaces(beyond.images.size() > 0 ? &beyond.images : nullptr);
     if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     return beyond;
   }
@@ -76,7 +72,7 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
     throw InputError(scene.body.position, "body", error.what());
   }
   parts.body = std::make_unique<const Body>(parts.partition->part(image_material(scene)));
-  know_interfaces(nullptr);
+  beyond.interfaces = std::make_shared<const Interfaces>(interfaces_of_part(*parts.body, parts.partition->whole(), *beyond.interfaces));
   return beyond;
 }
 

@@ -35,6 +35,7 @@ void solve(int d, const double* L, double* x) noexcept {
   }
 }
 
+constexpr double least_share = 1e-3;
 constexpr int most_iterations = 100;
 constexpr double smallest_step = 1e-12;
 
@@ -49,7 +50,10 @@ bool make_laminate(int dimension, const double* plus, const double* minus, Lamin
   }
   // Where the gradient of the distance itself is far from a unit vector, the stencil sees a corner or both sides of a layer.
   if (square < 0.25) return false;
-  const double share = std::clamp(1 - positive / square, 0.0, 1.0);
+  // What has next to no share has none: laws in series would let rounding of the share decide between stiffnesses far apart.
+  double share = 1 - positive / square;
+  if (share < least_share) share = 0;
+  if (share > 1 - least_share) share = 1;
   out.share = share;
   for (int e = 0; e < 3; ++e) {
     out.direction[0][e] = (1 - share) * normal[e];
@@ -157,7 +161,7 @@ bool LaminateScratch::look(const LaminatePoint& laminate, int k, int iteration) 
   search.done = size <= 4e-15 * scale || (iteration > 2 && size <= 1e-9 * scale && size >= 0.25 * search.size);
   if (search.done) {
     std::fill_n(search.direction, 3, 0.0);
-    return shift == 0;   // else a saddle: no a near this one stores least
+    return shift == 0;  // else a saddle: no a near this one stores least
   }
   std::copy_n(delta, 3, search.direction);
   std::copy_n(gradient, 3, search.gradient);
@@ -172,7 +176,9 @@ void LaminateScratch::write(const LaminateBatch& batch, int first, int k) const 
   const int lane = batch.lane[first + k], d = dimension_, n = components_;
   const double share[2] = {laminate.share, 1 - laminate.share};
   const bool inside = laminate.share > 0 && laminate.share < 1;
-  const auto mean = [&](const double* a, const double* b, int c) { return share[0] * a[c * batch_points + k] + share[1] * b[c * batch_points + k]; };
+  const auto mean = [&](const double* a, const double* b, int c) {
+    return share[0] * a[c * batch_points + k] + share[1] * b[c * batch_points + k];
+  };
   if (batch.psi) batch.psi[lane] = mean(side_[0].psi, side_[1].psi, 0);
   if (batch.lateral) batch.lateral[lane] = mean(side_[0].lateral, side_[1].lateral, 0);
   for (int c = 0; batch.P && c < n; ++c) batch.P[c * batch_points + lane] = mean(side_[0].P, side_[1].P, c);

@@ -1,9 +1,9 @@
 #pragma once
-/// Evaluation points that two materials share, as laminates. For a flat interface with normal n near q, a field that is affine on either
-/// side with the jump a (x) n of its gradient gives
+/// Evaluation points that two materials share, as laminates. For a flat interface with normal n near q, a field that is affine on
+/// either side with the jump a (x) n of its gradient gives
 ///   H_1 = H_q - a (x) g_1,   H_2 = H_q - a (x) g_2,   g_1 = (1 - theta) n,   g_2 = -theta n,
-/// where theta, the share of the first material, is 1 - n . gamma and gamma the stencil of q applied to the positive part of the distance
-/// from the interface. The laminate takes the a that stores least:
+/// where theta, the share of the first material, is 1 - n . gamma and gamma the stencil of q applied to the positive part of the
+/// distance from the interface. The laminate takes the a that stores least:
 ///   psi_q = min over a of theta psi_1(H_1) + (1 - theta) psi_2(H_2),   P_q = theta P_1 + (1 - theta) P_2.
 
 #include <cstdint>
@@ -14,14 +14,14 @@
 namespace perikit {
 
 struct LaminatePoint {
-  double share = -1;                      ///< theta; negative: none
-  double direction[2][3] = {};            ///< g_1, g_2 [-]
+  double share = -1;            ///< theta; negative: none
+  double direction[2][3] = {};  ///< g_1, g_2 [-]
   std::uint16_t material[2] = {0, 0};
-  std::int32_t point[2] = {-1, -1};       ///< where the constants of either law are taken
+  std::int32_t point[2] = {-1, -1};  ///< where the constants of either law are taken
 };
 
-/// plus, minus: the stencil applied to the positive and to the negative part of the distance. False where the materials do not meet in one
-/// flat piece of interface, as far as the stencil sees.
+/// plus, minus: the stencil applied to the positive and to the negative part of the distance. False where the materials do not
+/// meet in one flat piece of interface, as far as the stencil sees.
 bool make_laminate(int dimension, const double* plus, const double* minus, LaminatePoint& out) noexcept;
 
 /// What is wanted of lanes of a batch; arrays have stride batch_points, null: not wanted.
@@ -35,7 +35,7 @@ struct LaminateBatch {
   double* psi = nullptr;
   double* P = nullptr;
   double* dP = nullptr;
-  double* A = nullptr;                             ///< as in LawBatch
+  double* A = nullptr;  ///< as in LawBatch
   double* lateral = nullptr;
 };
 
@@ -43,8 +43,8 @@ struct LaminateBatch {
 class LaminateScratch {
  public:
   explicit LaminateScratch(const Laws& laws);
-  /// Writes the lanes of the batch and no others. Returns the first lane without a solution: an inadmissible deformation, or no a that
-  /// stores least.
+  /// Writes the lanes of the batch and no others. Returns the first lane without a solution: an inadmissible deformation, or no a
+  /// that stores least.
   int evaluate(const LaminateBatch& batch);
 
  private:

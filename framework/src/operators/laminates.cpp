@@ -53,7 +53,8 @@ void LaminateFinder::add(int n, const BatchScratch& s) {
   for (int l = 0; l < n; ++l) {
     std::int64_t number = s.first_number >= 0 ? s.first_number + l : s.number[l];
     // Numbers of bonds that are evaluated once come from one of their ends, whatever the order of threads.
-    if (number < 0 || (once_ && s.owner[l] >= s.far[l])) continue;
+    // Lanes without a weight are there to fill a batch.
+    if (number < 0 || s.weight[l] == 0 || (once_ && s.owner[l] >= s.far[l])) continue;
     if (s.far_number > 0 && number >= s.far_number) number -= s.far_number;
     Found entry{number, s.owner[l], {}};
     bool kept = true;

@@ -1,6 +1,6 @@
 #pragma once
-/// Which evaluation points of a space are laminates, by their stable numbers. Found by passes of the space over the distances of points from
-/// interfaces in place of displacements, so that what is found belongs to the stencils as they are.
+/// Which evaluation points of a space are laminates, by their stable numbers. Found by passes of the space over the distances of
+/// points from interfaces in place of displacements, so that what is found belongs to the stencils as they are.
 
 #include <cstdint>
 #include <memory>
@@ -14,8 +14,8 @@ namespace perikit {
 
 struct BatchScratch;
 
-/// Values at the points of one interface whose gradients tell what an evaluation point sees of it: the positive and the negative part of the
-/// distance, and something that is not zero at points of other materials.
+/// Values at the points of one interface whose gradients tell what an evaluation point sees of it: the positive and the negative
+/// part of the distance, and something that is not zero at points of other materials.
 enum class InterfaceValue { plus, minus, others };
 inline constexpr int interface_values = 3;
 double interface_value(const Interfaces& interfaces, std::size_t interface, std::size_t point, InterfaceValue what) noexcept;
@@ -28,7 +28,8 @@ void set_points(const Interfaces& interfaces, std::size_t interface, std::int32_
 
 /// By the stencil of an evaluation point: gradient(value, g) writes the gradient of value(p), p points of the body.
 template <class Gradient>
-bool laminate_by_stencil(int dimension, const Interfaces& interfaces, std::int32_t owner, Gradient&& gradient, LaminatePoint& out) {
+bool laminate_by_stencil(int dimension, const Interfaces& interfaces, std::int32_t owner, Gradient&& gradient,
+                         LaminatePoint& out) {
   for (std::size_t k = 0; k < interfaces.all.size(); ++k) {
     if (interfaces.all[k].find(owner) < 0) continue;
     double g[interface_values][3] = {};
@@ -51,10 +52,11 @@ class LaminateFinder {
   struct Found {
     std::int64_t number;
     std::int32_t owner;
-    double gradient[3][3];   ///< by component of the displacement
+    double gradient[3][3];  ///< by component of the displacement
   };
 
-  /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be there.
+  /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be
+  /// there.
   LaminateFinder(int dimension, bool once_for_both, int keep);
   void add(int n, const BatchScratch& s);
   /// In ascending order of numbers.
@@ -85,7 +87,7 @@ class Laminates {
   void clear(std::int64_t number) noexcept;
   std::size_t count() const noexcept;
   std::size_t bytes() const noexcept;
-  std::size_t kept_parallel = 0;   ///< evaluation points that see an interface and are no laminates
+  std::size_t kept_parallel = 0;  ///< evaluation points that see an interface and are no laminates
 
  private:
   std::shared_ptr<const Interfaces> interfaces_;

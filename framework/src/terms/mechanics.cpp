@@ -103,7 +103,7 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
       if (const double* others = other(InterfaceValue::others, found.number)) std::copy_n(others, 3, gradient[2]);
       LaminatePoint point;
       if (!find_laminate(d, gradient, point)) {
-        ++laminates_->kept_parallel;
+        laminates_->kept_parallel += !again;
         continue;
       }
       set_points(interfaces, k, found.owner, point);
