@@ -293,3 +293,71 @@ TEST_CASE("extremes: a point that is alone is a free mass in dynamics, and named
     }
   }
 }
+
+namespace {
+
+/// A block of 10 x 5 points whose ends are pulled by 1 %, `offset` away from the origin and `scale` times as large.
+std::string far_block(double offset, double scale, double jitter) {
+  const auto at = [&](double x) { return fmt::format("{:.17g}", offset + x * scale); };
+  return fmt::format(
+      "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\nthickness = {0:.17g}\n[body.lattice]\nspacing = {1:.17g}\nlower = [{2}, 0]\nupper = "
+      "[{3}, {4:.17g}]\njitter = {5}\n[sets]\nleft = \"x < {6}\"\nright = \"x > {7}\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = "
+      "\"baqp\"\n[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1e6\npoisson_ratio = 0.3\n[[boundary]]\nset = "
+      "\"left\"\ndisplacement = [0, 0]\n[[boundary]]\nset = \"right\"\ndisplacement = [{8:.17g}, 0]\n[integrator]\ntype = \"newton\"\nsteps = 1\n"
+      "[run]\nthreads = 1\n",
+      scale, 0.1 * scale, at(0), at(1), 0.5 * scale, jitter, at(0.12), at(0.88), 0.01 * scale);
+}
+
+/// Stored energy over that of a unit stress in its volume [-].
+double far_energy(double offset, double scale, double jitter, std::string* summary = nullptr) {
+  const auto simulation = build(far_block(offset, scale, jitter));
+  if (summary) *summary = simulation->summary();
+  run(*simulation);
+  double energy = 0;
+  Field force = simulation->problem().make_field();
+  REQUIRE(simulation->problem().evaluate_forces(simulation->problem().state().displacement(), force, &energy).ok());
+  return energy / (scale * scale * scale);
+}
+
+}  // namespace
+
+TEST_CASE("extremes: bodies far from the origin, as small as atoms and as large as stars") {
+  const double lattice = far_energy(0, 1, 0), cloud = far_energy(0, 1, 0.2);
+  REQUIRE(lattice > 0);
+  for (const double offset : {1e6, 1e9, 1e12}) CHECK(far_energy(offset, 1, 0) == doctest::Approx(lattice).epsilon(1e-12));
+  for (const double scale : {1e-9, 1e-3, 1e9}) {
+    CHECK(far_energy(0, scale, 0) == doctest::Approx(lattice).epsilon(1e-12));
+    CHECK(far_energy(0, scale, 0.2) == doctest::Approx(cloud).epsilon(1e-9));
+  }
+  // Of points of a cloud rounding of their positions is a part of a bond.
+  std::string near, far;
+  CHECK(far_energy(1e3, 1, 0.2, &near) == doctest::Approx(cloud).epsilon(1e-10));
+  far_energy(1e12, 1, 0.2, &far);
+  CHECK(near.find("rounds to") == std::string::npos);
+  CHECK_MESSAGE(far.find("rounds to") != std::string::npos, far);
+}
+
+TEST_CASE("extremes: a body whose bonds all fail within a step flies apart with the energy that it has") {
+  for (const std::string kinematics : {"bond_based", "ordinary", "baqp", "bond_associated", "sub_horizon"})
+    for (const std::string jitter : {"0.0", "0.2"}) {
+      INFO(kinematics, ", jitter ", jitter);
+      const auto simulation = build(fmt::format(
+          "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 0.5]\n"
+          "jitter = {}\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"{}\"\n[material]\ntype = \"saint_venant_kirchhoff\"\n"
+          "density = 1000.0\nyoungs_modulus = 1e6\npoisson_ratio = 0.25\n[damage]\ntype = \"critical_stretch\"\nstretch = 1e-6\n"
+          "[initial]\nvelocity = [\"100*x\", \"100*y\"]\n[integrator]\ntype = \"verlet\"\nend_time = 0.002\n[run]\nthreads = 1\n",
+          jitter, kinematics));
+      run(*simulation);
+      BodyProblem& problem = simulation->problem();
+      const Energies& energies = problem.state().energies;
+      CHECK(problem.terms().changed_bonds().size() > 0);
+      CHECK(energies.strain <= 1e-9 * energies.kinetic);
+      double flight = 0;  // each point goes on as it began
+      for (const std::int32_t p : problem.body().owned()) {
+        const Point x = problem.body().position(static_cast<std::size_t>(p));
+        for (int c = 0; c < 2; ++c)
+          flight = std::max(flight, std::abs(problem.state().displacement().component(c)[p] - 0.2 * x[static_cast<std::size_t>(c)]));
+      }
+      CHECK_MESSAGE(flight < 1e-4, "off its way by ", flight, " m of 0.2");
+    }
+}

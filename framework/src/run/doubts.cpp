@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace perikit {
 
@@ -13,6 +15,15 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
     lines.push_back(
         "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
         "the body is too soft by 1 to 12 %, however fine it is");
+  double farthest = 0;
+  for (const std::int32_t p : body.internal())
+    for (const double x : body.position(static_cast<std::size_t>(p))) farthest = std::max(farthest, std::abs(x));
+  const double rounding = std::numeric_limits<double>::epsilon() * farthest / body.spacing();
+  if (scene.random_points() && rounding > 1e-8)
+    lines.push_back(
+        fmt::format("points {:.3g} m away from the origin: the position of a point rounds to {:.2g} of the spacing; allowed: points "
+                    "near the origin",
+                    farthest, rounding));
   for (int a = 0; a < body.dimension(); ++a) {
     const auto c = static_cast<std::size_t>(a);
     double low = body.position(static_cast<std::size_t>(body.internal()[0]))[c],

@@ -156,9 +156,10 @@ class WeightSearch {
       out_.factors.assign(space_.factors(), 1.0);
       out_.weights.after = left(&out_.weights.worst);
     }
-    const auto [low, high] = std::minmax_element(out_.factors.begin(), out_.factors.end());
-    out_.smallest = -communicator().largest(-*low);
-    out_.largest = communicator().largest(*high);
+    double low = 1, high = 1;
+    for (const double f : out_.factors) low = std::min(low, f), high = std::max(high, f);
+    out_.smallest = -communicator().largest(-low);
+    out_.largest = communicator().largest(high);
     out_.at_surfaces = of_all_ranks(system_.closed().at_surfaces.size());
     out_.unbalanced = out_.whole - of_all_ranks(system_.closed().whole.size());
   }
@@ -263,7 +264,7 @@ void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudCons
                                  [&](auto d) { return find_shift<d>(parts, closed, out, out.gradients); });
       space.shift_gradients(out.shift);
     }
-    if (space.factors() > 0) WeightSearch(parts, space, closed, out).run();
+    if (of_all_ranks(space.factors()) > 0) WeightSearch(parts, space, closed, out).run();
   };
   find();
   if (std::max(out.gradients.after, out.weights.after) > acceptable_residual && of_all_ranks(closed.at_surfaces.size()) > 0) {
