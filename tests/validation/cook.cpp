@@ -54,7 +54,8 @@ TEST_CASE("Cook's membrane: selective comes within 7 % on the coarsest lattice, 
   for (const char* base : {"bond_associated", "baqp", "projection"}) {
     INFO(base);
     const Membrane found = run_cook("{ type = \"selective\", base = { type = \"" + std::string(base) + "\" } }", 20);
-    CHECK_MESSAGE(std::abs(found.corner[1] / reference_y - 1) < 0.07, "corner ", found.corner[1]);
+    // 4.4 % over bond_associated; the paper's Fig. 8 has curves only.
+    CHECK_MESSAGE(std::abs(found.corner[1] / reference_y - 1) < (base == std::string("bond_associated") ? 0.046 : 0.07), "corner ", found.corner[1]);
     // As many load steps as planned: no cut-back.
     CHECK(found.protocol.reports.size() == 6);
   }

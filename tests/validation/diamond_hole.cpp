@@ -34,7 +34,7 @@ double roughness(const std::string& kinematics, double ratio, int points) {
 TEST_CASE("diamond hole: sub_horizon is smooth along AB, conventional is not") {
   struct Row {
     double ratio;               // horizon over the diagonal of a cell
-    double smooth, oscillates;  // bounds of the high-frequency part
+    double smooth, oscillates;  // bounds of the high-frequency part: of our own, as the paper's Fig. 9 has curves only
   };
   for (const Row row : {Row{1.1, 0.0015, 0.008}, Row{2.1, 0.005, 0.5}, Row{3.1, 0.005, 0.5}}) {
     INFO("horizon over the diagonal of a cell ", row.ratio);

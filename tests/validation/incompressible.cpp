@@ -127,6 +127,7 @@ TEST_CASE("crack tip: long load steps need no cut-back") {
 TEST_CASE("arch: the tip follows the elastica to the end of the curve") {
   const auto simulation = load("scabbia/arch.toml");
   CHECK(run(*simulation).reports.back().residual <= 1e-9);
+  // Elastica: the paper prints no number. With w/5 the arch is 4 % too soft along x and 3 % along y; w/10 is in framework/docs/papers.md.
   CHECK(std::abs(mean(*simulation, "end", 0) / -2.072 - 1) < 0.06);
   CHECK(std::abs(mean(*simulation, "end", 1) / -9.768 - 1) < 0.04);
 }

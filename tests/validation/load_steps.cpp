@@ -154,7 +154,7 @@ TEST_CASE("options of quasi-static integrators change the way and not the answer
 }
 
 TEST_CASE("kinsol's line search shortens steps of a slender body, and its answer is that of full steps") {
-  const std::vector<std::string> common{"integrator.type=\"kinsol\"", "integrator.linear_solver=\"klu\"", "integrator.steps=20"};
+  const std::vector<std::string> common{"kinematics=baqp", "integrator.type=\"kinsol\"", "integrator.linear_solver=\"klu\"", "integrator.steps=20"};
   std::vector<std::string> full = common, searched = common;
   full.push_back("integrator.strategy=\"none\"");
   searched.push_back("integrator.strategy=\"linesearch\"");

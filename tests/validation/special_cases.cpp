@@ -62,6 +62,14 @@ TEST_CASE("non_spherical with n1 = n2 = 0 is the conventional model with a const
     }
 }
 
+TEST_CASE("sub_horizon with one part is the conventional model") {
+  for (int d = 1; d <= 3; ++d)
+    for (const char* influence : {"constant", "gaussian"}) {
+      const BodyOptions cloud{.dimension = d, .cloud = true, .influence = influence};
+      check_same(cloud, "type = \"sub_horizon\"\nparts = 1", "type = \"conventional\"");
+    }
+}
+
 TEST_CASE("bond_associated with a bond horizon of twice the horizon is the conventional model") {
   for (int d = 1; d <= 3; ++d)
     for (const char* influence : {"constant", "gaussian"}) {

@@ -26,15 +26,20 @@ double error(const std::string& kinematics, const std::string& influence, int po
 }  // namespace
 
 TEST_CASE("traction bar: baqp within 0.3 % from horizon ratio 3 to 4") {
-  CHECK(error("baqp", "cubic_spline", 4, 3.015, hyperelastic) == doctest::Approx(-0.0016).epsilon(0.05));
+  // The paper has -0.2 % at a horizon ratio of 3 for every N (Fig. 14); -0.16 % is our own value.
+  const double four = error("baqp", "cubic_spline", 4, 3.015, hyperelastic);
+  CHECK(std::abs(four + 0.002) < 0.0005);
+  CHECK(four == doctest::Approx(-0.0016).epsilon(0.05));
   CHECK(std::abs(error("baqp", "cubic_spline", 5, 3.015, hyperelastic)) < 0.003);
   CHECK(std::abs(error("baqp", "cubic_spline", 5, 3.9, hyperelastic)) < 0.003);
 }
 
 TEST_CASE("traction bar: pair laws without surface correction miss the elongation, the more the wider the horizon") {
+  // A value of our own: the paper's Fig. 13 has no number there. At 7 it has "up to around 200 %", and ours is 205 %.
   CHECK(error("bond_based", "constant", 5, 2.015, linear) == doctest::Approx(0.053).epsilon(0.02));
   const double wide = error("bond_based", "constant", 5, 7.015, linear);
   CHECK_MESSAGE(std::abs(wide - 2.05) < 0.02, "error ", wide);
+  CHECK_MESSAGE(std::abs(wide - 2) < 0.1, "error ", wide);
 }
 
 TEST_CASE("traction bar: tractions on both faces leave a homogeneous stress, for every kinematics with gradients") {

@@ -26,14 +26,19 @@ class SubHorizon final : public WeightedKinematics {
   int parts(int dimension) const override {
     const int orthants = 1 << dimension;
     if (!options_.has("parts") || options_.integer("parts") == orthants) return orthants;
-    if (dimension == 1 && options_.integer("parts") == 4) return 4;
+    if (options_.integer("parts") == 1 || (dimension == 1 && options_.integer("parts") == 4)) return static_cast<int>(options_.integer("parts"));
     throw options_.error("parts", "found " + std::to_string(options_.integer("parts")) + " in a body of dimension " +
                                       std::to_string(dimension) +
-                                      "; allowed: " + (dimension == 1 ? "2 or 4" : std::to_string(orthants)));
+                                      "; allowed: 1" + (dimension == 1 ? ", 2 or 4" : " or " + std::to_string(orthants)));
   }
 
   void weights(const FamilyView& family, double* omega, std::size_t stride) const noexcept override {
-    if (family.dimension == 1 && options_.has("parts") && options_.integer("parts") == 4) return quarters(family, omega, stride);
+    const std::int64_t chosen = options_.has("parts") ? options_.integer("parts") : 0;
+    if (family.dimension == 1 && chosen == 4) return quarters(family, omega, stride);
+    if (chosen == 1) {
+      for (int k = 0; k < family.bonds; k += pack_width) Pack::load(family.omega + k).store(omega + k);
+      return;
+    }
     for (int k = 0; k < family.bonds; k += pack_width) {
       const Pack length = Pack::load(family.length + k);
       Pack share[8] = {Pack::load(family.omega + k)};
@@ -83,8 +88,8 @@ PartDescription description() {
           "parts without a gradient of their own (surfaces, cracks) are dropped; the result depends on how the "
           "axes lie in the body"};
   part.parameters
-      .integer("parts", "number of parts: 2 (1D), 4 (2D) or 8 (3D) unless given; 1D also has 4, cut at half the horizon")
-      .at_least(2)
+      .integer("parts", "number of parts: 2 (1D), 4 (2D) or 8 (3D) unless given; 1D also has 4, cut at half the horizon; 1: the whole family, as `conventional`")
+      .at_least(1)
       .at_most(8);
   part.parameters
       .choice("weights", {"equal", "volume"}, "share of a part in its point's volume: all the same, or by the part's volume")
