@@ -17,7 +17,7 @@ inline constexpr double rounding_residual = 2e-13;
 inline constexpr double enough_residual = 5e-3;
 
 /// How long a balance is sought for: until its residual is rounding, but no longer than `polish` iterations once it is enough,
-/// and never longer than `most`.
+/// and never longer than `most`: clouds that cannot be balanced would go on for ever.
 struct BalanceEffort {
   int polish, most;
   bool ends(double residual, int iterations) const noexcept {

@@ -195,7 +195,7 @@ class WeightSearch {
       for (double& slope : slopes) slope = slope_of(slope);
       space_.set_factors(slopes);
       Field x = system_.make();
-      const BalanceEffort rest{std::max(effort_.polish - out_.weights.iterations, 1), std::max(effort_.most - out_.weights.iterations, 1)};
+      const BalanceEffort rest{effort_.polish - out_.weights.iterations, effort_.most - out_.weights.iterations};
       out_.weights.iterations += solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
       system_.factors(x, step);
       double longest = 0;
@@ -239,8 +239,10 @@ BalanceEffort effort_of_balance(const SpaceParts& parts) {
     work += own_family ? bonds * bonds / 4 : bonds;
   }
   communicator().sum({&work, 1});
-  const double products = 5e7 / static_cast<double>(std::max<std::int64_t>(work, 1));
-  return {static_cast<int>(std::min(products, 4000.0)), 4000};
+  const auto products = [&](double of_all, double least) {
+    return static_cast<int>(std::clamp(of_all / static_cast<double>(std::max<std::int64_t>(work, 1)), least, 4000.0));
+  };
+  return {products(5e7, 0), products(1e9, 150)};
 }
 
 std::vector<std::uint8_t> storing_points(const SpaceParts& parts) {
