@@ -178,24 +178,32 @@ class WeightSearch {
     return system_.largest(rest_, where);
   }
 
+  /// The points with most of rest_, which do not come to rest: those at surfaces first, all of these at the third time. How many.
+  std::size_t let_go(double residual) {
+    const bool surfaces = of_all_ranks(system_.closed().at_surfaces.size()) > 0;
+    return system_.let_go(rest_, surfaces && ++times_ > 2 ? 0 : forcing * residual);
+  }
+
   /// From f = 1. False: points were let go, so that it is to be begun again.
   bool search() {
     AlignedVector<double> y(space_.factors(), 0.0), step;
     AlignedVector<double>& f = out_.factors;
     f.assign(space_.factors(), 1.0);
     std::vector<double> residuals;
+    const int before = out_.weights.iterations;
     for (out_.rounds = 1;; ++out_.rounds) {
       space_.set_factors(f);
       const double residual = residuals.emplace_back(left());
-      if (effort_.ends(residual, out_.weights.iterations) || out_.rounds > most_rounds) return true;
-      const bool stuck = residuals.size() > 3 && residual > 0.5 * residuals[residuals.size() - 4];
+      const int spent = out_.weights.iterations - before;
+      if (effort_.ends(residual, spent) || out_.rounds > most_rounds) return true;
+      const bool stuck = residuals.size() > 3 && residual > 0.75 * residuals[residuals.size() - 4];
       if (stuck && residual <= enough_residual) return true;  // rounding
-      if (stuck) return system_.let_go(rest_, forcing * residual) == 0;
+      if (stuck) return let_go(residual) == 0;
       AlignedVector<double> slopes(f);
       for (double& slope : slopes) slope = slope_of(slope);
       space_.set_factors(slopes);
       Field x = system_.make();
-      const BalanceEffort rest{effort_.polish - out_.weights.iterations, effort_.most - out_.weights.iterations};
+      const BalanceEffort rest{effort_.polish - spent, effort_.most - spent};
       out_.weights.iterations += solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
       system_.factors(x, step);
       double longest = 0;
@@ -213,6 +221,7 @@ class WeightSearch {
   WeightSystem system_;
   Field none_, volumes_, rest_;
   BalanceEffort effort_;
+  int times_ = 0;  ///< that points at surfaces were let go
   CloudConsistency& out_;
 };
 
@@ -236,13 +245,13 @@ BalanceEffort effort_of_balance(const SpaceParts& parts) {
   std::int64_t work = 0;  // of a product, in bonds
   for (const std::int32_t p : parts.families.body().owned()) {
     const auto bonds = static_cast<std::int64_t>(parts.families.cloud()->neighbours(static_cast<std::size_t>(p)).size());
-    work += own_family ? bonds * bonds / 4 : bonds;
+    work += own_family ? std::max(bonds, bonds * bonds / 16) : bonds;
   }
   communicator().sum({&work, 1});
   const auto products = [&](double of_all, double least) {
     return static_cast<int>(std::clamp(of_all / static_cast<double>(std::max<std::int64_t>(work, 1)), least, 4000.0));
   };
-  return {products(5e7, 0), products(1e9, 150)};
+  return {products(1e8, 0), products(3e8, 150)};
 }
 
 std::vector<std::uint8_t> storing_points(const SpaceParts& parts) {

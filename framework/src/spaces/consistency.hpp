@@ -52,7 +52,7 @@ struct CloudConsistency {
 std::vector<std::uint8_t> storing_points(const SpaceParts& parts);
 
 struct BalanceEffort;
-/// Small clouds come to rounding within a second or two. The same on any number of ranks, which all must call it.
+/// Small clouds come to rounding within two or three seconds. The same on any number of ranks, which all must call it.
 BalanceEffort effort_of_balance(const SpaceParts& parts);
 
 /// Fills what is to be found, and gives it to the space. Clouds only. All ranks must call it.
