@@ -103,10 +103,10 @@ ParameterTable family_parameters() {
       "consistent",
       "Clouds: weights of evaluation points, or point gradients, with which a constant stress is in equilibrium inside of the body, as on a "
       "lattice. true unless given for [body.points] and lattices with jitter, where the kinematics allow it.");
-  table
-      .choice("interfaces", {"laminate", "parallel"},
-              "Evaluation points that two materials share: a laminate of both, or each law with its share of the weight.")
-      .by_default("\"laminate\"");
+  // No default that would be written out: it is refused where there is nothing to choose.
+  table.choice("interfaces", {"laminate", "parallel"},
+               "Evaluation points that two materials share: a laminate of both (unless given, where the kinematics allow it), or each law "
+               "with its share of the weight.");
   table.exactly(1, {"horizon_ratio", "horizon"});
   return table;
 }
