@@ -28,9 +28,9 @@ Forces forces_of(int dimension, int length, int width, double jitter, const std:
   const std::string zeros = dimension == 1 ? "" : dimension == 2 ? ", \"0.02*sin(x*y)\"" : ", \"0.02*sin(x*y)\", \"0.01*cos(x + 2*z)\"";
   const std::string text = fmt::format(
       "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\njitter = {}\n{}"
-      "[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0\n"
+      "[family]\nhorizon_ratio = 3.015\n{}[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0\n"
       "[initial]\ndisplacement = [\"0.05*sin(0.3*x) + 0.01*cos(2*x)\"{}]\n[integrator]\ntype = \"evaluate\"\n",
-      dimension, plane, lower[dimension - 1], upper, jitter, more, kinematics, zeros);
+      dimension, plane, lower[dimension - 1], upper, jitter, more, jitter > 0 ? "consistent = false\n" : "", kinematics, zeros);
   const Scene scene = parse_scene(text, "long_rows.toml", registry());
   Simulation simulation(scene, registry());
   BodyProblem& problem = simulation.problem();
