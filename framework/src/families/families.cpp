@@ -29,6 +29,15 @@ void Families::let_fail() {
   make_room();
 }
 
+GroupMarks Families::around(const GroupMarks& marks) const {
+  std::vector<std::int32_t> points;
+  for (std::size_t p = 0; p < body_.stride(); ++p)
+    if (marks[p / padding] && body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+  GroupMarks reached(marks.size(), 0);
+  mark(points, reached);
+  return reached;
+}
+
 std::vector<BondId> Families::fragment_bonds(std::span<const std::int32_t> points) const {
   std::vector<BondId> bonds;
   FamilyArrays family;

@@ -51,7 +51,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;
   if (!begin) {
-    fail(std::move(changes), u, u, nullptr, body, update);
+    fail(std::move(changes), u, 0, {}, body, update);
     return update;
   }
   const int d = u.components;
@@ -84,16 +84,15 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     // half it belongs to the beginning of the step and has moved the points since.
     const double owed = (moment - 0.5) * time_step;
     Field& impulse = reaction->impulse;
-    const Owing act = [&](double sign, const GroupMarks& marks) { body.forces(at_, marks, sign * owed, impulse); };
-    fail(std::move(of_half), u, at_, act, body, update);
+    fail(std::move(of_half), at_, owed, impulse, body, update);
     for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
   }
+  reaction->ends = update.ends;
   return update;
 }
 
-/// Lowers bonds, and those of fragments with them. at: where they fail; owing(sign, marks): adds sign times what the forces of
-/// the marked groups there owe.
-void Fracture::fail(std::vector<BondChange> changes, ConstFieldView u, ConstFieldView at, const Owing& owing, const Body& body,
+/// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there.
+void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
                     BondUpdate& update) {
   while (on_any_rank(!changes.empty())) {
     std::vector<std::int32_t> ends;
@@ -106,15 +105,12 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView u, ConstFiel
     GroupMarks marks(families_.body().stride() / padding, 0);
     families_.mark(ends, marks);
     shared_.mark(marks);
-    const double here = body.energy(u, marks), there = owing ? body.energy(at, marks) : here;
-    if (owing) owing(1, marks);
+    const double before = body.forces(at, marks, owed, impulse);
     families_.lower(changes);
     body.changed(ends);
-    const double left = body.energy(u, marks);
+    update.ends.insert(update.ends.end(), ends.begin(), ends.end());
     update.changed += std::max<std::size_t>(changes.size(), 1);
-    update.released += here - left;
-    update.dissipated += owing ? there - body.energy(at, marks) : here - left;
-    if (owing) owing(-1, marks);
+    update.dissipated += before - body.forces(at, marks, -owed, impulse);
     const std::vector<BondId> of_fragments = fragments(ends);
     if (gradual_) {
       gradual_->fade(of_fragments);

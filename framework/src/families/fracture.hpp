@@ -23,10 +23,9 @@ class Fracture {
 
   /// What it needs of those who know the forces. Marks: groups of points that depend on bonds that fail.
   struct Body {
-    /// Strain energy of the evaluation points of the marked groups, over all ranks.
-    std::function<double(ConstFieldView u, const GroupMarks&)> energy;
-    /// force += factor times the forces of at least these evaluation points, of the same ones whatever the bonds are.
-    std::function<void(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
+    /// force += factor times the forces of the evaluation points of the marked groups and of some others, the same ones whatever the
+    /// bonds are; without data nothing is added. Their energy, over all ranks.
+    std::function<double(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
@@ -47,9 +46,7 @@ class Fracture {
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
   /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
-  using Owing = std::function<void(double sign, const GroupMarks& marks)>;
-  void fail(std::vector<BondChange> changes, ConstFieldView u, ConstFieldView at, const Owing& owing, const Body& body,
-            BondUpdate& update);
+  void fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body, BondUpdate& update);
 
   Families& families_;
   const BodyDamage& damage_;

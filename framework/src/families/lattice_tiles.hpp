@@ -26,6 +26,11 @@ struct LatticeRow {
   std::int32_t k1, k2;
   std::int32_t before = 0, after = 0;
   bool holds(std::int32_t point) const noexcept { return point >= first && point < first + chunks * chunk_points; }
+  /// Whether a group of the row is marked; null: all are.
+  bool marked(const std::uint8_t* marks) const noexcept {
+    const std::int32_t group = first / chunk_points;
+    return !marks || std::any_of(marks + group, marks + group + chunks, [](std::uint8_t m) { return m != 0; });
+  }
 };
 
 struct LatticeBlock {

@@ -189,21 +189,20 @@ struct Pass {
   double* energies = nullptr;     ///< by block
   std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
-  /// By group of eight points: only the energy of the evaluation points that these own is wanted; point gradients are needed at `near`.
+  /// By group of eight points: only the evaluation points that these own are wanted; point gradients are needed at
+  /// `near`. Forces are then those of a whole pass on points whose families' families lie
+  /// in `only`, bit for bit; anything elsewhere.
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
-  /// By group of eight points: forces of the evaluation points alone that belong to the blocks of these, the same whatever is
-  /// quiet.
-  const std::uint8_t* nearby = nullptr;
   BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
 
   /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
   /// points.
   void add_samples(int n, const BatchScratch& s);
   /// Evaluation points are taken one by one and nothing is scattered.
-  bool alone() const noexcept { return only || work.work() == Work::sample || (work.balance() && work.balance()->factors); }
+  bool alone() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.
-  bool everywhere() const noexcept { return alone() || work.tangent() || work.balance(); }
+  bool everywhere() const noexcept { return only || alone() || work.tangent() || work.balance(); }
   bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
   bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
 

@@ -156,8 +156,12 @@ struct Registry::Implementation {
                                       known.empty() ? "none, no library brings any" : fmt::format("{}", fmt::join(known, ", ")),
                                       did_you_mean(part, known));
     const char* separator = "; refused libraries, one of which may hold it: ";
-    for (const RefusedLibrary& r : refused) {
-      message += fmt::format("{}{} ({})", separator, r.file.string(), r.reason);
+    // One line a reason: after an update all libraries of a folder may have the same one.
+    for (auto r = refused.begin(); r != refused.end(); ++r) {
+      const auto like_it = [&](const RefusedLibrary& other) { return other.reason == r->reason; };
+      if (std::any_of(refused.begin(), r, like_it)) continue;
+      const auto others = std::count_if(r + 1, refused.end(), like_it);
+      message += fmt::format("{}{}{} ({})", separator, r->file.string(), others > 0 ? fmt::format(" and {} others", others) : "", r->reason);
       separator = "; ";
     }
     if (refused.empty() && did_you_mean(part, known).empty()) message += "; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH";

@@ -95,16 +95,20 @@ void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const
 
 EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
 
+void BodyProblem::describe(EvaluationStatus& status) const {
+  if (status.ok()) return;
+  status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
+                                   terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
+                                   status.description, parts_.kinematics, parts_.materials[status.material]);
+}
+
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status = terms().forces(seen(u, seen_), force, energy);
   if (history) history->set_time_step(0);
-  if (!status.ok()) {
-    status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
-                                     terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
-                                     status.description, parts_.kinematics, parts_.materials[status.material]);
-  }
+  describe(status);
+  energy_wanted_ = energy != nullptr;
   if (weak_springs_ && status.ok()) {
     if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
     else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok()) return refused;
@@ -204,17 +208,24 @@ void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
   const std::span<const double> by_point = masses().by_point();
   const ConstFieldView free = constraints().free();
   ExactSum held;
+  std::vector<std::int32_t> moved;
   for (std::size_t k = 0; k < velocity.size(); ++k) {
     const double mass = by_point[k % velocity.stride];
     if (free.data[k] != 0 && mass > 0) {
       velocity.data[k] += impulse.data[k] / mass;
       u.data[k] += drift.data[k] / mass;
+      if (drift.data[k] != 0) moved.push_back(static_cast<std::int32_t>(k % velocity.stride));
     } else {
       held.add(impulse.data[k] * velocity.data[k]);
     }
   }
   state().energies.external_work -= total_over_ranks(held);
-  status = evaluate_forces(u, state().internal_force(), &state().energies.strain);
+  if (energy_wanted_ || ghosts_ || images() || weak_springs_) {
+    status = evaluate_forces(u, state().internal_force(), energy_wanted_ ? &state().energies.strain : nullptr);
+  } else {
+    status = terms().renew_forces(u, moved, reaction.ends, state().internal_force());
+    describe(status);
+  }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 

@@ -10,7 +10,7 @@ bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double
                             BondReaction* reaction) {
   const BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
   state.energies.dissipated += update.dissipated;
-  state.energies.strain -= update.released;
+  state.energies.strain -= update.dissipated;  // explicit steps take it anew
   if (update.dissipated < 0) {
     ++gains_;
     gained_ -= update.dissipated;

@@ -25,7 +25,6 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
   const BlockReach reach = cloud_reach(families_.lists(), points_);
   colouring_ = cloud_colouring(families_.body(), reach);
   quiet_ = parts.quiet_blocks(reach);
-  local_ = parts.local_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
@@ -201,10 +200,12 @@ static OwnerGradients gather_gradients(const AlignedVector<Row>& rows, std::size
 }
 
 template <int D>
-void CloudBonds<D>::volumes(std::size_t b, bool tangent) noexcept {
+void CloudBonds<D>::volumes(std::size_t b, const Pass& pass) noexcept {
+  const bool tangent = pass.work.tangent();
   double H[9 * padding], dH[9 * padding], volume[volume_components * padding] = {};
   const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
   for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+    if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
@@ -215,10 +216,12 @@ void CloudBonds<D>::volumes(std::size_t b, bool tangent) noexcept {
 }
 
 template <int D>
-void CloudBonds<D>::pressures(std::size_t b, bool tangent) noexcept {
+void CloudBonds<D>::pressures(std::size_t b, const Pass& pass) noexcept {
+  const bool tangent = pass.work.tangent();
   double H[9 * padding], dH[9 * padding], pressure[2][padding] = {};
   const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
   for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+    if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
@@ -243,7 +246,7 @@ void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
     if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
     if (selective_) pressure_[p] = Row{};
   });
-  if (selective_) volumes(b, pass.work.tangent());
+  if (selective_) volumes(b, pass);
 }
 
 template <int D>
@@ -266,27 +269,26 @@ void CloudBonds<D>::run(Pass& pass) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
   }
-  if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
-  if (pass.nearby || pass.everywhere())
+  if (pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  // The stress on Hbar reaches one family beyond the bonds, its divergence two; what they read is cleared up to three.
-  const auto works = [&](std::size_t b, int k) { return pass.nearby ? near(b, k) : quiet_.awake(b, 2); };
-  const auto awake = [&](int k, auto&& block) {
-    return [&, k](std::size_t b) {
-      if (works(b, k)) block(b);
+  // Each pass reads what the one before it left at one family's reach.
+  const auto awake = [&](auto&& block) {
+    return [&](std::size_t b) {
+      if (quiet_.awake(b, 2)) block(b);
     };
   };
   parallel_for(blocks(), [&](std::size_t b) {
-    if (pass.nearby ? near(b, 3) : quiet_.begins(b)) gradients(b, pass);
+    if (quiet_.begins(b)) gradients(b, pass);
   });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
-  colouring_.for_each(awake(0, [&](std::size_t b) { bonds(b, pass); }));
-  if (selective_) parallel_for(blocks(), awake(1, [&](std::size_t b) { pressures(b, tangent); }));
+  colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
+  if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, pass); }));
   auto stress_on_points = [&](std::size_t b) {
-    if (!works(b, 1)) return;
+    if (!quiet_.awake(b, 2)) return;
     over_points(b, [&](std::size_t p) {
+      if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
       if (gradient_of_.stored()) return gradient_of_.scatter(p, &flux_[D * p], force_);
       if (gradient_of_.shifted()) std::copy_n(&flux_[D * p], D, &stress_[D * p]);
       gradient_of_.times_transposed(p, &flux_[D * p], &flux_[D * p]);
@@ -296,9 +298,9 @@ void CloudBonds<D>::run(Pass& pass) {
   else parallel_for(blocks(), stress_on_points);
   if (pass.bad >= 0) return;
   parallel_for(blocks(), [&](std::size_t b) {
-    if (pass.nearby && !near(b, 2)) return;
-    const bool gather = !gradient_of_.stored() && (pass.nearby || quiet_.awake(b, last));
+    const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
     over_points(b, [&](std::size_t p) {
+      if (!pass.wanted(static_cast<std::int64_t>(p))) return;
       Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
       if (gather && gradient_of_.shifted()) f = gradient_of_.shifted_divergence(p, stress_, f);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];

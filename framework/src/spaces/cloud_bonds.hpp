@@ -34,8 +34,8 @@ class CloudBonds final : public EvaluationSpace {
   void number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
   void number_bonds();
   // Selective map: volume changes of the points of a block; its stress on their gradients, from the pressures.
-  void volumes(std::size_t b, bool tangent) noexcept;
-  void pressures(std::size_t b, bool tangent) noexcept;
+  void volumes(std::size_t b, const Pass& pass) noexcept;
+  void pressures(std::size_t b, const Pass& pass) noexcept;
   void volumes_of_bonds(std::size_t p, int lanes, bool both_ends, BatchScratch& s) const noexcept;
   double share_of_volume(std::size_t p) const noexcept {
     return std::isfinite(families_.condition(p)) ? families_.left(p) : 0.0;

@@ -15,7 +15,6 @@ CloudPoints<D>::CloudPoints(const SpaceParts& parts)
       flux_(D * points_) {
   const BlockReach reach = cloud_reach(families_.lists(), points_);
   quiet_ = parts.quiet_blocks(reach);
-  local_ = parts.local_blocks(reach);
 }
 
 template <int D>
@@ -59,7 +58,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       pass.add_samples(n, s);
       continue;
     }
-    for (int l = 0; l < n && !pass.only; ++l) {
+    for (int l = 0; l < n && !pass.alone(); ++l) {
       Row S[D];
       for (int e = 0; e < D; ++e) {
         S[e] = Row{};
@@ -78,18 +77,18 @@ void CloudPoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   mirror_rows(pass.u, points_, u_);
   if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
-  if (pass.nearby) look_around([&](std::size_t b) { return cloud_marked(pass.nearby, b, points_); });
-  if (pass.alone() || pass.nearby || pass.work.tangent())
+  if (pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
   parallel_for(blocks(), [&](std::size_t b) {
-    if (pass.nearby ? near(b, 2) : quiet_.begins(b)) block(b, pass);
+    if (quiet_.begins(b)) block(b, pass);
   });
   if (pass.bad >= 0 || pass.alone()) return;
   parallel_for(blocks(), [&](std::size_t b) {
-    if (pass.nearby ? !near(b, 1) : !quiet_.awake(b, 2)) return;
+    if (!quiet_.awake(b, 2)) return;
     for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+      if (!pass.wanted(static_cast<std::int64_t>(p))) continue;
       Row f = gradient_.divergence(p, flux_);
       if (gradient_.shifted()) f = gradient_.shifted_divergence(p, stress_, f);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];

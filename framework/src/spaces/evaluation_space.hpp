@@ -46,15 +46,6 @@ class EvaluationSpace {
 
  protected:
   QuietBlocks quiet_;
-  QuietBlocks local_;  ///< the blocks around those of Pass::nearby; only where bonds may fail
-
-  /// At the beginning of a pass with Pass::nearby: holds(b) says whether block b has a marked group. Then pass k of it has
-  /// something to do in block b where near(b, k): k = 0 in these blocks alone, k in those that k steps of families reach.
-  template <class Holds>
-  void look_around(const Holds& holds) {
-    local_.look(3, holds);
-  }
-  bool near(std::size_t b, int k) const noexcept { return local_.awake(b, k); }
 };
 
 /// What a space is made of. All but the kinematics must outlive it.
@@ -65,15 +56,12 @@ struct SpaceParts {
   bool skip = true;                      ///< leave out work whose result is known; changes no bit
   bool share = true;                     ///< savings by symmetry and uniformity; change rounding
   std::span<const double> factors = {};  ///< of the weights, as set_factors takes them; for assemblies
-  bool fails = false;                    ///< bonds may fail
-
   std::shared_ptr<const Interfaces> interfaces = {};  ///< null: no laminates
 
   ConstFieldView shift = {};  ///< of point gradients, as shift_gradients takes it; for assemblies
   bool history() const noexcept { return laws.state_components() > 0; }
   /// Evaluation points need numbers.
   bool numbered() const noexcept { return history() || interfaces; }
-  QuietBlocks local_blocks(const BlockReach& reach) const { return fails ? QuietBlocks(reach) : QuietBlocks(); }
   QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }
 };
 

@@ -34,7 +34,6 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       operator_(families_),
       slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
-  local_ = parts.local_blocks(tiles_.reach);
   const Body& body = families_.body();
   if (formulation_.order > 1) stencils_.emplace(families_, formulation_.order);
   flux_ = body.make_field(D * D);
@@ -75,12 +74,19 @@ void LatticeBonds<D>::gradients(std::size_t b, Pass& pass) {
   }
   for (std::size_t c = block.chunk_begin; c < block.chunk_end;) {
     const LatticeChunk& chunk = tiles_.chunks[c];
-    if (!pass.gradient_wanted(chunk.first) || !roles_.wants(c, &ChunkRole::gradient)) {
+    if (!roles_.wants(c, &ChunkRole::gradient)) {
       ++c;
       continue;
     }
-    int n = stencils_ || pass.near ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
+    int n = stencils_ ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
     while (n > 1 && !roles_.wants(c + static_cast<std::size_t>(n) - 1, &ChunkRole::gradient)) --n;
+    // Whole runs: kernels for other numbers of chunks may round in another way.
+    bool wanted = false;
+    for (int k = 0; k < n; ++k) wanted |= pass.gradient_wanted(chunk.first + k * chunk_points);
+    if (!wanted) {
+      c += static_cast<std::size_t>(n);
+      continue;
+    }
     if (stencils_) {
       stencils_->gradient(chunk, pass.u, gradient_);
       if (tangent) stencils_->gradient(chunk, pass.w, direction_);
@@ -212,7 +218,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
     pass.add_samples(lanes, s);
     return -1;
   }
-  if (pass.only) return -1;
+  if (pass.alone()) return -1;
   choose(adjoint);
   if (selective_) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
@@ -241,8 +247,8 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
   for (std::size_t c = tiles_.blocks[b].chunk_begin; c < tiles_.blocks[b].chunk_end; ++c) {
-    if (!roles_.wants(c, &ChunkRole::stress)) continue;
     const LatticeChunk& chunk = tiles_.chunks[c];
+    if (!pass.gradient_wanted(chunk.first) || !roles_.wants(c, &ChunkRole::stress)) continue;
     double* const stress = flux_.data() + chunk.first;
     if (selective_) {
       add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
@@ -256,14 +262,17 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
 template <int D>
 void LatticeBonds<D>::divergence(Pass& pass, int number) const {
   tiles_.colouring.for_each([&](std::size_t b) {
-    if (pass.nearby ? !near(b, 2) : !quiet_.awake(b, number)) return;
+    if (!quiet_.awake(b, number) || !here(b, pass)) return;
     const LatticeBlock& block = tiles_.blocks[b];
-    for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end && stencils_; ++c)
+      if (pass.gradient_wanted(tiles_.chunks[c].first)) stencils_->adjoint(tiles_.chunks[c], flux_, pass.out);
     if (stencils_) return;
-    for (std::size_t r = block.row_begin; r < block.row_end; ++r)
-      if (roles_.wants_row(r)) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, pass.out);
+    for (std::size_t r = block.row_begin; r < block.row_end; ++r) {
+      const LatticeRow& row = tiles_.rows[r];
+      if (roles_.wants_row(r) && row.marked(pass.near)) operator_.divergence(row, flux_, row.first, pass.out);
+    }
     for (std::size_t c = block.chunk_begin; c < block.chunk_end && families_.any_broken(); ++c)
-      operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, pass.out);
+      if (pass.gradient_wanted(tiles_.chunks[c].first)) operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, pass.out);
   });
 }
 
@@ -272,23 +281,22 @@ void LatticeBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
-  if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
-  if (pass.alone() || pass.nearby || pass.work.tangent())
+  if (pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(last, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
-  // The stress on Hbar reaches one family beyond the bonds, its divergence two; what they read is cleared up to three.
-  const auto awake = [&](int k, auto&& block) {
-    return [&, k](std::size_t b) {
-      if (pass.nearby ? near(b, k) : quiet_.awake(b, 2)) block(b);
+  // Each pass reads what the one before it left at one family's reach.
+  const auto awake = [&](auto&& block) {
+    return [&](std::size_t b) {
+      if (quiet_.awake(b, 2) && here(b, pass)) block(b);
     };
   };
   parallel_for(blocks(), [&](std::size_t b) {
-    if (pass.nearby ? near(b, 3) : quiet_.begins(b)) gradients(b, pass);
+    if (quiet_.begins(b) && here(b, pass)) gradients(b, pass);
   });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
-  tiles_.colouring.for_each(awake(0, [&](std::size_t b) { bonds(b, pass); }));
-  parallel_for(blocks(), awake(1, [&](std::size_t b) { finish_stress(b, pass); }));
+  tiles_.colouring.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
+  parallel_for(blocks(), awake([&](std::size_t b) { finish_stress(b, pass); }));
   if (pass.bad < 0) divergence(pass, last);
   tiles_.clear_dead(pass.out);
 }

@@ -35,6 +35,7 @@ class LatticeBonds final : public EvaluationSpace {
   void set_whole_vectors();
   void store_corrections();
   void divergence(Pass& pass, int number) const;
+  bool here(std::size_t b, const Pass& pass) const noexcept { return !pass.near || tiles_.marked(b, pass.near); }
   void finish_stress(std::size_t b, Pass& pass);
   // Selective map.
   void point_to_volumes(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s) const noexcept;

@@ -19,7 +19,6 @@ template <int D>
 LatticePoints<D>::LatticePoints(const SpaceParts& parts)
     : families_(*parts.families.lattice()), tiles_(families_.tiles), laws_(parts.laws), operator_(families_) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
-  local_ = parts.local_blocks(tiles_.reach);
   gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.slots.row_reach)));
   for (const LatticeRow& row : tiles_.rows) most_ = std::max(most_, static_cast<std::int64_t>(rows_at_once(row)) * width(row));
 }
@@ -138,6 +137,9 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   for (std::size_t first = block.row_begin; first < block.row_end;) {
     const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
     place(rows, next, block.chunk_end, r);
+    // Whole rows: kernels for other numbers of chunks may round in another way.
+    first += rows.size();
+    if (std::none_of(r.index.begin(), r.index.end(), [&](std::int32_t c) { return pass.wanted(chunk(c).first); })) continue;
     for (std::size_t i = 0; i < r.index.size();) {
       const bool own = i < r.own;
       const int n = static_cast<int>(std::min<std::size_t>(chunks_at_once, (own ? r.own : r.index.size()) - i));
@@ -154,7 +156,6 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
       start += width(row);
     }
     for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
-    first += rows.size();
   }
   s.keep_history = true;
   if (pass.energies) pass.energies[b] = energy;
@@ -163,8 +164,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
 template <int D>
 void LatticePoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
-  if (pass.nearby) look_around([&](std::size_t b) { return tiles_.marked(b, pass.nearby); });
-  if (pass.alone() || pass.nearby || pass.work.tangent())
+  if (pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
@@ -173,7 +173,7 @@ void LatticePoints<D>::run(Pass& pass) {
   for (Rows& r : rows_)
     if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
   tiles_.colouring.for_each([&](std::size_t b) {
-    if (pass.nearby ? near(b, 1) : quiet_.awake(b, 1)) by_rows(b, pass);
+    if (quiet_.awake(b, 1)) by_rows(b, pass);
   });
   tiles_.clear_dead(pass.out);
 }

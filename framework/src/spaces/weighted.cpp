@@ -326,18 +326,14 @@ void Weighted<D>::run(Pass& pass) {
   }
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { block(b, pass); });
   if (singles_) out_rows_.assign(stride, Row{});
-  if (pass.nearby)
-    look_around([&](std::size_t b) {
-      return lattice_ ? lattice_->tiles.marked(b, pass.nearby) : cloud_marked(pass.nearby, b, body_.points(), cloud_block);
-    });
-  if (pass.nearby || pass.everywhere())
+  if (pass.everywhere())
     quiet_.wake();
   else
     quiet_.look(1, [&](std::size_t b) {
       return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points(), cloud_block);
     });
   (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
-    if (pass.nearby ? near(b, 0) : quiet_.awake(b, 1)) block(b, pass);
+    if (quiet_.awake(b, 1)) block(b, pass);
   });
   if (!singles_) return;
   parallel_for(cloud_blocks(stride), [&](std::size_t b) {

@@ -19,7 +19,6 @@ Weighted<D>::Weighted(const SpaceParts& parts)
   lattice_ ? prepare_lattice() : prepare_cloud();
   const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), body_.points(), cloud_block);
   quiet_ = parts.quiet_blocks(reach);
-  local_ = parts.local_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
   if (parts.numbered()) number_groups();
 }

@@ -34,7 +34,7 @@ BondCriterion::BondCriterion(const Families& families, const Formulation& formul
     for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l);
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
-  for (GroupMarks* marks : {&own_, &near_, &wide_}) marks->assign(count, 0);
+  own_.assign(count, 0);
   if (damage && traits_.bound != ValueBound::none) set_screen();
 }
 
@@ -113,17 +113,10 @@ std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
 
 /// What the evaluation points of these groups hold, and those of everything in their families.
 void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
-  const auto mark = [&](const GroupMarks& of, GroupMarks& marks) {
-    std::vector<std::int32_t> points;
-    for (std::size_t p = 0; p < body_.stride(); ++p)
-      if (of[p / padding] && body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
-    std::fill(marks.begin(), marks.end(), std::uint8_t{0});
-    families_.mark(points, marks);
-  };
   std::fill(own_.begin(), own_.end(), std::uint8_t{0});
   for (const std::int32_t g : groups) own_[static_cast<std::size_t>(g)] = 1;
-  mark(own_, near_);
-  mark(near_, wide_);
+  near_ = families_.around(own_);
+  wide_ = families_.around(near_);
   samples_.clear(own_);
   for (const auto& term : terms_) term->add_bonds(u, near_, wide_, samples_);
   samples_.merge();

@@ -29,7 +29,6 @@ class CloudPairs final : public PairLoop {
   std::size_t bytes() const noexcept override {
     return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
-  bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return cloud_marked(marks, b, points_); }
   std::int64_t run(const PairPass& pass) override;
 
  private:
@@ -278,7 +277,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
     else pass.out.data[p] = 0;
   });
   each_block(pass, colouring_, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
-  if (pass.work == PairWork::force && fails_ && bad() < 0) nearest_.u = &u_;
+  if (pass.work == PairWork::force && fails_ && !pass.only && bad() < 0) nearest_.u = &u_;
   if (vectors && bad() < 0) {
     over_points([&](std::size_t p) {
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += force_[p][c];

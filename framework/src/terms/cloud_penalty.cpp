@@ -31,18 +31,22 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
     mirror_rows(u, points_, u_);
     std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
-    quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
+    if (only) quiet_.wake();
+    else quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
+    const auto wanted = [&](std::size_t p) { return !only || only[p / padding]; };
     over_points([&](std::size_t b) { return quiet_.begins(b); },
                 [&](std::size_t p) {
+                  if (!wanted(p)) return;
                   gradient_.at(p, u_, &flux_[D * p]);
                   if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
                   for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
                 });
     over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
                 [&](std::size_t p) {
+                  if (!wanted(p)) return;
                   const Row f = factor * position_[p][3] * force_of_point(p);
                   for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
                 });
@@ -57,16 +61,6 @@ class CloudPenalty final : public ZeroEnergyPenalty {
       gradient_.at(p, u_, &flux_[D * p]);
       density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
     });
-  }
-
-  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
-    mirror_rows(u, points_, u_);
-    quiet_.wake();
-    for (std::size_t p = 0; p < points_; ++p) {
-      if (!marks[p / padding] || !families_.body().owns(p)) continue;
-      gradient_.at(p, u_, &flux_[D * p]);
-      energy.add(energy_of_point(p, &flux_[D * p]));
-    }
   }
 
   void bonds_changed(std::span<const std::int32_t> points) override {

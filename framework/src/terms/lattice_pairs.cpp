@@ -43,12 +43,10 @@ class LatticePairs final : public PairLoop {
   bool owns(std::size_t b) const noexcept override { return families_.tiles.owns(b); }
   std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
 
-  bool holds(std::size_t b, const std::uint8_t* marks) const noexcept override { return families_.tiles.marked(b, marks); }
-
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
     look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); });
-    if (!pass.only && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
+    if ((!pass.only || pass.local) && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
     each_block(pass, families_.tiles.colouring, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
     return bad();
   }
@@ -62,7 +60,7 @@ class LatticePairs final : public PairLoop {
       const LatticeChunk& chunk = families_.tiles.chunks[c];
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
-        for (int k = 0; k < pass.out.components; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
+        for (int k = 0; k < pass.out.components && !pass.local; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
       }
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane < 0) continue;

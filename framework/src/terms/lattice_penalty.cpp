@@ -34,12 +34,13 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
     std::vector<double> energies(energy ? families_.tiles.blocks.size() : 0, 0.0);
-    quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
+    if (only) quiet_.wake();
+    else quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       if (!quiet_.begins(b)) return;
-      for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
+      for_gradients(b, u, only, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
         own_forces(chunk, u, factor, H, sums, force);
         if (!energy) return;
         double of_points[chunk_points];
@@ -50,9 +51,11 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     families_.tiles.colouring.for_each([&](std::size_t b) {
       if (!quiet_.awake(b, 2)) return;
       for (std::size_t r = families_.tiles.blocks[b].row_begin; r < families_.tiles.blocks[b].row_end; ++r)
-        operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
+        if (families_.tiles.rows[r].marked(only)) operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
       if (!families_.any_broken()) return;
-      for_chunks(b, [&](const LatticeChunk& chunk) { operator_.remove_broken(chunk, flux_, chunk.first, source_, force); });
+      for_chunks(b, [&](const LatticeChunk& chunk) {
+        if (!only || only[chunk.first / chunk_points]) operator_.remove_broken(chunk, flux_, chunk.first, source_, force);
+      });
     });
     families_.tiles.clear_dead(force);
     if (energy) add_owned(energies, *energy);
@@ -60,27 +63,12 @@ class LatticePenalty final : public ZeroEnergyPenalty {
 
   void add_density(ConstFieldView u, double* density) override {
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
-      for_gradients(b, u, [&](const LatticeChunk& chunk, const double* H, const double*) {
+      for_gradients(b, u, nullptr, [&](const LatticeChunk& chunk, const double* H, const double*) {
         double of_points[chunk_points];
         energies_of_points(chunk, u, H, of_points);
         for (int l = 0; l < chunk_points; ++l) density[chunk.first + l] += of_points[l] / families_.volume;
       });
     });
-  }
-
-  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
-    std::vector<double> energies(families_.tiles.blocks.size(), 0.0);
-    parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
-      alignas(64) double H[D * D * batch_points], sums[D * batch_points];
-      for_chunks(b, [&](const LatticeChunk& chunk) {
-        if (!marks[static_cast<std::size_t>(chunk.first) / padding]) return;
-        operator_.gradient_and_sums(&chunk, 1, u, H, sums, batch_points);
-        double of_points[chunk_points];
-        energies_of_points(chunk, u, H, of_points);
-        for (const double e : of_points) energies[b] += e;
-      });
-    });
-    add_owned(energies, energy);
   }
 
   void bonds_changed(std::span<const std::int32_t> points) override {
@@ -148,13 +136,17 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]);
   }
 
-  /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b.
+  /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b,
+  /// or those among them that are taken together with a marked one: kernels for other numbers of chunks may round in another way.
   template <class Use>
-  void for_gradients(std::size_t b, ConstFieldView u, Use&& use) const {
+  void for_gradients(std::size_t b, ConstFieldView u, const std::uint8_t* only, Use&& use) const {
     alignas(64) double H[D * D * batch_points], sums[D * batch_points];
     constexpr std::size_t at_once = batch_points / chunk_points;
     for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; c += at_once) {
       const std::size_t n = std::min(at_once, families_.tiles.blocks[b].chunk_end - c);
+      bool wanted = !only;
+      for (std::size_t k = 0; k < n && !wanted; ++k) wanted = only[families_.tiles.chunks[c + k].first / chunk_points];
+      if (!wanted) continue;
       operator_.gradient_and_sums(&families_.tiles.chunks[c], static_cast<int>(n), u, H, sums, batch_points);
       for (std::size_t k = 0; k < n; ++k) use(families_.tiles.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
     }

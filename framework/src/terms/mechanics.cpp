@@ -56,17 +56,13 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
   const Body& body = parts_.families.body();
   const Interfaces& interfaces = laminates_->interfaces();
   const int d = body.dimension();
-  std::vector<std::int32_t> points;
   bool any = false;
   for (std::size_t g = 0; g < marks.size(); ++g) {
     marks[g] = marks[g] && laminates_->near()[g];
     any |= marks[g] != 0;
   }
   if (!any) return;
-  for (std::size_t p = 0; p < body.stride(); ++p)
-    if (marks[p / padding] && body.alive(p)) points.push_back(static_cast<std::int32_t>(p));
-  GroupMarks near(marks.size(), 0);
-  parts_.families.mark(points, near);
+  const GroupMarks near = parts_.families.around(marks);
   Field values = body.make_field(d);
   if (again)
     for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) laminates_->clear(found.number);
@@ -134,29 +130,19 @@ std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldVie
   return pass.bad;
 }
 
-void Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
-  const Body& body = parts_.families.body();
-  std::vector<std::int32_t> points;
-  for (std::size_t p = 0; p < body.stride(); ++p)
-    if (marks[p / padding] && body.alive(p)) points.push_back(static_cast<std::int32_t>(p));
-  GroupMarks near(marks.size(), 0);
-  parts_.families.mark(points, near);
-  const BatchWork work = this->work(Work::force, true);
-  std::vector<double> energies(space_->blocks(), 0.0);
-  Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
+std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                      ExactSum* energy) {
+  const BatchWork work = this->work(Work::force, energy != nullptr);
+  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
+  Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}, only.data(), near.data()};
   space_->run(pass);
-  add_owned(energies, energy);
-}
-
-void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {
-  const BatchWork work = this->work(Work::force, false);
-  Pass pass{work, u, {}, force, nullptr, nullptr, -1, {}, nullptr, nullptr, marks.data()};
-  space_->run(pass);
+  if (energy) add_owned(energies, *energy);
+  return pass.bad;
 }
 
 void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
   const BatchWork work = this->work(Work::sample, false);
-  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), nullptr, &samples};
+  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), &samples};
   space_->run(pass);
 }
 

@@ -18,8 +18,8 @@ class Mechanics final : public Term {
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
-  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
-  void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
+  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                             ExactSum* energy) override;
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }

@@ -176,22 +176,24 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-void PairForces<D>::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) {
-  if (density_.size() == 0) density_ = body_.make_field(2);
-  if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), marks.data());
-  loop_->run({PairWork::energy, u, {}, q_, {}, {density_.data(), density_.stride(), 1}, nullptr, marks.data()});
-  for (std::size_t p = 0; p < body_.stride(); ++p)
-    if (marks[p / padding] && body_.alive(p) && body_.owns(p))
-      energy.add(body_.volume(p) * (density_.component(0)[p] + density_.component(1)[p]));
+std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                          ExactSum* energy) {
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, {}, energy, nullptr, near.data(), true);
+    if (bad >= 0) return bad;
+  }
+  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
+  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr, only.data(), true};
+  return run(pass, bonds, energy);
 }
 
+/// The loop, and the energies of its blocks.
 template <int D>
-void PairForces<D>::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) {
-  if (density_.size() == 0) density_ = body_.make_field(2);
-  if (formulation_.dilatation) dilatation(u, {}, nullptr, density_.component(1), near.data());
-  PairPass pass{PairWork::force, u, {}, q_, {}, force};
-  pass.nearby = marks.data();
-  loop_->run(pass);
+std::int64_t PairForces<D>::run(const PairPass& pass, const std::vector<double>& energies, ExactSum* energy) {
+  const std::int64_t bad = loop_->run(pass);
+  for (std::size_t b = 0; b < energies.size(); ++b)
+    if (loop_->owns(b)) energy->add(energies[b]);
+  return bad;
 }
 
 template <int D>
@@ -296,8 +298,8 @@ void PairForces<D>::set_correction() {
 
 template <int D>
 std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                                       const std::uint8_t* only) {
-  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only});
+                                       const std::uint8_t* only, bool local) {
+  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
   if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
@@ -323,7 +325,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, Exact
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energy && body_.alive(p) && body_.owns(p))
+      if (energy && body_.alive(p) && body_.owns(p) && (!only || only[p / padding]))
         energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
     }
   });
@@ -341,10 +343,7 @@ std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactS
   PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr};
   pass.screen = screen_;
   if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
-  const std::int64_t bad = loop_->run(pass);
-  for (std::size_t b = 0; b < bonds.size(); ++b)
-    if (loop_->owns(b)) energy->add(bonds[b]);
-  return bad;
+  return run(pass, bonds, energy);
 }
 
 template <int D>

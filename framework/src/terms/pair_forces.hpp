@@ -28,9 +28,8 @@ class PairForces final : public Term {
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override { return formulation_.dilatation ? 2 : 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
-  /// Half of each bond of the marked groups, and their dilatation.
-  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override;
-  void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) override;
+  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                             ExactSum* energy) override;
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage& damage) override;
@@ -45,6 +44,7 @@ class PairForces final : public Term {
     AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
     AlignedVector<double> energy, force;
   };
+  std::int64_t run(const PairPass& pass, const std::vector<double>& energies, ExactSum* energy);
   void load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const;
   /// P_i = sum_j b V_j (w'/2 + omega |xi| q_i) n (x) xi: the derivative of the energy density of a point by a homogeneous deformation.
   void add_virial(ConstFieldView u, FieldView P) const;
@@ -56,9 +56,9 @@ class PairForces final : public Term {
   void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
-  /// density. only: groups of points to do, null for all.
+  /// density. only, local: see PairPass; null for all.
   std::int64_t dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                          const std::uint8_t* only = nullptr);
+                          const std::uint8_t* only = nullptr, bool local = false);
 
   const Families& families_;
   const Body& body_;
@@ -74,7 +74,7 @@ class PairForces final : public Term {
   Field theta_, q_, rate_;
   Field by_theta_;  ///< phi/theta d/m, where bonds are screened
   BondScreen* screen_ = nullptr;
-  Field density_;  ///< work field of energy_of
+  Field density_;  ///< work field
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
 };

@@ -29,9 +29,10 @@ struct PairPass {
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
   double* energies = nullptr;          ///< by block
-  const std::uint8_t* only = nullptr;  ///< by group of eight points: others are left alone (dilatation and energy)
-  /// Forces of the bonds alone that belong to the blocks of these groups; dilatations are there.
-  const std::uint8_t* nearby = nullptr;
+  /// By group of eight points: others are left alone (dilatation and energy); where `local`, the bonds alone that these own, each
+  /// once: as in a whole loop on points whose families lie in `only`, anything elsewhere (dilatation and force).
+  const std::uint8_t* only = nullptr;
+  bool local = false;
   const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
   BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
 };
@@ -98,21 +99,19 @@ class PairLoop {
   template <class Moves>
   void look(const PairPass& pass, const Moves& moves) {
     reach_ = pass.q.data ? 2 : 1;
-    if (!pass.only && !pass.nearby && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
+    if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
       quiet_.look(reach_, moves);
     else
       quiet_.wake();
   }
-  /// Whether a group of block b is marked.
-  virtual bool holds(std::size_t b, const std::uint8_t* marks) const noexcept = 0;
   /// Each bond once, for both ends.
-  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && !pass.only; }
+  bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && (!pass.only || pass.local); }
   /// block(work, b) for each block that is awake, `work` being pass.work as a constant; coloured where far ends are written.
   template <class Block>
   void each_block(const PairPass& pass, const Colouring& colouring, const Block& block) const {
     const auto sweep = [&]<PairWork work>(std::integral_constant<PairWork, work> constant) {
       auto body = [&](std::size_t b) {
-        if (pass.nearby ? holds(b, pass.nearby) : quiet_.awake(b, reach_)) block(constant, b);
+        if (quiet_.awake(b, reach_)) block(constant, b);
       };
       if (at_once(pass)) colouring.for_each(body);
       else parallel_for(blocks(), body);

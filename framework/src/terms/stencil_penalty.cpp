@@ -35,19 +35,12 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
-  void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) override {
-    read(u);
-    std::vector<Row> t;
-    for (std::size_t r = 0; r < rows_.size(); ++r)
-      if (marks[rows_.point(r) / padding] && stencil_[r] >= 0 && rows_.body().owns(rows_.point(r)))
-        energy.add(0.5 * springs(r, t));
-  }
-
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) override {
+  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
     read(u);
     force_.assign(rows_.size(), Row{});
     std::vector<double> energies(energy ? rows_.size() : 0, 0.0);
-    quiet_.look(1, [&](std::size_t b) {
+    if (only) quiet_.wake();
+    else quiet_.look(1, [&](std::size_t b) {
       bool any = false;
       over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
       return any;
@@ -56,6 +49,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       if (!quiet_.awake(b, 1)) return;
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
+        if (only && !only[rows_.point(r) / padding]) return;
         const double twice = pull(r, factor, t);
         if (energy) energies[r] = 0.5 * twice;
       });

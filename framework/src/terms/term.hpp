@@ -31,11 +31,12 @@ class Term {
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
 
   // Where bonds fail.
-  /// energy += E of what those points of the marked groups own that this rank owns [J].
-  virtual void energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& energy) = 0;
-  /// force += the forces of all evaluation points that belong to the points of the marked groups, and of any others: the same
-  /// ones whichever bonds are left. `near`: those groups and everything in their families. An inadmissible point adds nothing.
-  virtual void add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, FieldView force) = 0;
+  /// force += the forces of the evaluation points that belong to the groups `only`, and of some others, the same ones whichever
+  /// bonds are left. `near`: those groups and everything in their families. On points whose families of order steps() - 1, and at
+  /// least 1, lie in `only`, all that add_forces adds, bit for bit.
+  /// *energy += their E, of what this rank owns [J], where wanted.
+  virtual std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                     ExactSum* energy) = 0;
   /// What the evaluation points of the points of the marked groups hold; point gradients are needed in the groups of `near`.
   virtual void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) = 0;
   /// What follows from the bonds of these points is to be computed anew.

@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "assembly/block_pattern.hpp"
 #include "body/interfaces.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "families/vicinity.hpp"
 #include "perikit/core/communicator.hpp"
-#include "perikit/terms/terms.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
 #include "terms/mechanics.hpp"
@@ -54,7 +56,14 @@ struct Terms::Assemblies {
 
 struct Terms::Failing {
   Fracture fracture;
-  Field force;  ///< work field
+  Field force;                       ///< work field
+  std::optional<Vicinity> vicinity;  ///< made when asked for
+
+  FieldView cleared(ConstFieldView like, const Body& body) {
+    if (force.size() == 0) force = body.make_field(like.components);
+    clear(force.data(), force.size());
+    return force;
+  }
 };
 
 Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
@@ -65,7 +74,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share, meeting}));
   } else {
     auto mechanics = std::make_unique<Mechanics>(
-        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, parts_.damage != nullptr, meeting});
+        SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, meeting});
     mechanics_ = mechanics.get();
     if (parts_.consistency) mechanics_->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
@@ -89,7 +98,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     if (criterion_) terms_.front()->screen(criterion_->screen());
     finder = std::move(criterion);
   }
-  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
+  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}, {}});
 }
 
 Terms::~Terms() = default;
@@ -114,6 +123,35 @@ EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy
     bad = (*term)->add_forces(u, force, energy ? &sum : nullptr);
   if (criterion_ && bad < 0) criterion_->end_forces();
   if (energy) *energy = total_over_ranks(sum);
+  return status(bad);
+}
+
+EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
+                                     FieldView force) {
+  if (!failing_ || !parts_.skip || history()) return forces(u, force, nullptr);
+  const Body& body = parts_.families->body();
+  int steps = 1;
+  for (const auto& term : terms_) steps = std::max(steps, term->steps());
+  std::optional<Vicinity>& vicinity = failing_->vicinity;
+  if (!vicinity) vicinity.emplace(body);
+  vicinity->clear();
+  vicinity->add(moved, steps);
+  vicinity->add(lost, std::max(1, steps - 1));
+  std::vector<std::int32_t> renewed, evaluated;
+  for (const std::int32_t p : body.internal())
+    if (vicinity->holds(static_cast<std::size_t>(p))) renewed.push_back(p);
+  vicinity->grow(std::max(1, steps - 1));
+  const GroupMarks only = vicinity->groups();
+  for (const std::int32_t p : body.internal())
+    if (only[static_cast<std::size_t>(p) / padding]) evaluated.push_back(p);
+  if (2 * evaluated.size() > body.points()) return forces(u, force, nullptr);
+  vicinity->add(evaluated, 1);
+  const GroupMarks near = vicinity->groups();
+  const FieldView own = failing_->cleared(force, body);
+  std::int64_t bad = -1;
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces_of(u, only, near, own, nullptr);
+  for (int c = 0; c < force.components; ++c)
+    for (const std::int32_t p : renewed) force.component(c)[p] = own.component(c)[p];
   return status(bad);
 }
 
@@ -196,25 +234,17 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
   const Families& families = *parts_.families;
-  const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
-    ExactSum sum;
-    for (const auto& term : terms_) term->energy_of(at, marks, sum);
-    return total_over_ranks(sum);
-  };
   const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
-    Field& own = failing_->force;
-    if (own.size() == 0) own = families.body().make_field(force.components);
-    clear(own.data(), own.size());
-    GroupMarks near(marks.size(), 0);
-    std::vector<std::int32_t> points;
-    for (std::size_t p = 0; p < families.body().stride(); ++p)
-      if (marks[p / padding] && families.body().alive(p)) points.push_back(static_cast<std::int32_t>(p));
-    families.mark(points, near);
-    for (const auto& term : terms_) term->add_forces_near(at, marks, near, own);
-    for (std::size_t k = 0; k < force.size(); ++k) force.data[k] += factor * own.data()[k];
+    const FieldView own = failing_->cleared(at, families.body());
+    ExactSum energy;
+    // A bond may be evaluated once for both ends, at either.
+    const GroupMarks only = families.around(marks), near = families.around(only);
+    for (const auto& term : terms_) term->add_forces_of(at, only, near, own, &energy);
+    if (force.data) combine(1, force, factor, own, force);
+    return total_over_ranks(energy);
   };
   return failing_->fracture.update(u, time_step, begin, reaction,
-                                   {energy, forces, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
+                                   {forces, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
 }
 
 std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {

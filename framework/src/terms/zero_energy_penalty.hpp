@@ -17,9 +17,9 @@ class ZeroEnergyPenalty : public Term {
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
-  /// Of all points: its loops have no parts.
-  void add_forces_near(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force) final {
-    apply(u, 1.0, force, nullptr);
+  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum* energy) final {
+    apply(u, 1.0, force, energy, only.data());
+    return -1;
   }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
   int steps() const noexcept final { return 2; }
@@ -31,8 +31,8 @@ class ZeroEnergyPenalty : public Term {
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
-  /// force += -factor dE/du [N]; *energy += E of what this rank owns [J] where wanted.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy) = 0;
+  /// force += -factor dE/du [N]; *energy += E of what this rank owns [J] where wanted. only: what add_forces_of says; null: all.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only = nullptr) = 0;
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;

@@ -100,10 +100,13 @@ class BodyProblem final : public Problem {
   template <class Fill>
   void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
 
+  /// What evaluations of forces say of inadmissible deformation.
+  void describe(EvaluationStatus& status) const;
   /// What bonds that failed inside of the last step mean for forces, velocity and work.
   void react(BondReaction& reaction, FieldView velocity);
 
   Field seen_, seen_direction_;
+  bool energy_wanted_ = false;   ///< by the last evaluation of forces
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
   std::unique_ptr<WeakSprings> weak_springs_;   ///< null unless pieces are watched

@@ -47,6 +47,9 @@ class Terms {
 
   /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted.
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
+  /// The same without the energy, where `force` holds the forces before the points `moved` went to where u has them and those of
+  /// `lost` lost bonds: what has not changed is left as it is, what has has the same bits. On one rank.
+  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost, FieldView force);
   /// Kw <- -d(force)/du w [N], fully overwritten.
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
   /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
