@@ -18,19 +18,7 @@ namespace {
 /// Relative distance of the displacement at the end from what the columns of the history call exact.
 double error(const std::string& scene, int points, const std::string& kinematics) {
   const auto simulation = load("faces/" + scene + ".toml", {fmt::format("body.lattice.spacing={:.17g}", 1.0 / points), "kinematics=" + kinematics, "run.threads=1"});
-  contract::run(*simulation);
-  BodyProblem& problem = simulation->problem();
-  double distance = 0, size = 0;
-  for (const HistoryDescription& record : simulation->scene().output.history) {
-    if (!record.exact) continue;
-    const double* u = problem.state().displacement().component(record.component[0] - 'x');
-    for (const std::int32_t p : problem.body().owned()) {
-      const double exact = (*record.exact)(problem.body().position(static_cast<std::size_t>(p)), problem.state().time);
-      distance += (u[p] - exact) * (u[p] - exact);
-      size += exact * exact;
-    }
-  }
-  return std::sqrt(distance / size);
+  return error_of_run(*simulation);
 }
 
 const std::vector<std::string> kinematics{

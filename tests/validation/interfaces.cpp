@@ -24,19 +24,7 @@ double error(const std::string& scene, int points, const std::string& kinematics
   more.push_back(fmt::format("family.interfaces=\"{}\"", laminates ? "laminate" : "parallel"));
   more.push_back("run.threads=1");
   const auto simulation = load("interfaces/" + scene + ".toml", std::move(more));
-  contract::run(*simulation);
-  BodyProblem& problem = simulation->problem();
-  double distance = 0, size = 0;
-  for (const HistoryDescription& record : simulation->scene().output.history) {
-    if (!record.exact) continue;
-    const double* u = problem.state().displacement().component(record.component[0] - 'x');
-    for (const std::int32_t p : problem.body().owned()) {
-      const double exact = (*record.exact)(problem.body().position(static_cast<std::size_t>(p)), problem.state().time);
-      distance += (u[p] - exact) * (u[p] - exact);
-      size += exact * exact;
-    }
-  }
-  return std::sqrt(distance / size);
+  return error_of_run(*simulation);
 }
 
 /// By name, what becomes at least so many times better at n = 20 in the bar.

@@ -1,5 +1,9 @@
 #include "tests/validation/scenes.hpp"
 
+#include <cmath>
+
+#include "tests/contract/integrator_fixture.hpp"
+
 namespace perikit::validation {
 
 Registry& registry() {
@@ -15,6 +19,22 @@ Registry& registry() {
 std::unique_ptr<Simulation> load(const std::string& scene, std::vector<std::string> overrides) {
   const std::string file = std::string(PERIKIT_SOURCE_FOLDER) + "/configs/" + scene;
   return std::make_unique<Simulation>(read_scene(file, registry(), {.overrides = std::move(overrides)}), registry());
+}
+
+double error_of_run(Simulation& simulation) {
+  contract::run(simulation);
+  BodyProblem& problem = simulation.problem();
+  double distance = 0, size = 0;
+  for (const HistoryDescription& record : simulation.scene().output.history) {
+    if (!record.exact) continue;
+    const double* u = problem.state().displacement().component(record.component[0] - 'x');
+    for (const std::int32_t p : problem.body().owned()) {
+      const double exact = (*record.exact)(problem.body().position(static_cast<std::size_t>(p)), problem.state().time);
+      distance += (u[p] - exact) * (u[p] - exact);
+      size += exact * exact;
+    }
+  }
+  return std::sqrt(distance / size);
 }
 
 }  // namespace perikit::validation

@@ -13,5 +13,7 @@ namespace perikit::validation {
 Registry& registry();
 /// scene: relative to configs/.
 std::unique_ptr<Simulation> load(const std::string& scene, std::vector<std::string> overrides = {});
+/// Runs it. Relative distance of the displacement at the end from what the columns of the history call exact.
+double error_of_run(Simulation& simulation);
 
 }  // namespace perikit::validation

@@ -10,16 +10,15 @@
 namespace perikit {
 
 void ScratchPool::prepare(const Laws& laws, bool laminates) {
-  for (const auto& scratch : scratch_)
-    if (laminates && !scratch->laminate) scratch->laminate = std::make_unique<LaminateScratch>(laws);
   while (scratch_.size() < static_cast<std::size_t>(thread_count())) {
     // Value-initialised: components that no kernel writes (lateral H) stay zero.
     scratch_.push_back(std::make_unique<BatchScratch>());
     BatchScratch& s = *scratch_.back();
     laws.prepare(s.law, false);
-    if (laminates) s.laminate = std::make_unique<LaminateScratch>(laws);
     for (auto* state : {&s.old_state, &s.new_state}) state->assign(static_cast<std::size_t>(laws.state_components()) * batch_points, 0.0);
   }
+  for (const auto& scratch : scratch_)  // some may have been made before there were laminates
+    if (laminates && !scratch->laminate) scratch->laminate = std::make_unique<LaminateScratch>(laws);
 }
 
 // Numbers that follow each other are read and written where they lie; others, and those of bodies with several laws, are gathered.
