@@ -1,5 +1,5 @@
 /// Explicit runs whose time step is too long: refused before they start, stopped where they lose their energy, warned of at the
-/// end.
+/// end. Quasi-static runs whose strain energy is not the work that was done: warned of.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -80,4 +80,34 @@ TEST_CASE("energies: a body at rest, far from where it was, has none that could 
   const Result run = desk.perikit("run scene.toml -o out --set 'output.history=[]'");
   CHECK_MESSAGE(run.status == 0, run.err);
   CHECK_MESSAGE(contains(run.out, "warnings      none"), run.out);
+}
+
+TEST_CASE("energies: a quasi-static run that jumps from one equilibrium to another is warned of its energies, one that follows its path is not") {
+  for (const std::string integrator : {"newton", "jfnk", "kinsol", "dynamic_relaxation"}) {
+    INFO(integrator);
+    std::string scene = replaced(plate, "type = \"verlet\"\ntime_step = 0.02\nend_time = 1.0",
+                                 fmt::format("type = \"{}\"\nsteps = 3\ntolerance = 1e-6", integrator));
+    scene = replaced(scene, "[[boundary]]\nset = \"right\"\nvelocity = [0.1, \"free\"]\n", "[[load]]\nset = \"right\"\nbody_force = [\"LOAD\", 0]\n");
+    scene = scene.substr(0, scene.find("[output]"));
+    const std::string warning = "warning: strain energy and the work of loads and boundaries were apart by up to ";
+    // All of the load from the start: in a body that is all but linear its work is twice the strain energy.
+    const Desk sudden(replaced(scene, "LOAD", "0.005 + 0*t")), gradual(replaced(scene, "LOAD", "0.005*t"));
+    const Result jump = sudden.perikit("run scene.toml -o out"), path = gradual.perikit("run scene.toml -o out");
+    REQUIRE_MESSAGE(jump.status == 0, jump.err);
+    REQUIRE_MESSAGE(path.status == 0, path.err);
+    REQUIRE_MESSAGE(contains(jump.out, warning), jump.out);
+    const std::string share = jump.out.substr(jump.out.find(" J, ", jump.out.find(warning)) + 4);
+    CHECK_MESSAGE(std::stod(share) == doctest::Approx(0.5).epsilon(0.03), share);
+    CHECK_MESSAGE(contains(path.out, "warnings      none"), path.out);
+  }
+}
+
+TEST_CASE("energies: load steps of a body that is held far from where it was are no jump") {
+  std::string scene = replaced(plate, "type = \"verlet\"\ntime_step = 0.02\nend_time = 1.0", "type = \"newton\"\nsteps = 3\ntolerance = 1e-3");
+  scene = replaced(scene, "displacement = [0, 0]\n", "displacement = [\"1e6\", \"0.3\"]\n");
+  scene = replaced(scene, "[[boundary]]\nset = \"right\"\nvelocity = [0.1, \"free\"]\n", "[initial]\ndisplacement = [1e6, 0.3]\n");
+  const Desk desk(scene.substr(0, scene.find("[output]")));
+  const Result run = desk.perikit("run scene.toml -o out");
+  REQUIRE_MESSAGE(run.status == 0, run.err);
+  CHECK_MESSAGE(!contains(run.out, "the work of loads and boundaries were apart"), run.out);
 }

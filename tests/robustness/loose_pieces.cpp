@@ -110,6 +110,18 @@ TEST_CASE("loose pieces: weak springs hold them, and are told of") {
   CHECK_MESSAGE(contains(dynamic.err, "run.weak_springs: found with integrator \"verlet\""), dynamic.err);
 }
 
+TEST_CASE("loose pieces: a tangent that springs hold by no more than its rounding is a warning of newton, one that they hold is not") {
+  const Desk desk(replaced(loaded("newton"), "force = [0.01, 0.002]", "force = [1e-9, 0]") + crack);
+  const std::string warning = "warning: newton: the tangent is nearly singular";
+  const Result hardly = desk.perikit("run scene.toml -o hardly --set run.weak_springs=1e-15");
+  REQUIRE_MESSAGE(hardly.status == 0, hardly.err);
+  CHECK_MESSAGE(contains(hardly.out, warning), hardly.out);
+  CHECK(contains(desk.text("hardly/run.log"), "tangent nearly singular ("));
+  const Result held_by_springs = desk.perikit("run scene.toml -o held --set run.weak_springs=1e-10");
+  REQUIRE_MESSAGE(held_by_springs.status == 0, held_by_springs.err);
+  CHECK_MESSAGE(!contains(held_by_springs.out, warning), held_by_springs.out);
+}
+
 TEST_CASE("loose pieces: a piece that failing bonds let go under load ends the run with its name, one without load does not") {
   const std::string scene = replaced(loaded("newton"), "steps = 2", "steps = 20") +
                             "[damage]\ntype = \"critical_stretch\"\nstretch = 0.05\nno_fail = [\"left\", \"right\"]\n";

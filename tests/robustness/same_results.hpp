@@ -41,14 +41,14 @@ inline int wait_for(pid_t child) {
 }
 
 /// Runs scene.toml with --resume into `folder` and kills it after a random time, later and later, until it comes to its end.
-/// Returns the kills.
-inline int run_with_kills(const Desk& desk, const std::string& folder, std::mt19937& random) {
+/// first: the longest time to the first kill [ms]. Returns the kills.
+inline int run_with_kills(const Desk& desk, const std::string& folder, std::mt19937& random, int first = 80) {
   int kills = 0, status = -1;
   while (status != 0) {
     REQUIRE_MESSAGE(kills < 100, "the run does not get on");
     const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", folder});
     // However slow the machine and the build are, the run gets through in the end.
-    std::this_thread::sleep_for(std::chrono::milliseconds(random() % static_cast<unsigned>(80 * std::pow(1.1, kills))));
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % static_cast<unsigned>(first * std::pow(1.1, kills))));
     kill(child, SIGKILL);
     status = wait_for(child);
     if (WIFSIGNALED(status))

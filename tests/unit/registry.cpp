@@ -263,12 +263,22 @@ TEST_CASE("a scan reads manifests alone; a library that changed since then is tr
     CHECK(error_of([&] { registry.describe(Kind::influence, "sound"); }).find("kills the process") != std::string::npos);
     CHECK(registry.names(Kind::influence).empty());
   }
-  SUBCASE("into one of the same size: what the manifest named is forgotten") {
+  SUBCASE("into one of the same size with other bytes: damaged, and refused") {
     other.back() = static_cast<char>(other.back() + 1);  // the end of the section table, which the loader does not read
     Registry registry;
     folder.write("good.so", other);
     registry.add_folder(folder.path);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
+    const std::string error = error_of([&] { registry.describe(Kind::influence, "sound"); });
+    CHECK_MESSAGE(error.find("its bytes are not those that good.parts describes") != std::string::npos, error);
+    CHECK(registry.names(Kind::influence).empty());
+    REQUIRE(registry.refused().size() == 1);
+  }
+  SUBCASE("into one of another size: what the manifest named is forgotten") {
+    Registry registry;
+    registry.add_folder(folder.path);
+    CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
+    folder.write("good.so", other + " ");
     CHECK(error_of([&] { registry.describe(Kind::influence, "promised"); }).find("found the unknown influence 'promised'") == 0);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
     CHECK(registry.refused().empty());

@@ -145,6 +145,10 @@ TEST_CASE("errors of a study file name place, key, what was found and what is al
   check("[1, 2, 4]", "[]", "values.constants.k: found a list of 0; allowed: a list of values, at least one");
   check("[1, 2, 4]", "[1979-05-27]",
         "values.constants.k.0: found a date or time; allowed: a number, boolean, string, list or table");
+  std::string many;
+  for (int k = 0; k < 800; ++k) many += "1, ";
+  check("constants.k = [1, 2, 4]", "constants.k = [" + many + "]\nconstants.l = [" + many + "]",
+        "study.toml:4:1: values: found 1.28e+06 combinations; allowed: at most 1000000 runs");
   check("constants.k = [1, 2, 4]", "\"kinematics.type\" = [\"baqp\"]", "found the key twice; allowed: once");
   check("\"max\"", "\"sum\"",
         "study.toml:10:10: quantity.0.reduce: found the string \"sum\"; allowed: \"last\", \"max\", \"min\" or \"mean\"");

@@ -101,10 +101,15 @@ struct Registry::Implementation {
   }
 
   void load(const fs::path& library) {
-    // A file that its manifest describes byte for byte was opened before, when the manifest was written. Any other is tried in a
-    // child process first, and what an old manifest named is forgotten.
+    // A file that its manifest describes byte for byte was opened before, when the manifest was written. One of the same size whose
+    // bytes are others is damaged: it might load, and compute something else. Any other is tried in a child process first, and
+    // what an old manifest named is forgotten.
     const auto manifest = manifests.find(library);
     if (manifest == manifests.end() || !manifest->second.matches(library)) {
+      if (manifest != manifests.end() && manifest->second.matches_size(library))
+        throw Refusal(fmt::format("its bytes are not those that {} describes: damaged, or built anew without its manifest, which "
+                                  "perikit-manifest writes again",
+                                  manifest_path(library).filename().string()));
       forget(library);
       probe_library(library);
     }

@@ -114,7 +114,8 @@ class StudyReader {
     read_keys(*node->as_table(), "");
     const auto place = [](const StudyKey& key) { return std::tuple(key.position.line, key.position.column); };
     std::ranges::sort(study_.keys, {}, place);  // TOML tables forget their order
-    if (!study_.zip || study_.keys.empty()) return;
+    if (study_.keys.empty()) return;
+    if (!study_.zip) return count_combinations(reader_.position(*node));
     const StudyKey& first = study_.keys.front();
     for (const StudyKey& key : study_.keys) {
       if (key.values.size() == first.values.size()) continue;
@@ -122,6 +123,15 @@ class StudyReader {
                          fmt::format("found a list of {}; allowed with mode = \"zip\": {}, as many as {} has", key.values.size(),
                                      first.values.size(), first.key));
     }
+  }
+
+  /// All combinations are made, and their scenes read, before the first run.
+  void count_combinations(const SourcePosition& position) {
+    constexpr double most = 1e6;
+    double count = 1;
+    for (const StudyKey& key : study_.keys) count *= static_cast<double>(key.values.size());
+    if (count <= most) return;
+    reader_.errors.add(position, "values", fmt::format("found {:.3g} combinations; allowed: at most {:.0f} runs, several studies for more", count, most));
   }
 
   /// kinematics.type = [...] is a table in a table; "kinematics.type" = [...] is not: both mean the same.
