@@ -34,9 +34,10 @@ TEST_CASE("clamped beam: von Karman's deflection within what the paper's unstabi
 TEST_CASE("cantilever: ten planned load steps, without stabilisation") {
   const auto simulation = load("hashim/cantilever.toml", {"constants.m=1.015", "kinematics={ type = \"projection\" }"});
   const Protocol protocol = run(*simulation);
-  // Elastica for a load at x = 9.9 m; five rows make the beam 4 % softer in bending.
-  CHECK(std::abs(mean(*simulation, "tip", 1) / -8.004 - 1) < 0.035);
-  CHECK(std::abs(mean(*simulation, "tip", 0) / -5.451 - 1) < 0.035);
+  // Elastica of what these points are: the inertia of five rows is 24/25 of the depth's, and the last held points lie half a spacing outside of the beam,
+  // 10 m from the load. (For the whole depth and 9.9 m, 8.004 and 5.451 m.)
+  CHECK(std::abs(mean(*simulation, "tip", 1) / -8.148 - 1) < 0.015);
+  CHECK(std::abs(mean(*simulation, "tip", 0) / -5.637 - 1) < 0.015);
   CHECK(protocol.reports.back().iterations <= 5);
   CHECK(protocol.reports.back().residual <= 1e-10);
 }
@@ -59,7 +60,8 @@ TEST_CASE("simply supported beam: deflection, and residuals that fall quadratica
   const auto simulation = load("hashim/simply_supported_beam.toml", {"constants.n=3"});
   const Protocol protocol = run(*simulation);
   const double error = -mean(*simulation, "middle", 1) / 5.08e-3 / 0.98075 - 1;
-  // A value of our own: the paper prints none, and the beam gives way around the one point that holds it.
+  // A value of our own, so that a change shows: the paper prints none, and the beam gives way around the one point that holds it. The next test holds the beam's
+  // deflection with ends that do not.
   CHECK_MESSAGE(std::abs(error - 0.019) < 0.001, "error ", error);
   CHECK(protocol.reports.size() == 11);
   CHECK(protocol.reports.back().iterations <= 4);
@@ -111,7 +113,8 @@ TEST_CASE("clamped beam: implicit integrators and dynamic relaxation err alike, 
     CHECK(protocol.reports.back().residual <= 1e-6);
     const double found = -mean(*simulation, "middle", 1) / 5.08e-3;
     if (integrator == "newton") {
-      // The paper's Table 1 has 6.7 %.
+      // The paper's Table 1 has 6.678 %, for ten steps and all errors of its own reference; 6.4 % is a value of our own.
+      CHECK_MESSAGE(std::abs(found / 0.61344 - 1.06678) < 0.0035, "error ", found / 0.61344 - 1);
       CHECK_MESSAGE(std::abs(found / 0.61344 - 1.064) < 0.001, "error ", found / 0.61344 - 1);
       deflection = found;
       cost = protocol.iterations();

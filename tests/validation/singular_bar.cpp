@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/validation/quasi_static.hpp"
@@ -38,7 +39,19 @@ TEST_CASE("singular bar: sub_horizon is smooth for every horizon, conventional i
   const Bar wide = pull(10.1, two);
   CHECK(wide.end == doctest::Approx(7.70e-3).epsilon(1e-3));
   CHECK(std::abs(pull(10.1, four).end / wide.end - 1) < 0.01);
+  // "With increasing horizon size, the magnitude of deformation reduces marginally."
+  CHECK(wide.end < pull(1.1, two).end);
+  CHECK(std::abs(wide.end / 8.0711e-3 - 1) < 0.05);
   CHECK(wide.roughness < 0.1);
   CHECK(pull(5.1, two).roughness < 0.1);
   CHECK(pull(5.1, "{ type = \"conventional\" }").roughness > 10);
+}
+
+TEST_CASE("singular bar: corrections of higher order oscillate less, not nothing") {
+  // Fig. 3: "with increasing correction order, the stability increases", "oscillations in the solution, though reduced, persist".
+  const auto corrected = [](int order) { return pull(5.1, fmt::format("{{ type = \"conventional\", order = {} }}", order)).roughness; };
+  const double first = corrected(1), sixth = corrected(6), seventh = corrected(7), eighth = corrected(8);
+  CHECK_MESSAGE(sixth < 0.5 * first, "orders 1 and 6: ", first, ", ", sixth);
+  CHECK_MESSAGE(std::max(seventh, eighth) < 0.7 * sixth, "orders 6, 7, 8: ", sixth, ", ", seventh, ", ", eighth);
+  CHECK(std::min(seventh, eighth) > 1);
 }

@@ -8,6 +8,7 @@
 
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
+#include "build/gradient_order.hpp"
 #include "build/image_planes.hpp"
 #include "build/interfaces.hpp"
 #include "build/materials.hpp"
@@ -196,6 +197,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
   steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
+  refuse_order(scene, of_terms.formulation, *parts.families);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;

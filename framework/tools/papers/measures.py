@@ -5,6 +5,8 @@ import re
 
 import numpy as np
 
+import plate
+
 
 # Slender beams under pressure (Hashim et al., sections 4.2, 4.3): E I w'''' - N w'' = q, N/(E A) the mean of w'^2/2 (von Karman), ends
 # held along the axis, clamped or pinned. 254 mm x 5.08 mm, E = 68.95 GPa, 276 kPa.
@@ -174,6 +176,14 @@ def coefficients(texts):
     return np.array([float(re.search(r"coefficient = ([^),]+)", text).group(1)) for text in texts])
 
 
+def elastic_energy(results, name, youngs_modulus=210000.0, poisson_ratio=0.25):
+    """Energy density of the Saint Venant-Kirchhoff law at the point gradient, mean over a set."""
+    F = results.field("deformation_gradient")[results.sets[name]].reshape(-1, 3, 3)
+    E = (np.swapaxes(F, 1, 2) @ F - np.eye(3)) / 2
+    shear, lame = youngs_modulus / (2 * (1 + poisson_ratio)), youngs_modulus * poisson_ratio / (1 + poisson_ratio) / (1 - 2 * poisson_ratio)
+    return np.mean(lame / 2 * np.trace(E, axis1=1, axis2=2) ** 2 + shear * np.sum(E**2, axis=(1, 2)))
+
+
 def twist_difference(study):
     """[%]: largest twist (u_x of the corner) of the second run over that of the first, less 1; largest distance of the two motions, over the largest motion."""
     paths = []
@@ -239,6 +249,21 @@ def spectrum(energy, kinematics, k, which, grid):
 def kinematics_is(texts, name, local):
     """Rows of a study whose kinematics is `name`, with the published force states or without."""
     return np.array([text.startswith(name) and ("local" in text) == local for text in texts])
+
+
+def penalty(texts):
+    """Coefficients of the penalty in a column of a study, 0 where there is none."""
+    return np.array([coefficients([text])[0] if "coefficient" in text else 0.0 for text in texts])
+
+
+def plate_axis(results):
+    """Plate with a hole: largest distance of u_x along the row next to the axis from the finite elements of plate.py, and its sawtooth, in % of the ends'
+    motion. Half of the plate, without the columns that carry the motion."""
+    x, u = along(results, "displacement", "x", y=1e-6)
+    inside = (x > 0) & (x < plate.LENGTH)
+    x, u = x[inside], u[inside, 0]
+    off = np.max(np.abs(u - np.interp(x, *plate.axis())))
+    return [100 * off / plate.PULL, 100 * sawtooth(u, plate.PULL)]
 
 
 def hole(results):

@@ -2,7 +2,8 @@
 
 import shlex
 import subprocess
-import time
+
+import numpy
 
 
 def quoted(word):
@@ -43,35 +44,84 @@ def settings(row):
     return [(key, toml(value).replace("|", "\\|")) for key, value in row.get("set", {}).items()]
 
 
-def picture(docs, entry, rows, runs):
-    """Draws a picture of a run, or copies the plot of a study; returns its lines."""
-    row = next(row for row in rows if row["what"] == entry["of"])
-    if row["verdict"] == "not run":
-        return []
-    folder, file = runs.folder(row), docs / "images" / ("papers_" + entry["file"] + ".png")
-    if "study" in row:
+def row_of(rows, what):
+    return next(row for row in rows if row["what"] == what)
+
+
+def draw(file, entry, rows, runs, names_of):
+    """A picture of a run, the plot of a study, or curves of several rows; nothing where a run is not there, so that the last picture stays."""
+    chosen = [row_of(rows, curve["of"]) for curve in entry.get("curves", [entry])]
+    if not all(runs.done(row) for row in chosen):
+        return
+    folder = runs.folder(chosen[0])
+    if "curves" in entry:
+        draw_curves(file, entry, [names_of(row, runs.folder(row)) for row in chosen])
+    elif "study" in chosen[0] and "run" not in entry:
         file.write_bytes((folder / "plot.png").read_bytes())
     else:
-        subprocess.run([runs.program, "plot", folder, *entry["options"], "-o", file], check=True, capture_output=True)
-    return [f"![{entry['file']}](images/{file.name})", "", f"*{entry['caption']}*", ""]
+        one = folder / "runs" / str(entry["run"]) if "run" in entry else folder
+        subprocess.run([runs.program, "plot", one, *entry.get("options", []), "-o", file], check=True, capture_output=True)
 
 
-def write(docs, sections, runs):
-    total, count = sum(runs.seconds.values()), len(runs.seconds)
-    longest = max(runs.seconds.values(), default=0)
-    lines = (docs / "papers.md.in").read_text(encoding="utf-8").rstrip("\n").split("\n")
+def draw_curves(file, entry, names):
+    """Curves by gnuplot."""
+    lines = ["set terminal pngcairo size 760,440 font 'sans,11'", f"set output '{file}'", "set key outside right", "set grid lc rgb '#dddddd'",
+             "set xlabel '%s'" % entry["axes"][0], "set ylabel '%s'" % entry["axes"][1], *(f"set logscale {axis}" for axis in entry.get("log", ""))]
+    plots, data = [], []
+    for curve, of_row in zip(entry["curves"], names):
+        # The picture belongs to this repository, like the rows.
+        x, y = (numpy.asarray(eval(curve[axis], of_row), dtype=float) for axis in "xy")
+        plots.append("'-' with %s title '%s' noenhanced" % (curve.get("with", "lines lw 1.5"), curve["title"]))
+        data += ["\n".join("%.9g %.9g" % pair for pair in zip(x, y)), "e"]
+    script = "\n".join([*lines, "plot " + ", ".join(plots), *data]) + "\n"
+    subprocess.run(["gnuplot"], input=script, text=True, check=True, capture_output=True)
+
+
+def picture(docs, entry, rows, runs, names_of):
+    """Its lines on the page."""
+    file = docs / "images" / ("papers_" + entry["file"] + ".png")
+    draw(file, entry, rows, runs, names_of)
+    return [f"![{entry['file']}](images/{file.name})", "", f"*{entry['caption']}*", ""] if file.exists() else []
+
+
+def duration(seconds):
+    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"
+
+
+def verdict_cell(row):
+    if row["verdict"] == "not run":
+        return "not run: `%s`" % row["command"].replace("|", "\\|")
+    return row["verdict"] + (f" [{duration(row['seconds'])}]" if row["seconds"] >= 300 else "")
+
+
+def write(docs, sections, runs, names_of):
+    every = [row for _, rows in sections for row in rows]
+    times = {row["command"]: row["seconds"] for row in every if "seconds" in row}
+    usual = {row["command"]: row["seconds"] for row in every if "seconds" in row and not row.get("long")}
+    dates = sorted({row["date"] for row in every if "date" in row})
+    verdicts = [row["verdict"] for row in every]
+    fill = {
+        "dates": dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}",
+        "runs": str(len(times)), "minutes": duration(sum(times.values())), "longest": duration(max(times.values())),
+        "usual": duration(sum(usual.values())), "rows": str(len(every)), "agree": str(sum(v.startswith("agrees") for v in verdicts)),
+        "differ": str(sum(v.startswith("differs") for v in verdicts)), "nothing": str(sum(v.startswith("nothing") for v in verdicts)),
+        "missing": str(verdicts.count("not run")),
+    }
+    text = (docs / "papers.md.in").read_text(encoding="utf-8").rstrip("\n")
+    for key, value in fill.items():
+        text = text.replace(f"@{key}@", value)
+    lines = text.split("\n")
     for table, rows in sections:
         agree = sum(row["verdict"].startswith("agrees") for row in rows)
         differ = sum(row["verdict"].startswith("differs") for row in rows)
+        missing = sum(row["verdict"] == "not run" for row in rows)
         lines += ["", f"## {table['title']}", "", *table["text"].strip().split("\n"), ""]
-        lines += [f"{len(rows)} rows: {agree} agree, {differ} differ, {len(rows) - agree - differ} not run.", ""]
+        lines += [f"{len(rows)} rows: {agree} agree, {differ} differ, {missing} not run" + (
+            f", {len(rows) - agree - differ - missing} with nothing printed in the paper." if len(rows) > agree + differ + missing else "."), ""]
         for entry in table.get("picture", []):
-            lines += picture(docs, entry, rows, runs)
+            lines += picture(docs, entry, rows, runs, names_of)
         lines += ["| figure, table | what | scene | here | paper | off by | verdict |", "|---|---|---|---|---|---|---|"]
         for row in rows:
             ours = numbers(row, row["ours"]) if "ours" in row else ""
-            verdict = row["verdict"] if row["verdict"] != "not run" else "not run: `%s`" % row["command"].replace("|", "\\|")
-            lines.append(f"| {row['item']} | {row['what']} | {scene_cell(row)} | {ours} | {theirs(row)} | {difference(row)} | {verdict} |")
-    minutes = f"{total / 60:.0f} minutes"
-    text = "\n".join(lines).replace("@minutes@", minutes).replace("@runs@", str(count)).replace("@longest@", f"{longest / 60:.1f} minutes")
-    (docs / "papers.md").write_text(text.replace("@date@", time.strftime("%Y-%m-%d")) + "\n", encoding="utf-8")
+            lines.append(f"| {row['item']} | {row['what']} | {scene_cell(row)} | {ours} | {theirs(row)} | {difference(row)} | {verdict_cell(row)} |")
+    (docs / "papers.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
