@@ -113,17 +113,22 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
 }
 
 /// Each block is one rank's.
-void Mechanics::add_owned(const std::vector<double>& energies, ExactSum& sum) const {
+void Mechanics::add_owned(const std::vector<BlockEnergy>& energies, double BlockEnergy::* which, ExactSum& sum) const {
   for (std::size_t b = 0; b < energies.size(); ++b)
-    if (space_->owns(b)) sum.add(energies[b]);
+    if (space_->owns(b)) sum.add(energies[b].*which);
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
-  Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
+  const bool dissipates = work.dissipates(), wanted = energy || dissipates;
+  std::vector<BlockEnergy> energies(wanted ? space_->blocks() : 0);
+  Pass pass{work, u, {}, force, nullptr, wanted ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
-  if (energy) add_owned(energies, *energy);
+  if (energy) add_owned(energies, &BlockEnergy::stored, *energy);
+  if (dissipates) {
+    dissipated_ = {};
+    add_owned(energies, &BlockEnergy::dissipated, dissipated_);
+  }
   return pass.bad;
 }
 
@@ -142,10 +147,10 @@ void Mechanics::energy_of(ConstFieldView u, const GroupMarks& marks, ExactSum& e
   GroupMarks near(marks.size(), 0);
   parts_.families.mark(points, near);
   const BatchWork work = this->work(Work::force, true);
-  std::vector<double> energies(space_->blocks(), 0.0);
+  std::vector<BlockEnergy> energies(space_->blocks());
   Pass pass{work, u, {}, {}, nullptr, energies.data(), -1, {}, marks.data(), near.data()};
   space_->run(pass);
-  add_owned(energies, energy);
+  add_owned(energies, &BlockEnergy::stored, energy);
 }
 
 void Mechanics::add_forces_near(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, FieldView force) {
