@@ -189,7 +189,7 @@ void bench(const Options& options) {
 
 void start_project(const Options& options) {
   const auto registry = open_registry(options);
-  fmt::print("{}", new_project(*registry, options.kind, options.part));
+  fmt::print("{}", new_project(*registry, options.kind, options.part, options.history));
 }
 
 /// Becomes the program of the contract suites, which lies beside this one.

@@ -20,6 +20,7 @@ struct Options {
   int threads = 0, jobs = 1, ranks = 1;
   bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false;
   std::string kind, part;
+  bool history = false;           ///< of a new material
   PlotOptions plot;
   std::int64_t frame = -1;
   std::string unit;

@@ -63,12 +63,14 @@ std::string filled(const fs::path& file, const std::vector<std::pair<std::string
 
 }  // namespace
 
-std::string new_project(const Registry& registry, const std::string& kind, const std::string& part) {
+std::string new_project(const Registry& registry, const std::string& kind, const std::string& part, bool history) {
   const fs::path templates = data_folder() / "templates";
   const std::vector<std::string> kinds = kinds_with_template(templates);
   if (std::ranges::find(kinds, kind) == kinds.end()) {
     throw InputError(fmt::format("no template for kind '{}'{}; allowed: {}", kind, did_you_mean(kind, kinds), fmt::join(kinds, ", ")));
   }
+  const fs::path with_history = templates / kind / "history";
+  if (history && !fs::exists(with_history)) throw InputError(fmt::format("--history: a {} has none; allowed: material", kind));
   if (!is_name(part))
     throw InputError(fmt::format("'{}' is no name of a part; allowed: a-z, 0-9 and single _ between them, a letter first", part));
   const Kind known = *kind_from_name(kind);
@@ -87,9 +89,9 @@ std::string new_project(const Registry& registry, const std::string& kind, const
                                                                {"perikit_prefix", prefix().string()},
                                                                {"part_name", part},
                                                                {"PartName", pascal_case(part)}};
-  for (const fs::path& source : {templates / "common", templates / kind}) {
+  for (const fs::path& source : {templates / "common", history ? with_history : templates / kind}) {
     for (const auto& entry : fs::directory_iterator(source))
-      write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
+      if (entry.is_regular_file()) write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
   }
   const std::string first = fs::exists(contract_program()) ? "" : fmt::format("  {}\n", how_to_build_contract());   // its ctest runs them
   return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n{1}"

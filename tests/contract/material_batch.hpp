@@ -1,6 +1,7 @@
 #pragma once
 /// Random deformations and one evaluation of a material with poisoned, guarded outputs: what the material contract is made of.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -99,13 +100,13 @@ inline Values random_direction(Random& random, Space space) {
 struct Evaluation {
   int n, components;
   std::size_t stride;
-  Field H, dH, psi, P, dP, A, lateral, constant_field, state_old, state;
+  Field H, dH, psi, P, dP, A, lateral, dissipated, constant_field, state_old, state;
   Status status;
   bool guards_intact = true;
 
   Evaluation(const Material& material, Space space, std::span<const double> constants, const std::vector<Values>& points,
              const std::vector<Values>& directions = {}, bool constants_per_point = false,
-             const std::vector<Values>& histories = {}, bool confined = false)
+             const std::vector<Values>& histories = {}, bool confined = false, double time_step = 0)
       : n(static_cast<int>(points.size())),
         components(tensor_components(space)),
         stride(padded(points.size()) + padding),
@@ -116,6 +117,7 @@ struct Evaluation {
         dP(components, stride),
         A(components * components, stride),
         lateral(1, stride),
+        dissipated(1, stride),
         constant_field(static_cast<int>(constants.size()), stride),
         state_old(material.state_components(space), stride + padding),
         state(material.state_components(space), stride + padding) {
@@ -128,10 +130,11 @@ struct Evaluation {
       for (int c = 0; c < state_old.components(); ++c) state_old.component(c)[p] = histories[p][c];
     for (std::size_t k = 0; k < constants.size(); ++k)
       for (std::size_t p = 0; p < stride; ++p) constant_field.component(static_cast<int>(k))[p] = constants[k];
-    for (Field* f : {&psi, &P, &dP, &A, &lateral, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
     status = material.evaluate(space, {.n = n,
                                        .stride = stride,
                                        .confined = confined,
+                                       .time_step = time_step,
                                        .H = H.data(),
                                        .dH = dH.data(),
                                        .constants = constants_per_point ? constant_field.data() : constants.data(),
@@ -143,8 +146,10 @@ struct Evaluation {
                                        .P = P.data(),
                                        .dP = dP.data(),
                                        .lateral = free_stretch(space) ? lateral.data() : nullptr,
-                                       .A = confined ? nullptr : A.data()});
-    for (Field* f : {&psi, &P, &dP, &A, &lateral, &state})
+                                       .A = confined ? nullptr : A.data(),
+                                       .dissipated = material.traits().dissipates ? dissipated.data() : nullptr});
+    if (!material.traits().dissipates) std::fill_n(dissipated.data(), padded(points.size()), 0.0);
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &state})
       for (int c = 0; c < f->components(); ++c)
         for (std::size_t p = padded(points.size()); p < f->stride(); ++p) guards_intact &= std::isnan(f->component(c)[p]);
   }
@@ -154,10 +159,10 @@ struct Evaluation {
     for (int c = 0; c < f.components(); ++c) r.push_back(f.component(c)[p]);
     return r;
   }
-  /// Every output at point p: psi, P, dP, A.
+  /// Every output at point p: psi, P, dP, A, dissipated.
   Values all(int p) const {
     Values r;
-    for (const Field* f : {&psi, &P, &dP, &A})
+    for (const Field* f : {&psi, &P, &dP, &A, &dissipated})
       for (int c = 0; c < f->components(); ++c) r.push_back(f->component(c)[p]);
     return r;
   }

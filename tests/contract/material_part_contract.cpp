@@ -90,7 +90,7 @@ TEST_CASE("material: stress, energy and tangent have the unit of the moduli") { 
 
 TEST_CASE("material: an inadmissible deformation is named, and its neighbours do not notice") { in_every_space(&MaterialContract::inadmissible); }
 
-TEST_CASE("material: a law with history follows paths: objective, exact tangent, its history in its own place") {
+TEST_CASE("material: a law with history follows paths: objective, exact tangent, its history in its own place, its energy accounted for") {
   for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) { check_history(material, constants, options); });
 }
 

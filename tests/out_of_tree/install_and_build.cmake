@@ -45,3 +45,18 @@ foreach(kind IN LISTS kinds)
   must_contain("${parts}" ${part})
   must_contain("${parts}" ".*\n.*\n")   # beside those of the installed tree
 endforeach()
+
+# The same of a material with history, whose scene dissipates.
+run(${prefix}/bin/perikit new material my_memory --history)
+run(${CMAKE_COMMAND} -S my_memory -B my_memory/build -G Ninja)
+run(${CMAKE_COMMAND} --build my_memory/build)
+run(${CMAKE_CTEST_COMMAND} --test-dir my_memory/build --output-on-failure --no-tests=error)
+file(STRINGS ${work}/my_memory/build/out/history.csv history)
+list(GET history 0 columns)
+must_contain("${columns}" ",dissipated_by_laws,")
+list(GET history -1 last)
+string(REPLACE "," ";" last "${last}")
+list(GET last 9 dissipated)
+if(NOT dissipated GREATER 0)
+  message(FATAL_ERROR "the scene of a material with history dissipates ${dissipated} J")
+endif()

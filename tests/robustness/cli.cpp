@@ -76,6 +76,15 @@ TEST_CASE("cli: errors name file, line, column, key and what was meant") {
       CHECK_MESSAGE(!fs::exists(desk.path("out")), "a refused scene leaves a folder");
     }
   }
+  // A study in place of a scene, and the other way round.
+  const Desk study;
+  study.write("study.toml", "format = 1\nscene = \"scene.toml\"\n[values]\nkinematics.type = [\"baqp\"]\n[[quantity]]\nname = \"cost\"\nfrom = \"run_time\"\n");
+  for (const std::string command : {"check study.toml", "run study.toml -o out"}) {
+    const Result result = study.perikit(command);
+    CHECK(result.status == 2);
+    CHECK_MESSAGE(contains(result.err, "study.toml:2:1: scene: found a study, which runs a scene over lists of values: `perikit study study.toml -o DIR` runs it"), result.err);
+    CHECK(lines(result.err).size() == 1);
+  }
   // All of them at once.
   const Result both = Desk(replaced(replaced(plate, "spacing = 1.0", "spacing = -1.0"), "horizon_ratio", "horizon_ratoi")).perikit("check scene.toml");
   CHECK(contains(both.err, "scene.toml:8:"));

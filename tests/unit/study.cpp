@@ -163,6 +163,7 @@ TEST_CASE("errors of a study file name place, key, what was found and what is al
   check("from = \"run_time\"\n", "from = \"run_time\"\n" + plot, "plot.log: found the string \"z\"");
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "values: found nothing; allowed: a table of scene keys"));
   CHECK(contains(folder.error("format = 1\nscene = \"scene.toml\"\n"), "quantity: found nothing; allowed: [[quantity]]"));
+  CHECK(contains(folder.error("format = 1\n[body]\ndimension = 1\n"), "study.toml:2:2: body: found a scene: `perikit run study.toml -o DIR` runs it"));
   CHECK(contains(folder.error("format = "), "study.toml:1:10: not valid TOML"));
   CHECK(contains(message_of([&] { read_study(folder.path / "absent.toml", folder.parts); }), "absent.toml: does not exist"));
 }
@@ -291,6 +292,12 @@ TEST_CASE("the picture has a line for each value of the series" *
   run_study(folder.parse(study_text + drawn), folder.parts, {}, folder.path / "sorted", pretend, silent);
   run_study(folder.parse(replaced(study_text, "[1, 2, 4]", "[4, 1, 2]") + drawn), folder.parts, {}, folder.path / "other", pretend, silent);
   CHECK(content(folder.path / "sorted" / "plot.svg") == content(folder.path / "other" / "plot.svg"));
+  // Names that are wide stand below each other, each whole, and the picture grows by as much.
+  const std::string wide = "title = [\"all of the points of the body at rest, and one that moves\", \"one of the points of the body at rest, and all move\"]";
+  run_study(folder.parse(replaced(study_text, "kinematics.type = [\"conventional\", \"baqp\"]", wide) + replaced(drawn, "kinematics.type", "title")), folder.parts, {}, folder.path / "wide",
+            pretend, silent);
+  const std::string picture = content(folder.path / "wide" / "plot.svg");
+  CHECK_MESSAGE(contains(picture, "height=\"790\""), picture.substr(0, 400));
   const auto fails = [](const Scene&, const fs::path&) { return RunOutcome{"failed", "no luck", {}}; };
   CHECK(contains(message_of([&] { run_study(study, folder.parts, {}, folder.path / "none", fails, silent); }),
                  "no run gives numbers for cost and top_error"));

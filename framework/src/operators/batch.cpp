@@ -57,6 +57,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   if (dP) batch.dH = s.dH;
   batch.dP = dP;
   if (work_ == Work::sample) batch.lateral = s.lateral;
+  if (dissipates()) batch.dissipated = s.dissipated;
   if (history_) batch.state = begin_state(n, s, numbers);
   const int bad = (s.one_law >= 0 ? laws_.evaluate_law(static_cast<std::size_t>(s.one_law), batch, s.law) : laws_.evaluate(batch, s.law)).inadmissible;
   if (history_ && bad < 0) end_state(n, s, numbers);
@@ -78,6 +79,12 @@ double weighted_energy(int n, const double* weight, const double* psi) noexcept 
 }
 
 }  // namespace
+
+/// Of lanes first ..., with their weights.
+void BatchWork::add_energies(int n, const double* weight, const BatchScratch& s, int first, BlockEnergy* energy) const noexcept {
+  if (energy_) energy->stored += weighted_energy(n, weight, s.psi + first);
+  if (dissipates()) energy->dissipated += weighted_energy(n, weight, s.dissipated + first);
+}
 
 /// Laminates among n lanes, by the numbers that the space gave them.
 void BatchWork::find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept {
@@ -123,7 +130,7 @@ int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const 
   return -1;
 }
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, double* energy,
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, BlockEnergy* energy,
                     const LaminateLanes* laminates) const noexcept {
   const int d = dimension(laws_.space());
   const bool tangent = work_ == Work::tangent;
@@ -131,7 +138,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   if (bad >= 0) return bad;
   if (laminates && laminates->n > 0) bad = evaluate_laminates(s, tangent ? nullptr : P, tangent ? P : nullptr, *laminates);
   if (bad >= 0) return bad;
-  if (energy_) *energy += weighted_energy(n, weight, s.psi);
+  add_energies(n, weight, s, 0, energy);
   if (work_ == Work::sample) return -1;
   const double sign = tangent ? -1.0 : 1.0;
   for (int l = 0; l < n; l += pack_width) {
@@ -141,7 +148,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   return -1;
 }
 
-int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept {
+int BatchWork::selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* energy) const noexcept {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   const bool tangent = work_ == Work::tangent;
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
@@ -168,10 +175,8 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, double* energy) 
     tidy(s.growth, ends * lanes);
     tidy(s.inverse, lanes);
   }
-  if (energy_) {
-    *energy += weighted_energy(n, s.weight, s.psi);
-    if (ends == 2) *energy += weighted_energy(n, s.far_weight, s.psi + lanes);
-  }
+  add_energies(n, s.weight, s, 0, energy);
+  if (ends == 2) add_energies(n, s.far_weight, s, lanes, energy);
   if (work_ == Work::sample) return -1;
   selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
   return -1;
@@ -211,7 +216,7 @@ void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
   }
 }
 
-int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept {
+int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept {
   if (finder_) {
     finder_->add(n, s);
     return -1;
@@ -227,7 +232,7 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, double* energy) 
   return evaluate_plain(n, s, both_ends, energy, &laminates);
 }
 
-int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept {
+int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy, const LaminateLanes* laminates) const noexcept {
   const std::int32_t* owners = one_law(s) ? nullptr : s.owner;
   if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.

@@ -18,6 +18,12 @@ namespace perikit {
 
 enum class Work { force, tangent, sample };
 
+/// Of a block of evaluation points [J].
+struct BlockEnergy {
+  double stored = 0;
+  double dissipated = 0;   ///< in the step that the evaluation ends, by laws that say so
+};
+
 /// In place of the laws, for weights that balance a constant stress (spaces/consistency.hpp): the stress of an evaluation point
 /// is (constant + tr H + multiplier of its owner) times the unit tensor.
 struct Balance {
@@ -39,6 +45,7 @@ struct BatchScratch {
   alignas(64) double psi[batch_points];
   alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
+  alignas(64) double dissipated[batch_points];
   alignas(64) double A[9 * batch_points];
   alignas(64) double dA[9 * batch_points];
   alignas(64) double du[3 * batch_points];
@@ -121,6 +128,8 @@ class BatchWork {
 
   Work work() const noexcept { return work_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
+  /// The evaluation ends a step in which laws dissipate.
+  bool dissipates() const noexcept { return work_ == Work::force && history_ && history_->time_step() > 0 && laws_.dissipates(); }
   /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
   /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
   void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
@@ -137,10 +146,10 @@ class BatchWork {
   const Balance* balance() const noexcept { return balance_; }
 
   /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
-  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energy of the lanes to *energy. Returns the first bad lane or -1.
+  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energies of the lanes to *energy. Returns the first bad lane or -1.
   /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
-  int evaluate(int n, BatchScratch& s, bool both_ends, double* energy) const noexcept;
+  int evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
@@ -152,17 +161,18 @@ class BatchWork {
     const LaminatePoint* point[batch_points];
   };
 
-  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, double* energy,
+  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, BlockEnergy* energy,
            const LaminateLanes* laminates) const noexcept;
   void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
   void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;
   int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
   bool one_law(const BatchScratch& s) const noexcept { return laws_.single() || s.one_law >= 0; }
   bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
-  int evaluate_plain(int n, BatchScratch& s, bool both_ends, double* energy, const LaminateLanes* laminates) const noexcept;
+  int evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy, const LaminateLanes* laminates) const noexcept;
+  void add_energies(int n, const double* weight, const BatchScratch& s, int first, BlockEnergy* energy) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
-  int selective_pass(int n, BatchScratch& s, int ends, double* energy) const noexcept;
+  int selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* energy) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
@@ -186,7 +196,7 @@ struct Pass {
   ConstFieldView u, w;
   FieldView out;
   const SampleSums* sums = nullptr;
-  double* energies = nullptr;     ///< by block
+  BlockEnergy* energies = nullptr;   ///< by block
   std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
   /// By group of eight points: only the evaluation points that these own are wanted; point gradients are needed at

@@ -10,7 +10,10 @@ namespace perikit {
 Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std::uint16_t> ids, std::size_t stride)
     : space_(space), records_(std::move(records)), ids_(ids), stride_(stride),
       single_(ids.empty() && records_.front().uniform) {
-  for (const MaterialRecord& record : records_) state_ = std::max(state_, record.material->state_components(space));
+  for (const MaterialRecord& record : records_) {
+    state_ = std::max(state_, record.material->state_components(space));
+    dissipates_ |= record.traits.dissipates;
+  }
 }
 
 bool Laws::constant_tangent() const noexcept {
@@ -54,6 +57,8 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.dP = batch.dP;
   call.A = batch.A;
   call.lateral = batch.lateral;
+  if (record.traits.dissipates) call.dissipated = batch.dissipated;
+  else if (batch.dissipated) std::fill_n(batch.dissipated, padded(static_cast<std::size_t>(batch.n)), 0.0);
   call.time_step = batch.state.time_step;
   call.state_old = batch.state.begin;
   call.state_new = batch.state.end;
@@ -86,6 +91,7 @@ Status Laws::evaluate_among_silent(const MaterialRecord& record, const LawBatch&
       for (int l = 0; l < batch.n; l += pack_width) (Pack::load(x + r * batch_points + l) * Pack::load(stores + l)).store(x + r * batch_points + l);
   };
   keep(batch.psi, 1);
+  keep(batch.dissipated, 1);
   keep(batch.P, components());
   keep(batch.dP, components());
   keep(batch.A, components() * components());
@@ -124,6 +130,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     part.P = batch.P ? scratch.P : nullptr;
     part.dP = batch.dP ? scratch.dP : nullptr;
     part.lateral = batch.lateral ? scratch.lateral : nullptr;
+    part.dissipated = batch.dissipated ? scratch.dissipated : nullptr;
     part.A = batch.A ? scratch.A.data() : nullptr;
     if (batch.state.end) part.state.end = scratch.history.data();   // the state of mixed batches has stride batch_points
     const Status one = evaluate_one(records_[m], part, scratch);
@@ -136,6 +143,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     };
     keep(batch.psi, scratch.psi, 1, batch_points);
     keep(batch.lateral, scratch.lateral, 1, batch_points);
+    keep(batch.dissipated, scratch.dissipated, 1, batch_points);
     keep(batch.P, scratch.P, components(), batch_points);
     keep(batch.dP, scratch.dP, components(), batch_points);
     keep(batch.A, scratch.A.data(), components() * components(), batch_points);

@@ -181,6 +181,11 @@ bool BodyProblem::constant_stiffness() const noexcept {
 
 bool BodyProblem::advance(double time_step, FieldView velocity) {
   if (terms().history()) terms().history()->advance();
+  if (laws().dissipates()) {
+    const double dissipated = terms().take_dissipated();
+    state().energies.dissipated += dissipated;
+    state().energies.dissipated_by_laws += dissipated;
+  }
   if (!parts_.fracture.damage()) return false;
   const ConstFieldView u = state().displacement();
   const StepBegin begin = [&](FieldView before) {

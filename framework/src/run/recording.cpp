@@ -88,8 +88,9 @@ void share(Checkpoint& checkpoint) {
 void request_stop() noexcept { stop = true; }
 bool stop_requested() noexcept { return stop; }
 
-std::vector<std::string> history_columns(const Scene& scene) {
+std::vector<std::string> history_columns(const Scene& scene, bool laws_dissipate) {
   std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
+  if (laws_dissipate) columns.emplace_back("dissipated_by_laws");
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -114,7 +115,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   }
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
-  columns_ = perikit::history_columns(scene);
+  columns_ = perikit::history_columns(scene, simulation.problem().laws().dissipates());
   const ReferenceData reference = reference_of(simulation.problem());
   body_ = body_fingerprint(reference);
   if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
@@ -331,6 +332,7 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           energies.dissipated,
                           static_cast<double>(report.iterations),
                           report.residual};
+  if (problem.laws().dissipates()) row.push_back(energies.dissipated_by_laws);
   for (const HistoryDescription& record : simulation_.scene().output.history)
     row.push_back(reduced(record, problem, fields_.get(record.quantity), report.time));
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);

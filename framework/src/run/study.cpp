@@ -46,7 +46,7 @@ double reference_of(const StudyQuantity& quantity, const Scene& scene) {
 }
 
 void check_source(const StudyQuantity& quantity, const Scene& scene) {
-  std::vector<std::string> known = history_columns(scene);
+  std::vector<std::string> known = history_columns(scene, true);
   known.insert(known.end(), run_measures().begin(), run_measures().end());
   if (std::ranges::find(known, quantity.from) != known.end()) return;
   throw InputError(

@@ -4,12 +4,38 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "output/picture/gnuplot.hpp"
 #include "run/study_axes.hpp"
 #include "run/study_series.hpp"
 
 namespace perikit {
+
+namespace {
+
+constexpr int width = 1100, height = 750;
+
+/// A key under the plot, in as many columns as its longest name leaves room for, and the height that it takes [pixels].
+struct Key {
+  std::string script;
+  int height = 0;
+};
+
+Key key_below(const std::vector<StudySeries>& lines, const std::filesystem::path& picture) {
+  constexpr double of_a_letter = 8.2, of_a_mark = 60, of_a_row = 20, font = 12;   // for this size of the letters
+  std::size_t longest = 1;
+  for (const StudySeries& line : lines) longest = std::max(longest, line.name.size());
+  const double needed = of_a_letter * static_cast<double>(longest) + of_a_mark, room = width - 40;
+  const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(room / needed)));
+  const std::size_t rows = (lines.size() + columns - 1) / columns;
+  const double scale = std::min(1.0, (room - of_a_mark) / (of_a_letter * static_cast<double>(longest)));   // of one name that fills more than the picture
+  // Letters of PDF are measured in points of the page (see gnuplot_terminal).
+  const double size = font * scale * (picture.extension() == ".pdf" ? 8.0 / 18 : 1.0);
+  return {fmt::format("set key below left Left reverse height 0.6 maxrows {} samplen 1.5 font ',{:.3g}'\n", rows, size), static_cast<int>(of_a_row * static_cast<double>(rows))};
+}
+
+}  // namespace
 
 void draw(const StudyTable& table, const std::filesystem::path& picture) {
   // Told apart also without colour: the marks differ.
@@ -19,14 +45,15 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
   const std::vector<StudySeries> lines = plotted_series(table);
   if (lines.empty()) throw RunError(fmt::format("{}: no run gives numbers for {} and {}", picture.string(), plot.x, plot.y));
 
-  std::string script = gnuplot_terminal(picture, 1100, 750);
+  const bool wide = !plot.series.empty() && std::ranges::any_of(lines, [](const StudySeries& line) { return line.name.size() > 24; });  // would leave no room beside it
+  const Key below = wide ? key_below(lines, picture) : Key();
+  std::string script = gnuplot_terminal(picture, width, height + below.height);
   script += axes(table);
   script +=
       "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
-  const bool wide = std::ranges::any_of(lines, [](const StudySeries& line) { return line.name.size() > 24; });  // would leave no room beside it
   script += plot.series.empty() ? "unset key\n"
-                                : wide                ? fmt::format("set key below center maxrows {} samplen 1.5 width -3 font ',12'\n", (lines.size() + 1) / 2)
-                                  : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
+                : wide      ? below.script
+                            : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     script += fmt::format("$line{} << end\n", i);
     for (const auto& [x, y] : lines[i].points) script += fmt::format("{} {}\n", x, y);

@@ -79,6 +79,9 @@ class StudyReader {
   StudyReader(PartCatalogue& parts, const fs::path& file) : reader_(parts, file.string()) { study_.file = file; }
 
   Study read(const toml::table& root) {
+    if (const auto body = root.find("body"); body != root.end() && !root.contains("scene"))
+      throw InputError(reader_.position(body->first.source()), "body",
+                       fmt::format("found a scene: `perikit run {} -o DIR` runs it; allowed here: a study, which names a scene and lists values for its keys", study_.file.string()));
     read_head(root);
     read_values(root);
     read_quantities(root);

@@ -23,6 +23,16 @@ bool identifier(std::string_view name) {
          std::all_of(name.begin(), name.end(), [](unsigned char c) { return (c < 0x80 && std::isalnum(c)) || c == '_'; });
 }
 
+/// The scene of a study is another file: nothing else of it needs a message.
+void refuse_study(const toml::table& root, const std::filesystem::path& file, const TomlReader& reader) {
+  const auto scene = root.find("scene");
+  if (scene == root.end() || root.contains("body") || !(root.contains("values") || root.contains("quantity"))) return;
+  const std::string name = scene->second.value_or(std::string());
+  throw InputError(reader.position(scene->first.source()), "scene",
+                   fmt::format("found a study, which runs a scene over lists of values: `perikit study {} -o DIR` runs it; allowed here: a scene{}", file.string(),
+                               name.empty() ? "" : ", such as " + (file.parent_path() / name).lexically_normal().string()));
+}
+
 }  // namespace
 
 SceneReader::SceneReader(PartCatalogue& parts, const std::filesystem::path& file, bool trust)
@@ -31,6 +41,7 @@ SceneReader::SceneReader(PartCatalogue& parts, const std::filesystem::path& file
 }
 
 void SceneReader::read(toml::table& root) {
+  refuse_study(root, scene_.file, reader_);
   refuse_reserved(root);
   read_head(root);
   read_constants(root);

@@ -25,10 +25,19 @@ struct BalanceEffort {
   }
 };
 
-/// x with A x = b, from the x that is there, to a residual of `wanted`; the number of iterations. Ends where the residual no
-/// longer falls, too.
+/// What conjugate gradients came to.
+struct Solved {
+  int iterations = 0;
+  bool contradiction = false;   ///< no x solves the system: x is nothing
+};
+
+/// Of squared residuals in the norm of the preconditioner. They fall, or rise by a little, where a system has a solution, and grow
+/// without bound where it has none.
+inline constexpr double contradictory_growth = 1e4;
+
+/// x with A x = b, from the x that is there, to a residual of `wanted`. Ends where the residual no longer falls, too.
 template <class System>
-int solve(System& system, const Field& b, double wanted, const BalanceEffort& effort, Field& x) {
+Solved solve(System& system, const Field& b, double wanted, const BalanceEffort& effort, Field& x) {
   Field r = system.make(), z = r, direction = r, image = r;
   int iterations = 0;
   double best = 0;
@@ -56,12 +65,13 @@ int solve(System& system, const Field& b, double wanted, const BalanceEffort& ef
       const double next = dot(r, z);
       since = next < 0.5 * least ? 0 : since + 1;
       least = std::min(least, next);
+      if (next > contradictory_growth * start) return {iterations, true};
       if (since > 300 || next < 1e-30 * start) break;
       combine(1, z, next / product, direction, direction);
       product = next;
     }
   }
-  return iterations;
+  return {iterations, false};
 }
 
 }  // namespace perikit

@@ -27,7 +27,7 @@ class CloudBonds final : public EvaluationSpace {
  private:
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
-  int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, double* energy);
+  int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, BlockEnergy* energy);
   void read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
   void gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du, double* A) const noexcept;
   void scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept;

@@ -27,7 +27,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points] = h[e][c];
   };
-  double energy = 0;
+  BlockEnergy energy;
   for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));

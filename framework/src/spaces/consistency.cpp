@@ -204,7 +204,9 @@ class WeightSearch {
       space_.set_factors(slopes);
       Field x = system_.make();
       const BalanceEffort rest{effort_.polish - spent, effort_.most - spent};
-      out_.weights.iterations += solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
+      const Solved solved = solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
+      out_.weights.iterations += solved.iterations;
+      if (solved.contradiction) return true;
       system_.factors(x, step);
       double longest = 0;
       for (const double s : step) longest = std::max(longest, std::abs(s));
@@ -269,13 +271,14 @@ void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudCons
     out.gradients = out.weights = {};
     out.whole = of_all_ranks(closed.whole.size());
     out.unbalanced = 0;
+    out.factors.clear();
     out.at_surfaces = of_all_ranks(closed.at_surfaces.size());
     if (parts.formulation.point || parts.formulation.selective()) {
       out.shift = with_dimension(parts.families.body().dimension(),
                                  [&](auto d) { return find_shift<d>(parts, closed, out, out.gradients); });
       space.shift_gradients(out.shift);
     }
-    if (of_all_ranks(space.factors()) > 0) WeightSearch(parts, space, closed, out).run();
+    if (of_all_ranks(space.factors()) > 0 && out.whole + out.at_surfaces > 0) WeightSearch(parts, space, closed, out).run();
   };
   find();
   if (std::max(out.gradients.after, out.weights.after) > acceptable_residual && of_all_ranks(closed.at_surfaces.size()) > 0) {

@@ -157,7 +157,7 @@ void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, boo
 }
 
 template <int D>
-int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy) {
+int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
   const LatticeChunk& chunk = tiles_.chunks[index];
   const LatticePattern& pattern = families_.pattern(chunk);
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.alone();
@@ -229,7 +229,7 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
   const std::size_t slots = pairs_ && !pass.alone() ? families_.slots.half : families_.slots.size();
-  double energy = 0;
+  BlockEnergy energy;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
     if (!pass.wanted(chunk.first) || !roles_.wants(c, &ChunkRole::bonds)) continue;

@@ -29,7 +29,7 @@ class LatticeBonds final : public EvaluationSpace {
  private:
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
-  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, double* energy);
+  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, BlockEnergy* energy);
   void number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();

@@ -31,7 +31,7 @@ class LatticePoints final : public EvaluationSpace {
   };
   void one_by_one(std::size_t b, Pass& pass);
   void by_rows(std::size_t b, Pass& pass);
-  bool evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, double* energy) const;
+  bool evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, BlockEnergy* energy) const;
   void place(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, Rows& r) const;
   void gradients(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept;
   std::int64_t width(const LatticeRow& row) const noexcept;

@@ -129,7 +129,7 @@ Field find_shift(const SpaceParts& parts, const ClosedPoints& closed, const Clou
   system.unshifted(b);
   result.before = system.largest(b);
   combine(-1, b, 0, b, b);
-  result.iterations = solve(system, b, rounding_residual, effort_of_balance(parts), x);
+  result.iterations = solve(system, b, rounding_residual, effort_of_balance(parts), x).iterations;
   system.apply(x, r);
   combine(1, b, -1, r, r);
   result.after = system.largest(r, &result.worst);

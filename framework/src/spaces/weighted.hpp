@@ -85,12 +85,12 @@ class Weighted final : public EvaluationSpace {
   // Evaluation (weighted.cpp).
   void block(std::size_t b, Pass& pass);
   /// Evaluate a group; -1, or an inadmissible one of its points.
-  std::int32_t single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
-  std::int32_t together(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, double* energy);
-  std::int32_t side_by_side(std::size_t g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, double* energy);
-  std::int32_t left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  std::int32_t single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  std::int32_t together(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  std::int32_t side_by_side(std::size_t g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  std::int32_t left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
   /// A point with the family in m; `number` is that of its first evaluation point.
-  std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, double* energy);
+  std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
   void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
   /// Of evaluation point k of a point of a cloud.
   std::size_t factor_of(std::int32_t p, int k) const noexcept {

@@ -109,17 +109,22 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
 }
 
 /// Each block is one rank's.
-void Mechanics::add_owned(const std::vector<double>& energies, ExactSum& sum) const {
+void Mechanics::add_owned(const std::vector<BlockEnergy>& energies, double BlockEnergy::* which, ExactSum& sum) const {
   for (std::size_t b = 0; b < energies.size(); ++b)
-    if (space_->owns(b)) sum.add(energies[b]);
+    if (space_->owns(b)) sum.add(energies[b].*which);
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
-  Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}};
+  const bool dissipates = work.dissipates(), wanted = energy || dissipates;
+  std::vector<BlockEnergy> energies(wanted ? space_->blocks() : 0);
+  Pass pass{work, u, {}, force, nullptr, wanted ? energies.data() : nullptr, -1, {}};
   space_->run(pass);
-  if (energy) add_owned(energies, *energy);
+  if (energy) add_owned(energies, &BlockEnergy::stored, *energy);
+  if (dissipates) {
+    dissipated_ = {};
+    add_owned(energies, &BlockEnergy::dissipated, dissipated_);
+  }
   return pass.bad;
 }
 
@@ -133,10 +138,10 @@ std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldVie
 std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                       ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr);
-  std::vector<double> energies(energy ? space_->blocks() : 0, 0.0);
+  std::vector<BlockEnergy> energies(energy ? space_->blocks() : 0);
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}, only.data(), near.data()};
   space_->run(pass);
-  if (energy) add_owned(energies, *energy);
+  if (energy) add_owned(energies, &BlockEnergy::stored, *energy);
   return pass.bad;
 }
 

@@ -29,6 +29,8 @@ class Mechanics final : public Term {
 
   /// Of the laws; null where none has one.
   LawHistory* history() noexcept { return history_.get(); }
+  /// What laws dissipate on this rank in the step that the last evaluation of forces ended; once.
+  ExactSum take_dissipated() { return std::exchange(dissipated_, {}); }
   /// A constant stress is in equilibrium from now on, where the body is whole.
   void balance(std::shared_ptr<CloudConsistency> consistency);
   void history_restored() { space_->history_restored(); }
@@ -40,13 +42,14 @@ class Mechanics final : public Term {
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
   void find_laminates(GroupMarks marks, bool again);
   std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near);
-  void add_owned(const std::vector<double>& energies, ExactSum& sum) const;
+  void add_owned(const std::vector<BlockEnergy>& energies, double BlockEnergy::* which, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
   std::unique_ptr<Laminates> laminates_;
   BondScreen* screen_ = nullptr;
+  ExactSum dissipated_;
   std::shared_ptr<const CloudConsistency> consistency_;
 };
 

@@ -227,6 +227,8 @@ void Terms::history_restored() {
   if (mechanics_) mechanics_->history_restored();
 }
 
+double Terms::take_dissipated() { return mechanics_ ? total_over_ranks(mechanics_->take_dissipated()) : 0; }
+
 void Terms::bonds_changed(std::span<const std::int32_t> points) {
   for (const auto& term : terms_) term->bonds_changed(points);
 }

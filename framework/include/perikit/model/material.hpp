@@ -15,6 +15,7 @@ struct MaterialTraits {
   bool objective = true;      ///< false for small-strain laws
   bool isotropic = true;
   bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
+  bool dissipates = false;    ///< psi is the energy that is stored; of laws with history, which say what their steps dissipate
 };
 
 /// Lame constants of the law at F = I [Pa].
@@ -45,6 +46,7 @@ struct MaterialBatch {
   double* dP = nullptr;          ///< A : dH [Pa]
   double* lateral = nullptr;     ///< H33 that plane stress (or H22 = H33 that line stress) found [-]; one component
   double* A = nullptr;           ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
+  double* dissipated = nullptr;  ///< what the step from state_old to H dissipates [J/m^3], never negative; of laws that declare it
 
   /// Constant k at point p, and where it is stored.
   double constant(std::size_t k, int p) const noexcept { return *constant_at(k, p); }

@@ -32,6 +32,7 @@ struct LawScratch {
   alignas(64) double H[9 * batch_points];
   alignas(64) double psi[batch_points];
   alignas(64) double lateral[batch_points];
+  alignas(64) double dissipated[batch_points];
   alignas(64) double P[9 * batch_points];
   alignas(64) double dP[9 * batch_points];
   AlignedVector<double> constants;
@@ -59,6 +60,7 @@ struct LawBatch {
   double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
   LawState state;                        ///< of laws with history
   double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
+  double* dissipated = nullptr;          ///< in the step; see MaterialBatch
 };
 
 class Laws {
@@ -73,6 +75,8 @@ class Laws {
   bool objective() const noexcept;
   /// Doubles of history per evaluation point, the most of any law; 0 where every law depends on F alone.
   int state_components() const noexcept { return state_; }
+  /// Some law says what its steps dissipate.
+  bool dissipates() const noexcept { return dissipates_; }
   /// Both points have the same law and the same constants, so that a symmetric bond needs one evaluation.
   bool same(std::size_t p, std::size_t q) const noexcept {
     return ids_.empty() ? records_[0].uniform : ids_[p] == ids_[q] && records_[ids_[p]].uniform;
@@ -104,6 +108,7 @@ class Laws {
   std::size_t stride_;
   bool single_;
   int state_ = 0;                        ///< components of history, the most of any law
+  bool dissipates_ = false;
 };
 
 }  // namespace perikit

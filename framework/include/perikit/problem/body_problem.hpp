@@ -83,7 +83,10 @@ class BodyProblem final : public Problem {
   const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
   /// The body of all ranks.
   const Body& whole() const noexcept { return parts_.partition ? parts_.partition->whole() : *parts_.body; }
-  std::string fracture_summary() const { return parts_.fracture.summary(terms().bond_checks(), values_.state.energies.dissipated); }
+  std::string fracture_summary() const {
+    const Energies& e = values_.state.energies;
+    return parts_.fracture.summary(terms().bond_checks(), e.dissipated - e.dissipated_by_laws);
+  }
   const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;

@@ -56,8 +56,9 @@ class Simulation {
   std::string carried_, loose_;   ///< from an earlier run, by weak springs; in words
 };
 
-/// The columns of history.csv: the standard ones, then those that the scene asks for.
-std::vector<std::string> history_columns(const Scene& scene);
+/// The columns of history.csv: the standard ones, the part of the dissipated energy that laws dissipate where some do, then those that
+/// the scene asks for.
+std::vector<std::string> history_columns(const Scene& scene, bool laws_dissipate);
 
 /// The libraries that a registry has opened, a line "file name, fingerprint of the bytes" for each.
 std::string library_fingerprints(const Registry& registry);

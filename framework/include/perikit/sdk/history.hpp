@@ -7,11 +7,16 @@
 ///     /// The step that begins at `state`: a point law with P(H, k) and tangent(H, k), and with
 ///     /// update(H, k) -> HistoryUpdate<T, S, 7>, H at the end of the step.
 ///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state) const noexcept;
-///     /// or, for laws of rates: time_step is the length of the step [s], 0 where no step is taken (samples, tangents)
+///     /// or, for laws of rates: time_step is the length of the step [s], 0 where no step is taken (samples, tangents), so that
+///     /// nothing relaxes
 ///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state, double time_step) const noexcept;
 ///   };
 ///
 /// Fresh history is all zeros: store differences from it (U - I, not U).
+///
+/// Energy: the work of P on a step is what psi grows by and what is dissipated. A law that loses energy (viscosity, plasticity)
+/// declares traits.dissipates, lets psi be what it stores and puts the rest into HistoryUpdate::dissipated; the run adds it up.
+/// Other laws leave that out: their psi is the work done so far.
 
 #include <array>
 
@@ -26,6 +31,7 @@ struct HistoryUpdate {
   T psi;
   Tensor<T, S> P;
   std::array<T, size> state;
+  T dissipated = 0.0;   ///< in this step [J/m^3]; with traits.dissipates
 };
 
 template <class Law>

@@ -230,9 +230,10 @@ class LawMaterial final : public Material {
         probe += 0.0 * total;
       };
       if constexpr (HasHistory<Law>) {
-        if (b.psi || b.P || b.state_new) {
+        if (b.psi || b.P || b.state_new || b.dissipated) {
           const auto end = law.update(H, k);
           if (b.psi) put_energy(end.psi);
+          if (b.dissipated) end.dissipated.store(b.dissipated + p);
           if (b.P) put_stress(end.P);
           if (b.state_new)
             for (std::size_t i = 0; i < end.state.size(); ++i) end.state[i].store(b.state_new + i * b.state_stride + p);
@@ -285,6 +286,7 @@ class LawMaterial final : public Material {
         for (int c = 0; c < count; ++c) x[static_cast<std::size_t>(c) * b.stride + p + lane] = 0.0;
       };
       zero(b.psi, 1);
+      zero(b.dissipated, 1);
       zero(b.lateral, 1);
       zero(b.P, components);
       zero(b.dP, components);

@@ -77,6 +77,8 @@ class Terms {
   /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
   LawHistory* history() const noexcept;
   void history_restored();
+  /// What laws dissipate in the step that the last evaluation of forces ended, over all ranks [J]; once, then 0 until the next.
+  double take_dissipated();
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that are beyond their limit at u, and recomputes what depends on them. To be called after

@@ -29,7 +29,7 @@ SceneUnits::SceneUnits(const std::string& scene) {
 
 std::string SceneUnits::column(const std::string& name) const {
   if (name == "time" || name == "time_step") return time_;
-  for (const char* energy : {"strain_energy", "kinetic_energy", "dissipated_energy", "external_work"})
+  for (const char* energy : {"strain_energy", "kinetic_energy", "dissipated_energy", "dissipated_by_laws", "external_work"})
     if (name == energy) return "J";
   for (const auto& [own, unit] : own_)
     if (name == own) return unit;
