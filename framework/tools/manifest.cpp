@@ -1,4 +1,4 @@
-/// perikit-manifest FILE.so: opens a library as the program would, and writes the manifest beside it.
+/// perikit-manifest FILE.so: opens a library as the program would, and writes the manifest beside it; an older one says nothing of this file.
 
 #include "plugin/manifest.hpp"
 
@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "perikit/plugin/registry.hpp"
 
@@ -14,6 +15,7 @@ int main(int argc, char** argv) try {
     fmt::print(stderr, "usage: perikit-manifest FILE.so\n");
     return 2;
   }
+  std::filesystem::remove(perikit::manifest_path(argv[1]));
   perikit::Registry registry;
   registry.open(argv[1]);
   std::vector<perikit::NamedPart> parts;
