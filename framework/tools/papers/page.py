@@ -90,7 +90,7 @@ def duration(seconds):
 
 def verdict_cell(row):
     if row["verdict"] == "not run":
-        return "not run: `%s`" % row["command"].replace("|", "\\|")
+        return "not run (%s): `%s`" % (row.get("takes", "its time is not known"), row["command"].replace("|", "\\|"))
     return row["verdict"] + (f" [{duration(row['seconds'])}]" if row["seconds"] >= 300 else "")
 
 
@@ -106,6 +106,7 @@ def write(docs, sections, runs, names_of):
         "usual": duration(sum(usual.values())), "rows": str(len(every)), "agree": str(sum(v.startswith("agrees") for v in verdicts)),
         "differ": str(sum(v.startswith("differs") for v in verdicts)), "nothing": str(sum(v.startswith("nothing") for v in verdicts)),
         "missing": str(verdicts.count("not run")),
+        "clock": " (or, where only that is known, time on the clock of a busy machine)" if any(row.get("clock") for row in every) else "",
     }
     text = (docs / "papers.md.in").read_text(encoding="utf-8").rstrip("\n")
     for key, value in fill.items():

@@ -24,6 +24,7 @@ Keys of a row:
   held              what perikit gives where it differs from the paper, to a hundredth or within held_percent
   because           why it differs
   format            of a number, "%.3g"
+  takes             how long it takes, where no run has said so yet
 
 Keys of a picture: file, caption, and
   of                `what` of a row: its run drawn by `perikit plot` with options, or the plot of its study; run: a run of the study instead
@@ -213,6 +214,11 @@ class Record:
         self.entries[self.name(table, row)] = {"source": self.source(row), "ours": [float(v) if numpy.isfinite(v) else None for v in row["ours"]],
                                                "kept": bool(kept), "seconds": round(done["seconds"], 1), "date": done["date"]}
 
+    def prune(self, names):
+        """Forgets rows that are no more."""
+        self.entries = {name: entry for name, entry in self.entries.items() if name in names}
+        self.write()
+
     def write(self):
         self.FILE.write_text(json.dumps(self.entries, indent=0, sort_keys=True) + "\n", encoding="utf-8")
 
@@ -263,6 +269,7 @@ def main():
                 broken.append(f"{Record.name(table, row)}: {page.numbers(row, row['ours'])}")
         sections.append((table, rows))
     if not options.small and not options.only and not broken:
+        record.prune({Record.name(table, row) for table, rows in sections for row in rows})
         page.write(ROOT / "framework/docs", sections, runs, evaluate_in)
     times = {row["command"]: row["seconds"] for _, rows in sections for row in rows if "seconds" in row}
     print("%d rows, %.0f s of runs" % (sum(len(rows) for _, rows in sections), sum(times.values())))
@@ -290,7 +297,7 @@ def recalled(entry, row):
         return True
     row["ours"] = numpy.array([numpy.nan if v is None else v for v in entry["ours"]])
     row["verdict"], kept = judged(row, row["ours"], {}, entry["kept"])
-    row.update(seconds=entry["seconds"], date=entry["date"])
+    row.update(seconds=entry["seconds"], date=entry["date"], clock=entry.get("clock", False))
     return kept
 
 
