@@ -214,8 +214,8 @@ def all_tables(runs, write):
     table(["tube, displacement; 8, 16, 32 through the wall (order)"] + list(clouds),
           [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: tube(runs, n, cloud, k), name, (8, 16, 32)) for name in shown])
     for what, place in (("displacement", 0), ("stress", 1)):
-        table([f"plate with a hole, {what}; 20, 40 along a side (order)"] + list(clouds),
-              [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: hole(runs, n, cloud, k)[place], name, (20, 40)) for name in shown])
+        table([f"plate with a hole, {what}; 20, 40, 80 along a side (order)"] + list(clouds),
+              [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: hole(runs, n, cloud, k)[place], name, (20, 40, 80)) for name in shown])
 
     def speeds(name, jitter):
         result = attempt(lambda: waves(runs, 64, jitter, KINEMATICS[name]))
