@@ -70,7 +70,7 @@ std::string new_project(const Registry& registry, const std::string& kind, const
     throw InputError(fmt::format("no template for kind '{}'{}; allowed: {}", kind, did_you_mean(kind, kinds), fmt::join(kinds, ", ")));
   }
   const fs::path with_history = templates / kind / "history";
-  if (history && !fs::exists(with_history)) throw InputError(fmt::format("--history: a {} has none; allowed: material", kind));
+  if (history && !fs::exists(with_history)) throw InputError(fmt::format("--history: found the kind '{}'; allowed: material", kind));
   if (!is_name(part))
     throw InputError(fmt::format("'{}' is no name of a part; allowed: a-z, 0-9 and single _ between them, a letter first", part));
   const Kind known = *kind_from_name(kind);

@@ -39,9 +39,10 @@ def polar(a, b, rings):
     return points
 
 
-def blue_noise(upper, spacing, inside=lambda x, y: True, seed=1):
+def blue_noise(upper, spacing, inside=lambda x, y, rim: True, seed=1):
     """Points at random, no two of them nearer than 0.77 spacings, until there is no room: about as many as a lattice of that spacing has.
-    spacing: of x, y. Candidates come from cells that still have room."""
+    spacing: of x, y. None lies nearer than a quarter of a spacing to the sides of the box, nor to where `inside` ends, since cells that are slivers
+    count for nothing but trouble."""
     generator = random.Random(seed)
     size = min(spacing(x * upper[0] / 16, y * upper[1] / 16) for x in range(17) for y in range(17)) * 0.77
     grid = {}
@@ -62,7 +63,8 @@ def blue_noise(upper, spacing, inside=lambda x, y: True, seed=1):
         generator.shuffle(cells)
         for i, j in cells:
             x, y = (i + generator.random()) * size, (j + generator.random()) * size
-            if x < upper[0] and y < upper[1] and inside(x, y) and fits(x, y):
+            rim = 0.25 * spacing(x, y)
+            if rim < x < upper[0] - rim and rim < y < upper[1] - rim and inside(x, y, rim) and fits(x, y):
                 points.append((x, y))
                 grid.setdefault((i, j), []).append((x, y))
     return points
@@ -119,7 +121,7 @@ def tube(runs, rings, cloud, kinematics):
     if cloud == "polar":
         points = runs.points(polar(1.0, 2.0, rings)) + " }"
     elif cloud == "blue noise":
-        points = runs.points(blue_noise((2, 2), lambda x, y: h, lambda x, y: 1 < math.hypot(x, y) < 2)) + f', lower = [0, 0], upper = [2, 2], inside = "{inside}" }}'
+        points = runs.points(blue_noise((2, 2), lambda x, y: h, lambda x, y, rim: 1 + rim < math.hypot(x, y) < 2 - rim)) + f', lower = [0, 0], upper = [2, 2], inside = "{inside}" }}'
     else:
         jitter = 'jitter = 0.3, volume = "voronoi", ' if cloud == "jitter 0.3" else ""
         points = f'lattice = {{ spacing = {h}, lower = [0, 0], upper = [2, 2], {jitter}inside = "{inside}" }}'
@@ -132,7 +134,7 @@ def hole(runs, n, cloud, kinematics):
     """Relative errors of the displacement and of the stress of Kirsch's plate."""
     values = {"constants.n": n, "kinematics": kinematics}
     if cloud == "blue noise":
-        points = runs.points(blue_noise((1, 1), lambda x, y: 1 / n, lambda x, y: math.hypot(x, y) > 0.25))
+        points = runs.points(blue_noise((1, 1), lambda x, y: 1 / n, lambda x, y, rim: math.hypot(x, y) > 0.25 + rim))
         values["body"] = f'{{ dimension = 2, plane = "stress", {points}, lower = [0, 0], upper = [1, 1], inside = "x^2 + y^2 > a^2" }} }}'
     elif cloud == "lattice":
         values.update({"body.lattice.jitter": 0, "body.lattice.volume": '"cell"'})
@@ -212,8 +214,8 @@ def all_tables(runs, write):
     table(["tube, displacement; 8, 16, 32 through the wall (order)"] + list(clouds),
           [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: tube(runs, n, cloud, k), name, (8, 16, 32)) for name in shown])
     for what, place in (("displacement", 0), ("stress", 1)):
-        table([f"plate with a hole, {what}; 20, 40 along a side (order)"] + list(clouds),
-              [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: hole(runs, n, cloud, k)[place], name, (20, 40)) for name in shown])
+        table([f"plate with a hole, {what}; 20, 40, 80 along a side (order)"] + list(clouds),
+              [lambda name=name: [f"`{name}`"] + orders(lambda n, cloud, k: hole(runs, n, cloud, k)[place], name, (20, 40, 80)) for name in shown])
 
     def speeds(name, jitter):
         result = attempt(lambda: waves(runs, 64, jitter, KINEMATICS[name]))

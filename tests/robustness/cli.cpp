@@ -36,6 +36,7 @@ TEST_CASE("cli: what was meant by a misspelt command, kind or name") {
     CHECK_MESSAGE(contains(result.err, word), "perikit ", arguments, ": no '", word, "' in\n", result.err);
   };
   said("", "Subcommands:");
+  said("new influence memory --history", "--history: found the kind 'influence'; allowed: material");
   said("rnu scene.toml", "unknown command 'rnu'; allowed: run, check, study, plot, bench, new, contract, list, describe; did you mean 'run'?");
   said("run", "scene is required\nHelp: perikit run --help");
   said("run scene.toml --sett a=1", "Help: perikit run --help");

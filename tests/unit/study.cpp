@@ -293,7 +293,7 @@ TEST_CASE("the picture has a line for each value of the series" *
   run_study(folder.parse(replaced(study_text, "[1, 2, 4]", "[4, 1, 2]") + drawn), folder.parts, {}, folder.path / "other", pretend, silent);
   CHECK(content(folder.path / "sorted" / "plot.svg") == content(folder.path / "other" / "plot.svg"));
   // Names that are wide stand below each other, each whole, and the picture grows by as much.
-  const std::string wide = "title = [\"all of the points of the body at rest, and one that moves\", \"one of the points of the body at rest, and all move\"]";
+  const std::string wide = "title = [\"all of the points of the body at rest, and one that moves under its weight\", \"one of the points of the body at rest, and all others move under their weight\"]";
   run_study(folder.parse(replaced(study_text, "kinematics.type = [\"conventional\", \"baqp\"]", wide) + replaced(drawn, "kinematics.type", "title")), folder.parts, {}, folder.path / "wide",
             pretend, silent);
   const std::string picture = content(folder.path / "wide" / "plot.svg");

@@ -106,6 +106,18 @@ TEST_CASE("volume = voronoi fills the body, whatever the points, and a disc up t
   CHECK(std::abs(fine - area) < 2e-3 * area);
 }
 
+TEST_CASE("Voronoi cells that reach far into a hole keep what of them lies inside") {
+  const std::string ring =
+      "[body.lattice]\nspacing = 0.03125\nlower = [0, 0]\nupper = [2, 2]\ninside = \"x^2 + y^2 > 1 && x^2 + y^2 < 4\"\njitter = 0.3\nvolume = \"voronoi\"\n";
+  const Body quarter = body(ring, "");
+  double least = 1;
+  for (const std::int32_t p : quarter.internal()) least = std::min(least, quarter.volume(static_cast<std::size_t>(p)));
+  const double area = 2 * 0.75 * std::numbers::pi;
+  MESSAGE("quarter of a ring of ", area, ": ", total(quarter), ", least cell ", least / (2 * 0.03125 * 0.03125), " of a lattice's");
+  CHECK(least > 0.05 * 2 * 0.03125 * 0.03125);
+  CHECK(std::abs(total(quarter) - area) < 2e-3 * area);
+}
+
 TEST_CASE("a point file needs no volumes where they come from Voronoi cells") {
   const TemporaryFolder folder;
   std::ofstream(folder.path / "cloud.csv") << "x,y\n0.5,0.5\n1.5,0.5\n0.5,1.5\n1.5,1.5\n";

@@ -49,6 +49,10 @@ double share_inside(const Expression& inside, const Point& centre, double spacin
 std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,
                                     const Expression* inside) {
   VoronoiCells cells = voronoi_cells(points, dimension, lower, upper, inside != nullptr);
+  std::vector<double> reaches = cells.reach;
+  const auto middle = reaches.begin() + static_cast<std::ptrdiff_t>(reaches.size() / 2);
+  std::ranges::nth_element(reaches, middle);
+  const double typical = reaches.empty() ? 0 : *middle;
   for (std::size_t n = 0; n < points.size() && inside; ++n) {
     // Cells all of whose surroundings are inside, on a coarse grid, are whole.
     bool whole = true;
@@ -57,17 +61,36 @@ std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension
       whole = whole && (*inside)(x) != 0;
     });
     if (whole) continue;
-    int all = 0, in = 0;
-    over_grid(points[n], cells.reach[n], 2 * samples(dimension), dimension, [&](const Point& x) {
-      const double own = squared_distance(x, points[n]);
+    const auto own = [&](const Point& x) {
       for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c)
-        if (x[c] < lower[c] || x[c] > upper[c]) return;
-      for (const std::int32_t j : cells.neighbours[n])
-        if (squared_distance(x, points[static_cast<std::size_t>(j)]) < own) return;
-      ++all;
-      in += (*inside)(x) != 0;
-    });
-    if (all > 0) cells.size[n] *= static_cast<double>(in) / all;
+        if (x[c] < lower[c] || x[c] > upper[c]) return false;
+      const double distance = squared_distance(x, points[n]);
+      return std::ranges::none_of(cells.neighbours[n], [&](std::int32_t j) { return squared_distance(x, points[static_cast<std::size_t>(j)]) < distance; });
+    };
+    const int along = 2 * samples(dimension);
+    if (cells.reach[n] <= 1.5 * typical) {
+      int all = 0, in = 0;
+      over_grid(points[n], cells.reach[n], along, dimension, [&](const Point& x) {
+        if (!own(x)) return;
+        ++all;
+        in += (*inside)(x) != 0;
+      });
+      if (all > 0) cells.size[n] *= static_cast<double>(in) / all;
+      continue;
+    }
+    // The cell reaches far out of the body, as into a hole: the part inside is sought around the point, in boxes that grow until none of it
+    // lies in their outer third.
+    for (double half = 0.75 * typical;; half = std::min(1.5 * half, cells.reach[n])) {
+      int in = 0;
+      bool outer = false;
+      over_grid(points[n], half, along, dimension, [&](const Point& x) {
+        if ((*inside)(x) == 0 || !own(x)) return;
+        ++in;
+        for (std::size_t c = 0; c < 3; ++c) outer = outer || std::abs(x[c] - points[n][c]) > 2.0 / 3 * half;
+      });
+      cells.size[n] = in * std::pow(2 * half / along, dimension);
+      if (!outer || half >= cells.reach[n]) break;
+    }
   }
   return cells.size;
 }
