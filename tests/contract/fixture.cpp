@@ -44,7 +44,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   const int d = o.dimension;
   const int n = o.cells > 0 ? o.cells : d == 3 ? 9 : d == 2 ? 13 : 40;
   // Unequal sides: the axes must not be interchangeable, and the longest one is not a multiple of a SIMD pack.
-  const std::array<int, 3> cells{n - 2 > 1 && d > 1 ? n - 2 : n, d > 1 ? n : 1, d > 2 ? std::max(2, n - 4) : 1};
+  const std::array<int, 3> cells{n - 2 > 1 && d > 1 ? n - 2 : n, d > 1 ? n : 1, d > 2 ? std::max(3, n - 4) : 1};
   const auto vector = [&](auto&& value) {
     std::string text = "[";
     for (int a = 0; a < d; ++a) text += fmt::format("{}{:.17g}", a > 0 ? ", " : "", static_cast<double>(value(a)));
