@@ -188,7 +188,7 @@ TEST_CASE("kinematics: half a lattice and its image are the whole") {
     for (int d = 1; d <= 3; ++d) {
       BodyOptions options;
       options.dimension = d;
-      options.cells = d == 3 ? 5 : 8;
+      options.cells = d == 3 ? 7 : 8;
       options.two_materials = d > 1;
       const std::string whole_text = scene_text(options, kinematics_table(example));
       options.conditions = symmetric('x');

@@ -116,7 +116,7 @@ TEST_CASE("loose pieces: a tangent that springs hold by no more than its roundin
   const Result hardly = desk.perikit("run scene.toml -o hardly --set run.weak_springs=1e-15");
   REQUIRE_MESSAGE(hardly.status == 0, hardly.err);
   CHECK_MESSAGE(contains(hardly.out, warning), hardly.out);
-  CHECK(contains(desk.text("hardly/run.log"), "tangent nearly singular ("));
+  CHECK(contains(desk.text("hardly/run.log"), warning));
   const Result held_by_springs = desk.perikit("run scene.toml -o held --set run.weak_springs=1e-10");
   REQUIRE_MESSAGE(held_by_springs.status == 0, held_by_springs.err);
   CHECK_MESSAGE(!contains(held_by_springs.out, warning), held_by_springs.out);

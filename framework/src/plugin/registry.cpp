@@ -161,12 +161,13 @@ struct Registry::Implementation {
                                       known.empty() ? "none, no library brings any" : fmt::format("{}", fmt::join(known, ", ")),
                                       did_you_mean(part, known));
     const char* separator = "; refused libraries, one of which may hold it: ";
-    // One line a reason: after an update all libraries of a folder may have the same one.
+    // After an update all libraries of a folder may have the same reason: many of one are named by the first.
+    constexpr std::ptrdiff_t many = 4;
     for (auto r = refused.begin(); r != refused.end(); ++r) {
       const auto like_it = [&](const RefusedLibrary& other) { return other.reason == r->reason; };
-      if (std::any_of(refused.begin(), r, like_it)) continue;
-      const auto others = std::count_if(r + 1, refused.end(), like_it);
-      message += fmt::format("{}{}{} ({})", separator, r->file.string(), others > 0 ? fmt::format(" and {} others", others) : "", r->reason);
+      const auto alike = std::count_if(refused.begin(), refused.end(), like_it);
+      if (alike >= many && std::any_of(refused.begin(), r, like_it)) continue;
+      message += fmt::format("{}{}{} ({})", separator, r->file.string(), alike >= many ? fmt::format(" and {} others", alike - 1) : "", r->reason);
       separator = "; ";
     }
     if (refused.empty() && did_you_mean(part, known).empty()) message += "; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH";
