@@ -179,7 +179,8 @@ template <int D>
 std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                           ExactSum* energy) {
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy, nullptr, near.data(), true);
+    // At the rim of `near` dilatations are not complete, and not the same on several ranks.
+    const std::int64_t bad = dilatation(u, {}, energy, nullptr, near.data(), true, only.data());
     if (bad >= 0) return bad;
   }
   std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
@@ -298,7 +299,7 @@ void PairForces<D>::set_correction() {
 
 template <int D>
 std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                                       const std::uint8_t* only, bool local) {
+                                       const std::uint8_t* only, bool local, const std::uint8_t* counted) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -325,7 +326,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, Exact
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energy && body_.alive(p) && body_.owns(p) && (!only || only[p / padding]))
+      if (energy && body_.alive(p) && body_.owns(p) && (!counted || counted[p / padding]))
         energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
     }
   });

@@ -56,9 +56,10 @@ class PairForces final : public Term {
   void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
-  /// density. only, local: see PairPass; null for all.
+  /// density. only, local: see PairPass; null for all. counted: groups whose
+  /// energies count.
   std::int64_t dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                          const std::uint8_t* only = nullptr, bool local = false);
+                          const std::uint8_t* only = nullptr, bool local = false, const std::uint8_t* counted = nullptr);
 
   const Families& families_;
   const Body& body_;
