@@ -47,9 +47,4 @@ bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_
   return QuietBlocks::moves(u, b * block_points, std::min(points, (b + 1) * block_points));
 }
 
-bool cloud_marked(const std::uint8_t* marks, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
-  const std::size_t begin = b * block_points, end = std::min(points, begin + block_points);
-  return std::any_of(marks + begin / padding, marks + (end + padding - 1) / padding, [](std::uint8_t m) { return m != 0; });
-}
-
 }  // namespace perikit

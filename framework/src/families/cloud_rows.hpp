@@ -32,8 +32,5 @@ Colouring cloud_colouring(const Body& body, const BlockReach& reach, std::size_t
 
 /// Whether a point of block b moves.
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points = cloud_block_points) noexcept;
-/// Whether a group of eight points in block b is marked.
-bool cloud_marked(const std::uint8_t* marks, std::size_t b, std::size_t points,
-                  std::size_t block_points = cloud_block_points) noexcept;
 
 }  // namespace perikit

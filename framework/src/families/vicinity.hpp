@@ -25,7 +25,6 @@ class Vicinity {
   bool holds(std::size_t p) const noexcept { return in_[cell_[p]]; }
   /// The groups of eight points that have a point in it.
   GroupMarks groups() const;
-  std::size_t bytes() const noexcept { return cell_.size() * sizeof(std::uint32_t) + 2 * in_.size(); }
 
  private:
   void grow(std::vector<std::uint8_t>& cells, int families);

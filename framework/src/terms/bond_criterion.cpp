@@ -115,10 +115,9 @@ std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
 void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
   std::fill(own_.begin(), own_.end(), std::uint8_t{0});
   for (const std::int32_t g : groups) own_[static_cast<std::size_t>(g)] = 1;
-  near_ = families_.around(own_);
-  wide_ = families_.around(near_);
+  const GroupMarks near = families_.around(own_), wide = families_.around(near);
   samples_.clear(own_);
-  for (const auto& term : terms_) term->add_bonds(u, near_, wide_, samples_);
+  for (const auto& term : terms_) term->add_bonds(u, near, wide, samples_);
   samples_.merge();
 }
 

@@ -70,7 +70,7 @@ class BondCriterion final : public BondFinder {
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
   std::vector<std::int32_t> groups_;  ///< with live points
-  GroupMarks own_, near_, wide_;
+  GroupMarks own_;
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
   std::size_t checked_ = 0;

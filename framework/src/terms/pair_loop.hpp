@@ -29,7 +29,7 @@ struct PairPass {
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
   double* energies = nullptr;          ///< by block
-  /// By group of eight points: others are left alone (dilatation and energy); where `local`, the bonds alone that these own, each
+  /// By group of eight points: others are left alone (dilatation); where `local`, the bonds alone that these own, each
   /// once: as in a whole loop on points whose families lie in `only`, anything elsewhere (dilatation and force).
   const std::uint8_t* only = nullptr;
   bool local = false;
