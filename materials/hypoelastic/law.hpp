@@ -2,6 +2,7 @@
 
 #include "perikit/core/spectral.hpp"
 #include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/history.hpp"
 
 namespace perikit {
@@ -54,6 +55,18 @@ struct Hypoelastic {
     template <class K>
     Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
       return update(H, k).P;
+    }
+
+    /// s33 = 0 is linear in the strain along the free axes, where U is diagonal: strain33 = e = 2 (u - u0)/(2 + u0 + u), u = U33 - 1.
+    template <class K>
+    T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
+      const auto& [lambda, mu] = k;
+      const Stretch end(with_free_part(H, T(0.0)));
+      const Tensor<T, S> given = symmetric_part(increment(end) * middle_inverse(end));
+      T plane = 0.0;
+      for (int i = 0; i < S::dimension; ++i) plane += given(i, i);
+      const T e = -(stress(2, 2) + lambda * plane) / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu)));
+      return (2.0 * stretch(2, 2) + e * (2.0 + stretch(2, 2))) / (2.0 - e);
     }
 
     /// Derivative of the update at fixed state; not symmetric.

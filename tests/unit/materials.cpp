@@ -127,6 +127,50 @@ TEST_CASE("missing pieces by forward differentiation equal the written ones") {
   check_differentiated<LinearElastic>({1.2, 0.8}, "linear_elastic");
 }
 
+namespace {
+
+/// Plane and uniaxial stress at stretches from 1/20 to 20: the solid at the free stretch has no stress along it, and the same stress.
+void check_extreme_stretches(const Material& material, const std::vector<double>& constants, const std::string& what) {
+  const double stretches[] = {0.05, 0.2, 0.6, 0.95, 1 - 1e-9, 1.0, 1.0001, 1.4, 3, 20};
+  std::vector<contract::Values> planes, lines, solids;
+  for (const double a : stretches) {
+    lines.push_back({a - 1, 0, 0});
+    for (const double b : stretches)
+      for (const double shear : {0.0, 0.4}) planes.push_back({a - 1, shear * a, -0.3 * shear * b, b - 1, 0});
+  }
+  for (const auto& [space, points] : {std::pair(Space::plane_stress, planes), std::pair(Space::line_stress, lines)}) {
+    const Evaluation free(material, space, constants, points);
+    CHECK_MESSAGE(free.status.ok(), what, ", ", name(space), ": no free stretch at point ", free.status.inadmissible);
+    solids.clear();
+    for (int p = 0; p < free.n; ++p) {
+      const double h = free.lateral.data()[p];
+      if (space == Space::plane_stress)
+        solids.push_back({points[p][0], points[p][1], 0, points[p][2], points[p][3], 0, 0, 0, h});
+      else
+        solids.push_back({points[p][0], 0, 0, 0, h, 0, 0, 0, h});
+    }
+    const Evaluation solid(material, Space::solid, constants, solids);
+    for (int p = 0; p < free.n; ++p) {
+      // What a rounding error of F = I + H changes, where F is a twentieth of H.
+      const double rounding = 1e-12 * contract::largest(solid.at(solid.A, p)) * (1 + contract::largest(solids[p]));
+      const contract::Values P = solid.at(solid.P, p), plane = free.at(free.P, p);
+      CHECK_MESSAGE(std::abs(P[8]) <= rounding, what, ", ", name(space), ", point ", p, ": free stress ", P[8]);
+      CHECK_MESSAGE(std::abs(P[0] - plane[0]) <= rounding, what, ", ", name(space), ", point ", p, ": P11 ", plane[0], ", expected ", P[0]);
+      if (space == Space::plane_stress) CHECK_MESSAGE(std::abs(P[1] - plane[1]) <= rounding, what, ", point ", p, ": P12 ", plane[1], ", expected ", P[1]);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("plane and uniaxial stress of rubber at extreme stretches") {
+  for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic})
+    for (const double kappa : {0.4, 3.0, 1e3, 1e6}) {
+      check_extreme_stretches(LawMaterial(NeoHookean{form}), {1.0, kappa}, "neo_hookean, bulk modulus " + std::to_string(kappa));
+      check_extreme_stretches(LawMaterial(MooneyRivlin{form}), {0.3, 0.2, kappa}, "mooney_rivlin, bulk modulus " + std::to_string(kappa));
+    }
+}
+
 TEST_CASE("saint_venant_kirchhoff: uniaxial strain and uniaxial stress") {
   const double lambda = 1.2, mu = 0.8, E = mu * (3 * lambda + 2 * mu) / (lambda + mu);
   const LawMaterial<SaintVenantKirchhoff> material;

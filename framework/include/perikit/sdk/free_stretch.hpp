@@ -1,8 +1,10 @@
 #pragma once
 /// Plane and uniaxial stress: the stretch normal to the body is not given but follows from zero stress normal to it.
 
+#include <array>
 #include <concepts>
 #include <limits>
+#include <utility>
 
 #include "perikit/sdk/differentiation.hpp"
 
@@ -18,6 +20,14 @@ template <class T, class S, class U>
 Tensor<T, S> with_free_part(Tensor<T, S> a, const U& s) noexcept {
   for (int i = S::dimension; i < 3; ++i) a(i, i) = s;
   return a;
+}
+
+/// The largest component.
+template <class S>
+Pack largest(const Tensor<Pack, S>& H) noexcept {
+  Pack size = 0.0;
+  for (int c = 0; c < S::components; ++c) size = max(size, abs(H[c]));
+  return size;
 }
 
 /// Lateral contraction at F = I in the sense of logarithmic strains, -d ln(free stretch) / d ln(J in the body's space).
@@ -42,6 +52,14 @@ concept HasFreeStretch = requires(const Law& law, const Tensor<T, S>& H, const K
 template <class Law, class T, class S, class K>
 concept HasFreeStress = requires(const Law& law, const Tensor<T, S>& H, const K& k, const T& h) {
   { law.free_stress(H, k)(h) } -> std::same_as<FreeStress<T>>;
+};
+
+/// An equation may solve itself: zeros(several of it, what rest() of each gives, h, q) -> H33, NaN where it does not, and the cube root q
+/// of J; stress(H, q) is P there.
+template <class Law, class T, class S, class K>
+concept HasFreeZeros = requires(const Law& law, const Tensor<T, S>& H, const K& k, T& q) {
+  law.free_stress(H, k).zeros(std::array{law.free_stress(H, k)}, std::array{law.free_stress(H, k).rest()}, &q, &q);
+  { law.free_stress(H, k).stress(H, q) } -> std::same_as<Tensor<T, S>>;
 };
 
 /// The free Kirchhoff stress of any law, over the free stretch: slope d(x residual)/dy over x.
@@ -84,25 +102,31 @@ Pack solve_free_equation(const Equation& equation, Pack y, Pack size, PackMask& 
   return h;
 }
 
-/// H with its free components such that the free stress vanishes to rounding. Lanes that are
-/// not `good` on entry keep H = 0; lanes without a solution are taken from `good`. Where the law does not know better, Newton from the
-/// exact solution for a Kirchhoff stress linear in the logarithmic strain.
-template <bool small_strain, class Law, class S, class K>
-Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k, Pack ratio, PackMask& good) noexcept {
+/// H without its free components, and zero where it is not finite or, but for small-strain laws, not 0 < det F < infinity: there
+/// `good` turns false.
+template <bool small_strain, class S>
+Tensor<Pack, S> admissible_given_part(Tensor<Pack, S> H, PackMask& good) noexcept {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   H = with_free_part(H, Pack(0.0));
-  Pack size = 0.0;
-  for (int c = 0; c < S::components; ++c) size = max(size, abs(H[c]));
   const Pack j = jacobian_minus_one(H);
   if constexpr (!small_strain) good &= (j > -1.0) & (j < infinity);
-  good &= size < infinity;
-  H = Tensor<Pack, S>::map([&](int c) { return select(good, H[c], Pack(0.0)); });
+  good &= largest(H) < infinity;
+  return Tensor<Pack, S>::map([&](int c) { return select(good, H[c], Pack(0.0)); });
+}
+
+/// The free strain where the free stress vanishes to rounding, in the lanes that are `good`; lanes without a solution are taken from
+/// them. H: of admissible_given_part. Where the law does not know better, Newton from the exact solution for a Kirchhoff stress
+/// linear in the logarithmic strain.
+template <bool small_strain, class Law, class S, class K>
+Pack free_strain(const Law& law, const Tensor<Pack, S>& H, const K& k, Pack ratio, PackMask& good) noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   Pack h = 0.0;
   if constexpr (HasFreeStretch<Law, Pack, S, K>) {
     h = law.free_stretch(H, k);
     good &= small_strain ? abs(h) < infinity : (h > -1.0) & (h < infinity);
   } else if constexpr (small_strain) {
     const Tensor<Pack, S> N = free_direction<Pack, S>();
+    const Pack size = largest(H);
     PackMask active = good;
     for (int iteration = 0; iteration < 80 && any(active); ++iteration) {
       const Tensor<Pack, S> at = with_free_part(H, h);
@@ -113,11 +137,47 @@ Tensor<Pack, S> solve_free_stretch(const Law& law, Tensor<Pack, S> H, const K& k
     good &= !active;
   } else {
     PackMask active = good;
-    h = solve_free_equation(free_stress_of(law, H, k), -ratio * log1p(select(good, j, Pack(0.0))), size, active);
+    h = solve_free_equation(free_stress_of(law, H, k), -ratio * log1p(jacobian_minus_one(H)), largest(H), active);
     good &= !active;
   }
-  return with_free_part(H, select(good, h, Pack(0.0)));
+  return select(good, h, Pack(0.0));
 }
+
+inline constexpr int free_zero_packs = 4;
+
+/// Free strains of some packs of points at a time, and what the stress takes from them, of laws with HasFreeZeros.
+template <class Law, class S, class K>
+class FreeZeros {
+ public:
+  using Equation = decltype(std::declval<const Law&>().free_stress(Tensor<Pack, S>(), std::declval<const K&>()));
+  static constexpr int packs = free_zero_packs;
+  std::array<Equation, packs> equation;
+  Pack strain[packs], root[packs];  ///< strain: not a number where there is none
+
+  /// same_constants: as in the last call.
+  template <class Given>
+  void find(const Law& law, const std::array<K, packs>& k, bool same_constants, const Given& given) noexcept {
+    for (int i = 0; i < packs; ++i) equation[i] = law.free_stress(given(i), k[i]);
+    if (!same_constants)
+      for (int i = 0; i < packs; ++i) rest_[i] = equation[i].rest();
+    Equation::zeros(equation, rest_, strain, root);
+    for (int i = 0; i < packs; ++i)
+      if (!all(strain[i] == strain[i])) [[unlikely]]
+        find_step_by_step(law, k[i], given(i), i);
+  }
+
+ private:
+  [[gnu::noinline, gnu::cold]] void find_step_by_step(const Law& law, const K& k, const Tensor<Pack, S>& whole, int i) noexcept {
+    PackMask good = Pack(0.0) == Pack(0.0);
+    const Tensor<Pack, S> H = admissible_given_part<false>(whole, good);
+    const PackMask found = strain[i] == strain[i];
+    strain[i] = select(found, strain[i], free_strain<false>(law, H, k, contraction_ratio<S>(law, k), good));
+    root[i] = select(found, root[i], cbrt(1.0 + jacobian_minus_one(with_free_part(H, strain[i]))));
+    strain[i] = select(good, strain[i], Pack(std::numeric_limits<double>::quiet_NaN()));
+  }
+
+  std::array<typename Equation::Rest, packs> rest_;
+};
 
 /// dH -> dP under zero free stress: dP = A : (dH + N dh) with N : dP = 0.
 template <class Law, class S, class K>

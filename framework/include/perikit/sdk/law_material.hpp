@@ -193,28 +193,59 @@ class LawMaterial final : public Material {
     }
   }
 
+  template <class S>
+  Pack contraction(const Constants& k, [[maybe_unused]] double time_step) const noexcept {
+    if constexpr (HasHistory<Law>)
+      return contraction_ratio<S>(after<S>(std::array<Pack, state_size<Law, S>()>{}, time_step), k);
+    else
+      return contraction_ratio<S>(law_, k);
+  }
+
+  template <class S, bool own>
+  static auto zeros_of_batch() noexcept {
+    if constexpr (own)
+      return FreeZeros<Law, S, Constants>();
+    else
+      return 0;
+  }
+
+  /// Free strains of the packs that begin with points p ...; beyond the last point those of the first again.
+  template <class S>
+  [[gnu::noinline]] PERIKIT_FLATTEN void find_zeros(const MaterialBatch& b, int p, FreeZeros<Law, S, Constants>& zeros) const noexcept {
+    const auto first = [&](int i) { return p + i * pack_width < b.n ? p + i * pack_width : p; };
+    std::array<Constants, FreeZeros<Law, S, Constants>::packs> k;
+    for (std::size_t i = 0; i < k.size(); ++i) k[i] = load_constants(b, first(static_cast<int>(i)));
+    zeros.find(law_, k, p > 0 && b.constant_stride == 0, [&](int i) { return load<S>(b.H, b.stride, first(i)); });
+  }
+
   template <class S, bool free_stretch>
   PERIKIT_FLATTEN Status run(const MaterialBatch& b) const noexcept {
+    constexpr bool own_zeros = free_stretch && HasFreeZeros<Law, Pack, S, Constants>;
     Status status;
     Constants k = load_constants(b, 0);
     Pack ratio = 0.0;
-    const auto contraction = [&] {
-      if constexpr (HasHistory<Law>)
-        return contraction_ratio<S>(after<S>(std::array<Pack, state_size<Law, S>()>{}, b.time_step), k);
-      else
-        return contraction_ratio<S>(law_, k);
-    };
-    if constexpr (free_stretch) ratio = contraction();
+    [[maybe_unused]] decltype(zeros_of_batch<S, own_zeros>()) zeros;
+    if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
     for (int p = 0; p < b.n; p += pack_width) {
       if (b.constant_stride != 0) {
         k = load_constants(b, p);
-        if constexpr (free_stretch) ratio = contraction();
+        if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
       }
       decltype(auto) law = law_at<S>(b, p);
       Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
       PackMask good = Pack(0.0) == Pack(0.0);
-      if constexpr (free_stretch) H = solve_free_stretch<small_strain_law>(law, H, k, ratio, good);
-      good &= admissible(H);
+      [[maybe_unused]] const int in_group = p / pack_width % free_zero_packs;
+      if constexpr (own_zeros) {
+        if (in_group == 0) find_zeros<S>(b, p, zeros);
+        H = with_free_part(H, zeros.strain[in_group]);
+        good = zeros.strain[in_group] == zeros.strain[in_group];
+      } else {
+        if constexpr (free_stretch) {
+          H = admissible_given_part<small_strain_law>(H, good);
+          H = with_free_part(H, free_strain<small_strain_law>(law, H, k, ratio, good));
+        }
+        good &= admissible(H);
+      }
       if (b.lateral) H[S::components - 1].store(b.lateral + p);
 
       Pack probe = 0.0;  // turns to NaN where an output is not finite
@@ -245,7 +276,12 @@ class LawMaterial final : public Material {
           else
             put_energy(0.0);
         }
-        if (b.P) put_stress(stress(law, H, k));
+        if (b.P) {
+          if constexpr (own_zeros)
+            put_stress(zeros.equation[in_group].stress(H, zeros.root[in_group]));
+          else
+            put_stress(stress(law, H, k));
+        }
       }
       if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k);
       good &= probe == 0.0;

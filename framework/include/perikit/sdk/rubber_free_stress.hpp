@@ -1,39 +1,154 @@
 #pragma once
 /// Plane and uniaxial stress of rubber laws with energies linear in the invariants of the isochoric deformation.
 
+#include <array>
+#include <limits>
+
 #include "perikit/core/tensor.hpp"
 #include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
 
-/// Free Kirchhoff stress of psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J) over the free strain h. With b the free
-/// principal value of F F^T, e = b - 1, and of the given ones c = tr - 2, g = det - 1 (plane), or b1 = 1 + c (bar), s = J^(-2/3):
+/// Free Kirchhoff stress of psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + psi_vol(kappa, J). With b the free principal value of
+/// F F^T, e = b - 1, and of the given ones c = tr - 2, g = det - 1 (plane), or b1 = 1 + c (bar), s = J^(-2/3), it is
 ///   plane:  2 C1 s (2 e - c)/3 + 2 C2 s^2 (c + 2 e + c e - 2 g)/3 + J psi_vol'(J)
 ///   bar:    2 C1 s (e - c)/3   + 2 C2 s^2 b (e - c)/3             + J psi_vol'(J)
 /// every term of the order of the strains.
 template <class T, class S>
-auto rubber_free_stress(const Tensor<T, S>& H, const T& C1, const T& C2, const T& kappa, Volumetric volumetric) noexcept {
-  const Tensor<T, S> given = with_free_part(H, T(0.0)), strain = right_cauchy_green_minus_identity(given);
-  const T j = jacobian_minus_one(given), g = j * (2.0 + j);
-  T c = 0.0;
-  for (int i = 0; i < S::dimension; ++i) c += strain(i, i);
-  return [=](const T& h) {
-    constexpr bool plane = S::dimension == 2;
-    const T e = h * (2.0 + h), b = 1.0 + e, volume = plane ? T(j + h * (1.0 + j)) : T(j + e * (1.0 + j));
+class RubberFreeStress {
+ public:
+  RubberFreeStress() = default;
+  /// The free components of H are not read.
+  RubberFreeStress(const Tensor<T, S>& H, const T& C1, const T& C2, const T& kappa, Volumetric volumetric) noexcept
+      : C1_((2.0 / 3) * C1), C2_((2.0 / 3) * C2), kappa_(kappa), volumetric_(volumetric) {
+    const Tensor<T, S> given = with_free_part(H, T(0.0)), strain = right_cauchy_green_minus_identity(given);
+    j_ = jacobian_minus_one(given);
+    c_ = strain(0, 0);
+    for (int i = 1; i < S::dimension; ++i) c_ += strain(i, i);
+    inverse_ = reciprocal(T(1.0 + j_));
+  }
+
+  /// At the free strain h.
+  FreeStress<T> operator()(const T& h) const noexcept {
+    const T e = h * (2.0 + h), b = 1.0 + e, volume = plane ? T(j_ + h * (1.0 + j_)) : T(j_ + e * (1.0 + j_));
     const T root = reciprocal_cbrt(T(1.0 + volume)), s = root * root;
-    const T first = (2.0 / 3) * C1 * s, second = (2.0 / 3) * C2 * (s * s), slope = volumetric_kirchhoff_slope(volumetric, kappa, volume);
-    const T pressure = volumetric_kirchhoff(volumetric, kappa, volume);
+    const T first = C1_ * s, second = C2_ * (s * s), slope = volumetric_kirchhoff_slope(volumetric_, kappa_, volume);
+    const T pressure = volumetric_kirchhoff(volumetric_, kappa_, volume);
     if constexpr (plane) {
-      const T on_first = 2.0 * e - c, on_second = c + 2.0 * e + c * e - 2.0 * g;
-      return FreeStress<T>{first * on_first + second * on_second + pressure,
-                           first * (4.0 * b - (2.0 / 3) * on_first) + second * ((4.0 + 2.0 * c) * b - (4.0 / 3) * on_second) + slope};
+      const T on_first = 2.0 * e - c_, on_second = c_ + 2.0 * e + c_ * e - 2.0 * (j_ * (2.0 + j_));
+      return {first * on_first + second * on_second + pressure,
+              first * (4.0 * b - (2.0 / 3) * on_first) + second * ((4.0 + 2.0 * c_) * b - (4.0 / 3) * on_second) + slope};
     } else {
-      const T difference = e - c;
-      return FreeStress<T>{(first + second * b) * difference + pressure,
-                           first * (2.0 * b - (4.0 / 3) * difference) + second * b * (2.0 * b + (2.0 - 8.0 / 3) * difference) + 2.0 * slope};
+      const T difference = e - c_;
+      return {(first + second * b) * difference + pressure,
+              first * (2.0 * b - (4.0 / 3) * difference) + second * b * (2.0 * b + (2.0 - 8.0 / 3) * difference) + 2.0 * slope};
     }
+  }
+
+  /// The polynomial of zeros() about rest, to second order: slope d - linear j + curvature d^2 + mixed d j - square j^2 - shear (c - 2 j).
+  /// Its zero is d = by_j j + by_square j^2 + by_shear (c - 2 j).
+  struct Rest {
+    T by_j, by_square, by_shear, curvature;
   };
-}
+  Rest rest() const noexcept {
+    const double bulk = volumetric_ == Volumetric::quadratic ? 24 : 10.5;
+    const T linear = (plane ? 6.0 : 3.0) * (C1_ + C2_), inverse = reciprocal(T((plane ? 2.0 : 1.0) * linear + 3.0 * kappa_));
+    const T curvature = plane ? T(54.0 * C1_ + 30.0 * C2_ + bulk * kappa_) : T(9.0 * C1_ + 12.0 * C2_ + bulk * kappa_);
+    const T mixed = plane ? T(12.0 * (C2_ - C1_) + 6.0 * kappa_) : T(3.0 * kappa_ - 6.0 * C1_ - 12.0 * C2_);
+    const T square = plane ? T(6.0 * C1_ + 12.0 * C2_) : T(3.0 * C1_), by_j = linear * inverse;
+    return {by_j, (square - by_j * (mixed + curvature * by_j)) * inverse, plane ? T((C1_ - C2_) * inverse) : T(0.0), curvature};
+  }
+
+  /// Where it vanishes, for several of these at once, so that they need not wait for each other: the free strains h, not a number where
+  /// a few steps do not end at a zero that stress grows through, and the roots q = 1 + d of J = q^3 that go with them. The stress times
+  /// q^4 (1 + j)^2 in a plane, q^4 (1 + j) in a bar, is a polynomial of q and of the volumetric stress: no step needs a root or a power.
+  template <std::size_t count>
+  static void zeros(const std::array<RubberFreeStress, count>& of, const std::array<Rest, count>& rest, T* h, T* q) noexcept {
+    if (of[0].volumetric_ == Volumetric::quadratic)
+      zeros_of<Volumetric::quadratic>(of, rest, h, q);
+    else
+      zeros_of<Volumetric::logarithmic>(of, rest, h, q);
+  }
+
+  /// P at that zero: the given Kirchhoff stress less the free one, which leaves no pressure. With I1 b - b^2 = I2 I - cof b,
+  ///   plane:  2 C1 s (b - b33 I) + 2 C2 s^2 ((1 + g) I - b33 cof b),   tau F^-T = a (F - F^-T) + p F^-T
+  ///   bar:    (c - e) (2 C1 s + 2 C2 s^2 b)
+  Tensor<T, S> stress(const Tensor<T, S>& H, const T& q) const noexcept {
+    const T h = H(2, 2), e = h * (2.0 + h), s = reciprocal(T(q * q)), first = 3.0 * C1_ * s, second = 3.0 * C2_ * (s * s);
+    const T on_F = first + second * (1.0 + e);
+    Tensor<T, S> P = with_free_part(H, T(0.0));
+    if constexpr (plane) {
+      const T p = second * (j_ * (2.0 + j_) - c_ - e * (1.0 + c_)) - first * e;
+      const T on_cofactor = (p - on_F) * inverse_, on_identity = (on_F * j_ + p) * inverse_;
+      P(0, 0) = on_F * H(0, 0) + on_cofactor * H(1, 1) + on_identity;
+      P(1, 1) = on_F * H(1, 1) + on_cofactor * H(0, 0) + on_identity;
+      P(0, 1) = on_F * H(0, 1) - on_cofactor * H(1, 0);
+      P(1, 0) = on_F * H(1, 0) - on_cofactor * H(0, 1);
+    } else {
+      P(0, 0) = on_F * (c_ - e) * inverse_;
+    }
+    return P;
+  }
+
+ private:
+  static constexpr bool plane = S::dimension == 2;
+  static constexpr int most_steps = 6;
+  /// With the curvature at rest, a step leaves its square times the strains, within a factor of ten or so.
+  static constexpr double last_step = 3e-9;
+
+  template <Volumetric volumetric, std::size_t count>
+  static void zeros_of(const std::array<RubberFreeStress, count>& of, const std::array<Rest, count>& rest, T* h, T* q) noexcept {
+    using Mask = decltype(T(0.0) == T(0.0));
+    T d[count], per_slope[count];
+    Mask active[count], grows[count];
+    PERIKIT_UNROLL for (std::size_t i = 0; i < count; ++i) {
+      const T &j = of[i].j_, shear = of[i].c_ - 2.0 * j;
+      d[i] = rest[i].by_shear * shear + j * (rest[i].by_j + rest[i].by_square * j);
+      active[i] = grows[i] = j > -1.0;
+    }
+    for (int step = 0; step < most_steps; ++step) {
+      Mask any_active = T(0.0) > T(0.0);
+      PERIKIT_UNROLL for (std::size_t i = 0; i < count; ++i) {
+        const FreeStress<T> at = of[i].template polynomial<volumetric>(d[i]);
+        per_slope[i] = step == 0 ? reciprocal(at.slope) : T(per_slope[i] * (2.0 - at.slope * per_slope[i]));
+        const T newton = at.value * per_slope[i], square = newton * newton;
+        // Each lane ends by itself, whatever its neighbours do.
+        d[i] = select(active[i], d[i] - (newton + (rest[i].curvature * per_slope[i]) * square), d[i]);
+        grows[i] &= (at.slope > 0.0) | !active[i];
+        active[i] &= square > last_step * last_step;
+        any_active |= active[i];
+      }
+      if (!any(any_active)) break;
+    }
+    PERIKIT_UNROLL for (std::size_t i = 0; i < count; ++i) {
+      q[i] = 1.0 + d[i];
+      const T strain = (d[i] * (3.0 + d[i] * (3.0 + d[i])) - of[i].j_) * of[i].inverse_;  // in a bar of the stretch's square
+      const T found = plane ? strain : T(strain / (1.0 + sqrt(T(1.0 + strain))));
+      h[i] = select(grows[i] & !active[i] & (d[i] > -1.0), found, T(std::numeric_limits<double>::quiet_NaN()));
+    }
+  }
+
+  /// The stress times q^4 (1 + j)^2, or (1 + j), over d = q - 1.
+  template <Volumetric volumetric>
+  FreeStress<T> polynomial(const T& d) const noexcept {
+    const T J0 = 1.0 + j_, M = plane ? T(J0 * J0) : J0, c = c_ * M, q = 1.0 + d, q2 = q * q, v = d * (3.0 + d * (3.0 + d));  // v: J - 1
+    const T pressure = volumetric_kirchhoff(volumetric, kappa_, v), bulk = volumetric_kirchhoff_slope(volumetric, kappa_, v);
+    const T on_pressure = M * (q2 * q2), bulk_slope = (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk), by_q = 3.0 * q2;
+    if constexpr (plane) {
+      const T sum = J0 + (1.0 + v), E = (v - j_) * sum, on_first = 2.0 * E - c, by_E = (2.0 + 2.0 * v) * by_q;  // E: e (1 + j)^2
+      const T on_second = (2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_)));
+      return {(C1_ * q2) * on_first + C2_ * on_second + on_pressure * pressure,
+              (2.0 * C1_) * (q * on_first + q2 * by_E) + (C2_ * (2.0 + c_)) * by_E + bulk_slope};
+    } else {
+      const T difference = (v - j_) - c, second = C2_ * inverse_, both = C1_ * q2 + second * (1.0 + v);
+      return {both * difference + on_pressure * pressure, (2.0 * C1_ * q + second * by_q) * difference + both * by_q + bulk_slope};
+    }
+  }
+
+  T C1_, C2_, kappa_;  // C1, C2: times 2/3
+  T c_, j_, inverse_;  // inverse: 1/(1 + j)
+  Volumetric volumetric_;
+};
 
 }  // namespace perikit
