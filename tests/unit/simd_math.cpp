@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -119,6 +120,15 @@ TEST_CASE("roots and rational powers") {
       "x^(2/3)", [](Pack a) { return rational_power<2, 3>(a); }, [](long double a) { return std::cbrt(a * a); }, x);
   compare(
       "x^(-1/3)", [](Pack a) { return rational_power<-1, 3>(a); }, [](long double a) { return 1 / std::cbrt(a); }, x);
+  for (const auto& some : {between(1e-300, 1e300), x, arguments(-1000, 1000)}) {
+    std::vector<double> positive;
+    for (const double a : some) positive.push_back(std::clamp(std::abs(a), 1e-300, 1e300));
+    compare(
+        "reciprocal_sqrt", [](Pack a) { return reciprocal_sqrt(a); }, [](long double a) { return 1 / std::sqrt(a); }, positive, 1.5);
+    compare(
+        "reciprocal", [](Pack a) { return reciprocal(a); }, [](long double a) { return 1 / a; }, positive, 1.5);
+  }
+  for (const double a : {0.0, std::numeric_limits<double>::infinity()}) CHECK(!std::isfinite(reciprocal_sqrt(Pack(a))[0]));
   compare(
       "reciprocal_cbrt", [](Pack a) { return reciprocal_cbrt(a); }, [](long double a) { return 1 / std::cbrt(a); }, between(1e-300, 1e300), 4.0);
   compare(
