@@ -85,6 +85,17 @@ LatticeTiling::LatticeTiling(const Lattice& lattice) {
   count = {(groups + size[0] - 1) / size[0], (n[1] + tile1 - 1) / tile1, (n[2] + tile2 - 1) / tile2};
 }
 
+std::int32_t LatticeTiling::colour(std::int64_t number, const std::array<std::int64_t, 3>& reach) const noexcept {
+  std::int64_t colour = 0, colours = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t apart = std::min(count[a], 1 + (2 * reach[a] + size[a] - 1) / size[a]);
+    colour += colours * (number % count[a] % apart);
+    colours *= apart;
+    number /= count[a];
+  }
+  return static_cast<std::int32_t>(colour);
+}
+
 std::array<std::int64_t, 3> LatticeTiling::of(const std::array<std::int64_t, 3>& cell) const noexcept {
   return {cell[0] / static_cast<std::int64_t>(padding) / size[0], cell[1] / size[1], cell[2] / size[2]};
 }

@@ -94,11 +94,10 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
             for (std::int64_t e = low[0]; e <= high[0]; ++e)
               touched.push_back(static_cast<std::int32_t>(tiling.number({e, d, c})));
       }
-  const std::vector<std::int32_t> colours = block_colours(touches, static_cast<std::size_t>(tiling.tiles()));
   std::vector<std::int32_t> of_blocks;
   reach.units = static_cast<std::size_t>(tiling.tiles());
   for (const std::int32_t tile : tiles) {
-    of_blocks.push_back(colours[static_cast<std::size_t>(tile)]);
+    of_blocks.push_back(tiling.colour(tile, grow));
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }

@@ -55,6 +55,9 @@ struct LatticeTiling {
   std::int64_t number(const std::array<std::int64_t, 3>& tile) const noexcept {
     return tile[0] + count[0] * (tile[1] + count[1] * tile[2]);
   }
+  /// Of tile `number`: tiles of one colour touch disjoint cells when each of them is grown by `reach` (groups along axis 0, cells along the
+  /// others) on all sides.
+  std::int32_t colour(std::int64_t number, const std::array<std::int64_t, 3>& reach) const noexcept;
   /// The tile of a cell of the whole lattice.
   std::array<std::int64_t, 3> of(const std::array<std::int64_t, 3>& cell) const noexcept;
 };
