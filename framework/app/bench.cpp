@@ -11,6 +11,7 @@
 #include "operations.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/errors.hpp"
+#include "perikit/core/loop_times.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/output/machine_limits.hpp"
@@ -41,6 +42,48 @@ class StepTimer final : public Observer {
   std::uint64_t counted_ = 0, operations_ = 0;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   double best_ = INFINITY;
+};
+
+constexpr int modelled_threads[] = {2, 4, 8, 16, 32, 64};
+
+/// What the fastest step would take on more threads: loops as long as their last thread, all else as on one.
+class ThreadsModel final : public Observer {
+ public:
+  bool wants_sample(std::int64_t, double) override { return false; }
+  void step_done(const StepReport& report) override {
+    const std::vector<std::vector<double>> loops = times_.take();
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    if (report.step > 2 && seconds < whole_) {
+      whole_ = seconds;
+      double inside = 0;
+      blocks_ = 0;
+      for (const std::vector<double>& loop : loops) {
+        inside += makespan(loop, 1);
+        blocks_ += loop.size();
+      }
+      outside_ = std::max(0.0, seconds - inside);
+      loops_ = loops.size();
+      for (std::size_t k = 0; k < std::size(modelled_threads); ++k) {
+        double total = outside_;
+        for (const std::vector<double>& loop : loops) total += makespan(loop, modelled_threads[k]);
+        efficiency_[k] = seconds / (modelled_threads[k] * total);
+      }
+    }
+    last_ = std::chrono::steady_clock::now();
+  }
+  void log(std::string_view) override {}
+  void print() const {
+    fmt::print("{} | {} | {:.1f} |", loops_, blocks_, 100 * outside_ / whole_);
+    for (const double efficiency : efficiency_) fmt::print(" {:.0f} |", 100 * efficiency);
+    fmt::print("\n");
+  }
+
+ private:
+  LoopTimes times_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  double whole_ = INFINITY, outside_ = 0, efficiency_[std::size(modelled_threads)] = {};
+  std::size_t loops_ = 0, blocks_ = 0;
 };
 
 /// One row: a kinematics with a material on one body. Times in seconds per point, not a number where not measured.
@@ -89,6 +132,16 @@ double fastest(Work&& work) {
     total += seconds;
   }
   return best;
+}
+
+void model_threads(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
+  const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, 12), "bench.toml", registry);
+  Simulation simulation(scene, registry);
+  row.points = simulation.problem().body().points();
+  ThreadsModel model;
+  simulation.run(model);
+  fmt::print("{} | ", row.points);
+  model.print();
 }
 
 void measure(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
@@ -166,10 +219,19 @@ std::vector<Row> measure_rows(Registry& registry, const BenchOptions& options, S
           const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
           const std::string stabilization = plus == name.npos ? "" : fmt::format("\nstabilization = \"{}\"", name.substr(plus + 1));
           Row& row = rows.emplace_back(Row{name, material, dimension, cloud});
-          measure(registry, row, fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
-                  fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()), options);
-          fmt::print("| {} | {} | {} | {} | ", name, material, dimension, cloud ? "cloud" : "lattice");
-          show(row);
+          const std::string head = fmt::format("| {} | {} | {} | {} | ", name, material, dimension, cloud ? "cloud" : "lattice");
+          const auto run = [&](auto&& what) {
+            what(registry, row, fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
+                 fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()), options);
+          };
+          if (options.threads_model) {
+            fmt::print("{}", head);
+            run(model_threads);
+          } else {
+            run(measure);
+            fmt::print("{}", head);
+            show(row);
+          }
           std::fflush(stdout);
         }
   return rows;
@@ -194,6 +256,15 @@ void count(Registry& registry, const BenchOptions& options) {
 
 void bench(Registry& registry, const BenchOptions& options) {
   if constexpr (counts_operations) return count(registry, options);
+  if (options.threads_model) {
+    fmt::print("{} points a side, horizon 3.015 spacings, verlet. Efficiency of a step [%] on more threads, from the seconds of the blocks of its loops on\n"
+               "one thread; starting a loop and waiting at its end cost nothing here, memory is as fast as for one thread. Outside: of loops.\n\n"
+               "| kinematics | material | D | body | points | loops | blocks | outside [%] |", options.cells);
+    for (const int threads : modelled_threads) fmt::print(" {} |", threads);
+    fmt::print("\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    measure_rows(registry, options, [](const Row&) {});
+    return;
+  }
   const Operations operations(options.operations.empty() ? data_folder() / "operations.csv" : std::filesystem::path(options.operations));
   std::ofstream file;
   const auto refuse = [&] { throw RunError(fmt::format("{}: cannot be written", options.json)); };

@@ -75,6 +75,8 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--cells", options.bench.cells, "Points along each side")
       ->check(CLI::Range(2, 100000000))
       ->capture_default_str();
+  bench_command->add_flag("--threads-model", options.bench.threads_model,
+                          "Instead: the efficiency of a step on 2 to 64 threads, from the times of its blocks on one");
   bench_command->add_flag("--assembly", options.bench.assembly,
                           "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");
   bench_command->add_option("--json", options.bench.json, "Write the figures to this file as well");

@@ -8,6 +8,8 @@
 #include <set>
 
 #include "families/quiet_blocks.hpp"
+#include "perikit/body/lattice.hpp"
+#include "perikit/core/loop_times.hpp"
 
 using namespace perikit;
 
@@ -56,6 +58,56 @@ TEST_CASE("colouring: sums into shared units have one order, whatever the number
     CHECK(sums == first);
   }
   set_thread_count(threads);
+}
+
+TEST_CASE("colours of tiles: of one colour they are disjoint when grown by the reach of a family, and there are no more than that takes") {
+  for (const std::array<int, 3>& extent : {std::array{200, 64, 64}, std::array{80, 10, 10}, std::array{31, 31, 31}, std::array{500, 300, 1}, std::array{9, 9, 9}}) {
+    Lattice lattice;
+    lattice.whole = {extent[0], extent[1], extent[2]};
+    const LatticeTiling tiling(lattice);
+    for (const std::int64_t cells : {1, 3, 7}) {
+      const std::array<std::int64_t, 3> reach{(cells + 7) / 8, cells, extent[2] > 1 ? cells : 0};
+      std::set<std::int32_t> colours;
+      bool disjoint = true;
+      for (std::int64_t a = 0; a < tiling.tiles(); ++a) {
+        colours.insert(tiling.colour(a, reach));
+        for (std::int64_t b = 0; b < a; ++b) {
+          if (tiling.colour(a, reach) != tiling.colour(b, reach)) continue;
+          bool apart = false;
+          std::int64_t x = a, y = b;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const std::int64_t s = tiling.size[axis], between = std::abs(x % tiling.count[axis] - y % tiling.count[axis]) * s - s;
+            apart |= between >= 2 * reach[axis];
+            x /= tiling.count[axis];
+            y /= tiling.count[axis];
+          }
+          disjoint &= apart;
+        }
+      }
+      CHECK(disjoint);
+      std::size_t most = 1;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        most *= static_cast<std::size_t>(std::min(tiling.count[axis], tiling.size[axis] >= 2 * reach[axis] ? std::int64_t{reach[axis] > 0 ? 2 : 1} : 1 + 2 * reach[axis]));
+      CHECK(colours.size() <= most);
+    }
+  }
+}
+
+TEST_CASE("times of loops: each index once, and how long they take on more threads") {
+  CHECK(makespan({3, 1, 1, 1}, 2) == 3);
+  CHECK(makespan({1, 1, 1, 3}, 2) == 4);   // in their order
+  CHECK(makespan({1, 2, 3}, 1) == 6);
+  CHECK(makespan({1, 2, 3}, 64) == 3);
+  CHECK(makespan({}, 4) == 0);
+  LoopTimes times;
+  std::vector<int> seen(7, 0);
+  parallel_for(seen.size(), [&](std::size_t i) { ++seen[i]; });
+  const auto loops = times.take();
+  CHECK(seen == std::vector<int>(7, 1));
+  REQUIRE(loops.size() == 1);
+  CHECK(loops[0].size() == 7);
+  for (const double seconds : loops[0]) CHECK(seconds >= 0);
+  CHECK(times.take().empty());
 }
 
 TEST_CASE("quiet blocks: pass k reaches k blocks further than what moves") {

@@ -78,7 +78,7 @@ LatticeTiling::LatticeTiling(const Lattice& lattice) {
   const auto group = static_cast<std::int64_t>(padding);
   const std::int64_t groups = (n[0] + group - 1) / group, segments = (groups + segment - 1) / segment,
                      points = n[0] * n[1] * n[2];
-  std::int64_t tile1 = 16, tile2 = 8;
+  std::int64_t tile1 = 8, tile2 = 8;
   while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * group)) < 16 && tile1 * tile2 > 1)
     (tile1 > tile2 ? tile1 : tile2) /= 2;
   size = {segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, groups / 16), tile1, tile2};

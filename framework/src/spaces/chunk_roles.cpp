@@ -59,7 +59,7 @@ ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws) {
     });
     // Evaluated as one law, the bonds that store nothing would store something.
     over_bonds(families, chunks[c], [&](std::size_t p, std::size_t j) {
-      mixed = mixed || stores_nothing(p, j) && (laws.record_of(p).silent || laws.record_of(j).silent);
+      mixed = mixed || (stores_nothing(p, j) && (laws.record_of(p).silent || laws.record_of(j).silent));
       return !mixed;
     });
     if (law && !mixed) role.law = static_cast<std::int32_t>(law - laws.records().data());
