@@ -168,3 +168,22 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       CHECK_MESSAGE(worst <= 1e-12 * contract::largest(body, Kw), "K w is off by ", worst);
     }
 }
+
+TEST_CASE("a report counts the evaluation points of a force evaluation: points, bonds, or parts of families") {
+  registry();
+  for (const bool cloud : {false, true}) {
+    INFO((cloud ? "cloud" : "lattice"));
+    std::size_t points = 0;
+    const auto count = [&](const std::string& kinematics) {
+      const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 8}, kinematics));
+      points = simulation->problem().body().points();
+      return simulation->problem().terms().report().evaluation_points;
+    };
+    const std::size_t bonds = 2 * count("type = \"bond_based\"");
+    CHECK(count("type = \"conventional\"") == points);
+    CHECK(bonds > 4 * points);
+    CHECK(count("type = \"baqp\"") == bonds / 2);   // both ends at once
+    CHECK(count("type = \"bond_associated\"") == bonds);
+    CHECK(count("type = \"sub_horizon\"") == 4 * points);
+  }
+}
