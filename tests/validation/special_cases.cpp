@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
 
 #include "tests/validation/scenes.hpp"
 
@@ -186,4 +189,35 @@ TEST_CASE("a report counts the evaluation points of a force evaluation: points, 
     CHECK(count("type = \"bond_associated\"") == bonds);
     CHECK(count("type = \"sub_horizon\"") == 4 * points);
   }
+}
+
+TEST_CASE("a consistent cloud says between which bounds its weights lie, positive ones about 1") {
+  registry();
+  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = true, .consistent = true, .cells = 8}, "type = \"baqp\""));
+  double low = 0, high = 0;
+  for (const auto& [label, text] : simulation->problem().terms().report().notes)
+    if (const std::size_t at = text.find("w/W "); at != std::string::npos) REQUIRE(std::sscanf(text.c_str() + at, "w/W %lf to %lf", &low, &high) == 2);
+  CHECK(low > 0);
+  CHECK(low < 1);
+  CHECK(high > 1);
+}
+
+TEST_CASE("one evaluation is a sample of step 0 at time 0") {
+  class Asked final : public Observer {
+   public:
+    bool wants_sample(std::int64_t step, double time) override {
+      asked.emplace_back(step, time);
+      return true;
+    }
+    void step_done(const StepReport& report) override { CHECK(report.time == 0); }
+    void log(std::string_view) override {}
+    bool cancelled() const noexcept override { return false; }
+    std::vector<std::pair<std::int64_t, double>> asked;
+  };
+  registry();
+  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cells = 6}, "type = \"baqp\""));
+  Asked observer;
+  simulation->run(observer);
+  REQUIRE(observer.asked.size() == 1);
+  CHECK(observer.asked[0] == std::pair<std::int64_t, double>{0, 0.0});
 }
