@@ -111,11 +111,11 @@ class Units:
         if unit.reached is not None or limit <= unit.slower:
             return
         self.reached_file.write_bytes(bytes(BYTES))
-        passed, spent, late = self.run(unit, 10 * limit, 3 * limit, PERIKIT_FAULTS_REACHED=str(self.reached_file))
+        passed, spent, late = self.run(unit, 3 * limit, 10 * limit, PERIKIT_FAULTS_REACHED=str(self.reached_file))
         if late and not passed:
             unit.slower = limit
             return
-        unit.good = passed or self.run(unit, 10 * limit, 10 * limit)[0]
+        unit.good = passed or self.run(unit, 30 * limit, 100 * limit)[0]
         unit.seconds, unit.reached = spent, frozenset(k for k, byte in enumerate(self.reached_file.read_bytes()) if byte)
         if not unit.good:
             print(f"left out, for it fails without a fault: {unit.name}", flush=True)
