@@ -38,3 +38,18 @@ TEST_CASE("skipped checks: margins are used up in time, on lattices and clouds")
     CHECK(!contains(log, "failed bonds  0,"));
   }
 }
+
+TEST_CASE("skipped checks: bonds between onset and failure are looked at in every step, on lattices and clouds") {
+  for (const auto& [kinematics, more] : {std::pair<std::string, std::string>{"bond_based", ""}, {"baqp", ""}, {"bond_based", "jitter = 0.05\n"}, {"baqp", "jitter = 0.05\n"}}) {
+    INFO(kinematics, " ", more);
+    const Desk desk(replaced(stretched(kinematics, more), "type = \"critical_stretch\"\nstretch = 0.02", "type = \"smooth_degradation\"\nstretch_min = 0.02\nstretch = 0.5"));
+    for (const std::string& run : {std::string("true --set run.skip=true"), std::string("false --set run.skip=false"), std::string("whole --set damage.stretch_min=0.4")}) {
+      const Result told = desk.perikit("run scene.toml --quiet -o " + run);
+      REQUIRE_MESSAGE(told.status == 0, told.err);
+    }
+    const bool same = desk.text("true/history.csv") == desk.text("false/history.csv");
+    CHECK_MESSAGE(same, "bonds weaken at other steps");
+    const bool weakened = desk.text("true/history.csv") != desk.text("whole/history.csv");
+    CHECK_MESSAGE(weakened, "no bond weakens");
+  }
+}

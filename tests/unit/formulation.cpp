@@ -157,3 +157,12 @@ TEST_CASE("a base may give the far end any share, and only the mean of both ends
   CHECK_THROWS_AS(make_formulation(std::make_shared<Blend>(0.3, true)), std::invalid_argument);
   CHECK_THROWS_AS(make_formulation(std::make_shared<Blend>(-0.1, false)), std::invalid_argument);
 }
+
+TEST_CASE("formulation: a blend that states no share is the mean of both ends") {
+  class Blend final : public BondKinematics {
+   public:
+    BondTraits traits() const noexcept override { return {.base = BondBase::blend}; }
+    void correction(const FamilyView&, double*, std::size_t) const noexcept override {}
+  };
+  CHECK(make_formulation(std::make_shared<Blend>()).far_share == 0.5);
+}

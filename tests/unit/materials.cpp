@@ -319,3 +319,39 @@ TEST_CASE("a law that is stressed at rest by more than rounding is refused") {
   const MaterialInput input{[](std::string_view) { return true; }, [](std::string_view) { return 2.0; }};
   CHECK_THROWS_WITH_AS(LawMaterial<StressedLaw>().constants(input, &k), doctest::Contains("stressed"), std::domain_error);
 }
+
+namespace {
+
+/// A law written in such a way that its energy at rest is not zero.
+template <int digits>
+struct OffsetLaw {
+  static constexpr MaterialTraits traits{.constants = 1};
+  void constants(const MaterialInput& input, double* k) const { k[0] = input.value("kappa"); }
+  Moduli small_strain(const double* k) const noexcept { return {k[0], 0}; }
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const T j = jacobian_minus_one(H);
+    return k[0] * (0.5 * j * j + std::pow(10.0, -digits));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("what rounding leaves of a law's energy at rest is taken off at every point, and more than that is refused") {
+  double k = 0;
+  const MaterialInput input{[](std::string_view) { return true; }, [](std::string_view) { return 2e9; }};
+  CHECK_THROWS_WITH_AS(LawMaterial<OffsetLaw<9>>().constants(input, &k), doctest::Contains("stressed, or stores energy"), std::domain_error);
+  const LawMaterial<OffsetLaw<11>> material;
+  REQUIRE_NOTHROW(material.constants(input, &k));
+  for (const int n : {1, 11}) {
+    for (const double stretch : {0.0, 0.25}) {
+      const std::vector<contract::Values> points(static_cast<std::size_t>(n), {stretch, 0, 0, 0, 0, 0, 0, 0, 0});
+      const Evaluation e(material, Space::solid, std::vector{k}, points);
+      for (int p = 0; p < n; ++p) {
+        // The offset itself, 1e-11 k, would show in the eleventh digit of k.
+        if (stretch == 0) CHECK(e.psi.data()[p] == 0);
+        CHECK(std::abs(e.psi.data()[p] - 0.5 * k * stretch * stretch) <= 1e-15 * k);
+      }
+    }
+  }
+}

@@ -163,3 +163,15 @@ TEST_CASE("kinsol's line search shortens steps of a slender body, and its answer
   CHECK(of_a.text != of_b.text);
   CHECK(distance(*a, *b) <= 1e-8);
 }
+
+TEST_CASE("a body that nothing moves stays where it is, with a residual of zero") {
+  for (const std::string& integrator : integrators) {
+    INFO(integrator);
+    const auto simulation = contract::build(contract::scene_text(plate(integrator, "steps = 2\n"), kinematics));
+    const Protocol protocol = run(*simulation);
+    CHECK(protocol.reports.size() == 3);
+    for (const StepReport& report : protocol.reports) CHECK(report.residual == 0);
+    for (const std::int32_t p : simulation->problem().body().internal())
+      for (int c = 0; c < 2; ++c) CHECK(simulation->problem().state().displacement().component(c)[p] == 0);
+  }
+}

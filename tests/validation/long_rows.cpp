@@ -1,4 +1,5 @@
-/// Long rows of a lattice are split between blocks, which then reach into each other's rows: the forces are those of a cloud of the same points.
+/// Long rows of a lattice are split between blocks, which then reach into each other's rows, and families of long reach are worked on in pieces: the
+/// forces are those of a cloud of the same points.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -21,16 +22,16 @@ struct Forces {
   double energy = 0;
 };
 
-Forces forces_of(int dimension, int length, int width, double jitter, const std::string& kinematics, const std::string& more) {
+Forces forces_of(int dimension, int length, int width, double jitter, const std::string& kinematics, const std::string& more, double ratio = 3.015) {
   const char* lower[] = {"[0.0]", "[0.0, 0.0]", "[0.0, 0.0, 0.0]"};
   const std::string upper = dimension == 1 ? fmt::format("[{}.0]", length) : dimension == 2 ? fmt::format("[{}.0, {}.0]", length, width) : fmt::format("[{}.0, {}.0, {}.0]", length, width, width);
   const std::string plane = dimension == 2 ? "plane = \"strain\"\n" : dimension == 1 ? "line = \"strain\"\n" : "";
   const std::string zeros = dimension == 1 ? "" : dimension == 2 ? ", \"0.02*sin(x*y)\"" : ", \"0.02*sin(x*y)\", \"0.01*cos(x + 2*z)\"";
   const std::string text = fmt::format(
       "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\njitter = {}\n{}"
-      "[family]\nhorizon_ratio = 3.015\n{}[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0\n"
+      "[family]\nhorizon_ratio = {}\n{}[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0\n"
       "[initial]\ndisplacement = [\"0.05*sin(0.3*x) + 0.01*cos(2*x)\"{}]\n[integrator]\ntype = \"evaluate\"\n",
-      dimension, plane, lower[dimension - 1], upper, jitter, more, jitter > 0 ? "consistent = false\n" : "", kinematics, zeros);
+      dimension, plane, lower[dimension - 1], upper, jitter, more, ratio, jitter > 0 ? "consistent = false\n" : "", kinematics, zeros);
   const Scene scene = parse_scene(text, "long_rows.toml", registry());
   Simulation simulation(scene, registry());
   BodyProblem& problem = simulation.problem();
@@ -75,5 +76,23 @@ TEST_CASE("rows longer than a block") {
       CHECK(largest_difference(lattice.action, cloud.action) < 1e-9);
       CHECK(lattice.energy == doctest::Approx(cloud.energy).epsilon(1e-10));
     }
+  }
+}
+
+TEST_CASE("families of hundreds of bonds, and of more cells along a row than kernels keep at once") {
+  struct Case {
+    int dimension, length, width;
+    double ratio;
+    const char* kinematics;
+  };
+  for (const Case& c : {Case{1, 90, 1, 17.2, "type = \"conventional\""}, {2, 50, 22, 17.2, "type = \"conventional\""}, {2, 50, 22, 17.2, "type = \"baqp\""},
+                        {3, 10, 7, 4.2, "type = \"selective\"\nbase = \"baqp\""}, {3, 10, 7, 4.2, "type = \"ordinary\""}}) {
+    CAPTURE(c.dimension);
+    CAPTURE(c.kinematics);
+    const Forces lattice = forces_of(c.dimension, c.length, c.width, 0, c.kinematics, "", c.ratio);
+    const Forces cloud = forces_of(c.dimension, c.length, c.width, 1e-13, c.kinematics, "", c.ratio);
+    CHECK(largest_difference(lattice.force, cloud.force) < 1e-9);
+    CHECK(largest_difference(lattice.action, cloud.action) < 1e-9);
+    CHECK(lattice.energy == doctest::Approx(cloud.energy).epsilon(1e-10));
   }
 }

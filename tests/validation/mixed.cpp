@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <sstream>
 
@@ -121,4 +122,16 @@ TEST_CASE("mixed is refused without point volumes, and by kinsol") {
   CHECK_THROWS_WITH(make(plain)->run(protocol),
                     doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective"));
   CHECK_THROWS_WITH(make(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
+}
+
+TEST_CASE("mixed: the log says in how many iterations the linear residual fell, and to what share") {
+  const Protocol protocol = run(*make(scene(2, 5, 100, jfnk("mixed"))));
+  const std::size_t at = protocol.text.find("gmres ");
+  REQUIRE(at != std::string::npos);
+  int iterations = 0;
+  double reached = 0;
+  REQUIRE(std::sscanf(protocol.text.c_str() + at, "gmres %d to %lf", &iterations, &reached) == 2);
+  CHECK(iterations > 0);
+  CHECK(reached > 0);
+  CHECK(reached < 0.9);
 }

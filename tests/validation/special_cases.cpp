@@ -4,7 +4,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
 
+#include "tests/contract/integrator_fixture.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -167,4 +171,81 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
         }
       CHECK_MESSAGE(worst <= 1e-12 * contract::largest(body, Kw), "K w is off by ", worst);
     }
+}
+
+TEST_CASE("a report counts the evaluation points of a force evaluation: points, bonds, or parts of families") {
+  registry();
+  for (const bool cloud : {false, true}) {
+    INFO(std::string(cloud ? "cloud" : "lattice"));
+    std::size_t points = 0;
+    const auto count = [&](const std::string& kinematics) {
+      const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 8}, kinematics));
+      points = simulation->problem().body().points();
+      return simulation->problem().terms().report().evaluation_points;
+    };
+    const std::size_t bonds = 2 * count("type = \"bond_based\"");
+    CHECK(count("type = \"conventional\"") == points);
+    CHECK(bonds > 4 * points);
+    CHECK(count("type = \"baqp\"") == bonds / 2);   // both ends at once
+    CHECK(count("type = \"bond_associated\"") == bonds);
+    CHECK(count("type = \"sub_horizon\"") == 4 * points);
+  }
+}
+
+TEST_CASE("a consistent cloud says between which bounds its weights lie, positive ones about 1") {
+  registry();
+  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = true, .consistent = true, .cells = 8}, "type = \"baqp\""));
+  double low = 0, high = 0;
+  for (const auto& [label, text] : simulation->problem().terms().report().notes)
+    if (const std::size_t at = text.find("w/W "); at != std::string::npos) REQUIRE(std::sscanf(text.c_str() + at, "w/W %lf to %lf", &low, &high) == 2);
+  CHECK(low > 0);
+  CHECK(low < 1);
+  CHECK(high > 1);
+}
+
+TEST_CASE("one evaluation is a sample of step 0 at time 0") {
+  class Asked final : public Observer {
+   public:
+    bool wants_sample(std::int64_t step, double time) override {
+      asked.emplace_back(step, time);
+      return true;
+    }
+    void step_done(const StepReport& report) override { CHECK(report.time == 0); }
+    void log(std::string_view) override {}
+    bool cancelled() const noexcept override { return false; }
+    std::vector<std::pair<std::int64_t, double>> asked;
+  };
+  registry();
+  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cells = 6}, "type = \"baqp\""));
+  Asked observer;
+  simulation->run(observer);
+  REQUIRE(observer.asked.size() == 1);
+  CHECK(observer.asked[0] == std::pair<std::int64_t, double>{0, 0.0});
+}
+
+TEST_CASE("bonds that fail give what they owe to every point, the first one too: momentum is kept") {
+  registry();
+  for (const bool cloud : {false, true}) {
+    INFO(std::string(cloud ? "cloud" : "lattice"));
+    contract::BodyOptions body{.dimension = 1, .cloud = cloud, .cells = 2, .integrator = "type = \"verlet\"\nend_time = 0.5"};
+    body.material = "type = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 2000.0\npoisson_ratio = 0.3";
+    body.conditions = "[initial]\nvelocity = [\"3*(x - 1)\"]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.02\n";
+    const auto simulation = contract::build(contract::scene_text(body, "type = \"baqp\""));
+    BodyProblem& problem = simulation->problem();
+    const auto momentum = [&] {
+      double sum = 0, size = 0;
+      for (const std::int32_t p : problem.body().internal()) {
+        const double mv = problem.masses().by_point()[static_cast<std::size_t>(p)] * problem.state().velocity().component(0)[p];
+        sum += mv;
+        size += std::abs(mv);
+      }
+      return std::pair(sum, size);
+    };
+    const auto [before, before_size] = momentum();
+    contract::run(*simulation);
+    const auto [after, size] = momentum();
+    CHECK(problem.terms().bond_checks().failed > 0);
+    CHECK(size > 0);
+    CHECK(std::abs(after - before) <= 1e-12 * size);
+  }
 }

@@ -1,6 +1,7 @@
 """Small faults that could be planted in the sources, and the table of what became of them."""
 
 import csv
+import dataclasses
 import hashlib
 import itertools
 import pathlib
@@ -9,18 +10,16 @@ from dataclasses import dataclass
 
 # Rooms that faults go into, and how many of every hundred each of them gets.
 ROOMS = {
-    "families": (16, ["framework/src/families/*"]),
+    "families": (16, ["framework/src/families/*", "framework/include/perikit/families/*"]),
     "spaces": (16, ["framework/src/spaces/*"]),
-    "operators": (9, ["framework/src/operators/*", "framework/src/maps/*"]),
+    "operators": (9, ["framework/src/operators/*", "framework/src/maps/*", "framework/include/perikit/operators/*"]),
     "assembly": (9, ["framework/src/assembly/*"]),
-    "problem": (11, ["framework/src/problem/*", "framework/src/sdk/*"]),
-    "terms": (11, ["framework/src/terms/*"]),
+    "problem": (11, ["framework/src/problem/*", "framework/src/sdk/*", "framework/include/perikit/problem/*", "framework/include/perikit/sdk/*"]),
+    "terms": (11, ["framework/src/terms/*", "framework/include/perikit/terms/*"]),
     "integrators": (11, ["integrators/*/*"]),
-    "parts": (11, ["materials/*/law.hpp", "plugins/*/*/*", "framework/src/model/*"]),
-    "body": (6, ["framework/src/body/*"]),
+    "parts": (11, ["materials/*/law.hpp", "plugins/*/*/*", "framework/src/model/*", "framework/include/perikit/model/*"]),
+    "body": (6, ["framework/src/body/*", "framework/src/core/*", "framework/include/perikit/body/*", "framework/include/perikit/core/*"]),
 }
-
-WIDELY_USED = 4   # sources: headers that more of them read would take minutes to build with each fault
 
 # Kinds of faults: a pattern, of which group 1 is replaced, and what by.
 NUMBER = r"(?<![\w.\]])({})(?![\w.\]'])"
@@ -31,7 +30,7 @@ KINDS = [
     ("factor", r"(?<=[\w)\]]) (\*|/) (?=[\w(])", lambda x: {"*": "/", "/": "*"}[x]),
     ("constant", NUMBER.format(r"[0-9]+\.[0-9]+"), lambda x: "0.125" if float(x) == 0 else repr(0.8 * float(x))),
     ("constant", r"(?:[*/] )([2-9]|[1-9][0-9]+)(?![\w.])", lambda x: str(int(x) - 1)),
-    ("constant", r"(?<![\w.\]])([2-9]|[1-9][0-9]+)(?= [*/] )", lambda x: str(int(x) - 1)),
+    ("constant", r"(?<![\w.\]])(?<!e-)([2-9]|[1-9][0-9]+)(?= [*/] )", lambda x: str(int(x) - 1)),
     ("one", r"[+-] (1)(?![\w.])", lambda x: "2"),
     ("bound", r"\bfor \([^;]*= (0);", lambda x: "1"),
     ("index", r"\[([012])\]", lambda x: {"0": "1", "1": "0", "2": "1"}[x]),
@@ -47,8 +46,9 @@ BOUND = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 SENSE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 BETWEEN_REALS = re.compile(r"\.[0-9]|1e|std::(abs|sqrt|fabs|hypot)|norm|double|Pack|tolerance|residual|trace|det\b|size\b(?!\()|least|weight|volume|stretch|error|scale")
 
-# Lines that compute nothing: messages, tables of parameters, sizes of memory, what only speed depends on.
-SKIPPED = re.compile(r"^\s*(#|///?|\*|template|static_assert|namespace|using |case .*:$)|throw |fmt::|InputError|error\(|message|warn|log\(|describe|"
+# Lines that compute nothing: messages, tables of parameters, sizes of memory, what only speed depends on; and what must be known to the
+# compiler, in which nothing can be switched.
+SKIPPED = re.compile(r"constexpr|^\s*(#|///?|\*|template|static_assert|namespace|using |case .*:$)|throw |fmt::|InputError|error\(|message|warn|log\(|describe|"
                      r"\.by_default|\.at_least|\.at_most|\.above|\.below|table\.|reserve\(|alignas|bytes\(\)|sizeof|bytes|prefetch|operations::|"
                      r"batch_points =|\bnotes?_? |pack_width|parallel_for|grain|threads|noexcept = |std::format|operator<<|assert\(")
 
@@ -72,19 +72,28 @@ class Fault:
     def planted(self):
         return self.line[: self.column] + self.new + self.line[self.column + len(self.old):]
 
-    def plant(self, source):
-        """The text of the file with this fault in it."""
-        lines = (source / self.path).read_text().splitlines(keepends=True)
-        number = [k for k, line in enumerate(lines) if line.strip() == self.line][self.which]
-        lines[number] = lines[number].replace(self.line, self.planted())
-        return "".join(lines)
+    def place(self, text):
+        """Where in the text of its file the replaced characters begin."""
+        begin, equal = 0, 0
+        for raw in text.splitlines(keepends=True):
+            if raw.strip() == self.line:
+                if equal == self.which:
+                    return begin + len(raw) - len(raw.lstrip()) + self.column
+                equal += 1
+            begin += len(raw)
+        raise LookupError(f"{self.path} has no line {self.line}")
+
+
+TOKENS = re.compile(r'"(\\.|[^"\\])*"|\'(\\.|[^\'\\])\'|/\*.*?\*/|//.*$')
+
+
+def without_comments(line):
+    return TOKENS.sub(lambda m: " " * len(m[0]) if m[0][0] == "/" else m[0], line)
 
 
 def code_of(line):
     """The line with blanks in place of comments and of what stands between quotation marks: columns stay."""
-    line = re.sub(r'"(\\.|[^"\\])*"', lambda m: '"' + " " * (len(m[0]) - 2) + '"', line)
-    line = re.sub(r"/\*.*?\*/", lambda m: " " * len(m[0]), line)
-    return re.sub(r"//.*$", lambda m: " " * len(m[0]), line)
+    return TOKENS.sub(lambda m: " " * len(m[0]) if m[0][0] == "/" else m[0][0] + " " * (len(m[0]) - 2) + m[0][0], line)
 
 
 def in_loop_head(code, column):
@@ -108,6 +117,8 @@ def faults_of(source, path, room):
                     continue   # endless loops and reads out of bounds, which every test sees or none can
                 if re.search(r"(?:^|\W)[\w:]+<[^<>;()]*$", code[:column]):
                     continue   # an argument of a template
+                if re.match(r"(?!return |delete |else )[\w:<>, ]+[ *]+\w+(\[\w+\])*\[[^\]=(]*$", code[:column]):
+                    continue   # the size of an array
                 if kind == "comparison":
                     new = (SENSE if BETWEEN_REALS.search(code) else BOUND)[old]
                 else:
@@ -115,41 +126,15 @@ def faults_of(source, path, room):
                 yield Fault(room, kind, path, line, which, column, old, new)
 
 
-def used_by(source):
-    """For each header the sources that read it, directly or not."""
-    included = {}
-    for folder in ("framework/src", "integrators", "materials", "plugins"):
-        for path in (source / folder).rglob("*.[ch]pp"):
-            included[path] = set(re.findall(r'#include "([^"]+)"', path.read_text()))
-    places = {}
-    for path in included:
-        for root in (source / "framework/src", path.parent):
-            if path.is_relative_to(root):
-                places.setdefault(str(path.relative_to(root)), set()).add(path)
-    users = {path: set() for path in included}
-    for source_file in (p for p in included if p.suffix == ".cpp"):
-        seen, waiting = set(), [source_file]
-        while waiting:
-            for name in included[waiting.pop()]:
-                for header in places.get(name, ()):
-                    if header not in seen and header.suffix == ".hpp":
-                        seen.add(header)
-                        waiting.append(header)
-        for header in seen:
-            users[header].add(source_file)
-    return {str(path.relative_to(source)): len(users[path]) for path in users}
-
-
 def choose(source, count, seed):
     """The faults in the order in which they are planted: rooms in turn, by their shares; in each of them files in turn, kinds in turn."""
     def rank(*what):
         return hashlib.sha256("|".join(map(str, (seed, *what))).encode()).hexdigest()
     total = sum(share for share, _ in ROOMS.values())
-    users = used_by(source)
     chosen = []
     for room, (share, patterns) in ROOMS.items():
         paths = sorted({str(p.relative_to(source)) for pattern in patterns for p in source.glob(pattern)
-                        if p.suffix == ".cpp" or p.suffix == ".hpp" and users[str(p.relative_to(source))] <= WIDELY_USED})
+                        if p.suffix in (".cpp", ".hpp")})
         by_file = {}
         for path in paths:
             by_kind = {}
@@ -180,19 +165,19 @@ class Table:
         self.rows = {}
         if self.path.exists():
             with self.path.open(newline="") as file:
-                for row in csv.DictReader(file):
-                    fault = self.fault(row)
-                    self.rows[row["key"] or fault.key] = row | {"key": row["key"] or fault.key}
+                self.rows = {row["key"]: row for row in csv.DictReader(file)}
 
     @staticmethod
     def fault(row):
         return Fault(row["room"], row["kind"], row["path"], row["line"], int(row["which"]), int(row["column"]), row["old"], row["new"])
 
-    def record(self, fault, result, by, seconds):
-        old = self.rows.get(fault.key, {})
-        self.rows[fault.key] = {"key": fault.key, "room": fault.room, "kind": fault.kind, "path": fault.path, "which": fault.which,
-                                "column": fault.column, "line": fault.line, "old": fault.old, "new": fault.new, "result": result,
-                                "by": by, "seconds": f"{seconds:.0f}", "note": old.get("note", "")}
+    def result(self, fault):
+        return self.rows[fault.key]["result"] if fault.key in self.rows else ""
+
+    def record(self, fault, result, by="", seconds=0.0, note=""):
+        """`seconds`: processor time of its tests."""
+        note = note or self.rows.get(fault.key, {}).get("note", "")
+        self.rows[fault.key] = dataclasses.asdict(fault) | {"key": fault.key, "result": result, "by": by, "seconds": f"{seconds:.1f}", "note": note}
         new = self.path.with_suffix(".new")
         with new.open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
