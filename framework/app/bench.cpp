@@ -134,16 +134,6 @@ double fastest(Work&& work) {
   return best;
 }
 
-void model_threads(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
-  const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, 12), "bench.toml", registry);
-  Simulation simulation(scene, registry);
-  row.points = simulation.problem().body().points();
-  ThreadsModel model;
-  simulation.run(model);
-  fmt::print("{} | ", row.points);
-  model.print();
-}
-
 void measure(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
   const auto timed = [&](int steps, bool all) {
     const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, steps), "bench.toml", registry);
@@ -207,9 +197,9 @@ std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
   return text + "\n  ]\n}\n";
 }
 
-/// Measures every row that the options ask for, and shows each as soon as it is there.
-template <class Show>
-std::vector<Row> measure_rows(Registry& registry, const BenchOptions& options, Show&& show) {
+/// work(row, [kinematics], [material]) for every row that the options ask for; what it prints is shown as soon as it is there.
+template <class Work>
+std::vector<Row> for_each_row(Registry& registry, const BenchOptions& options, Work&& work) {
   std::vector<Row> rows;
   for (const std::string& name : options.kinematics.empty() ? every_row(registry) : options.kinematics)
     for (const std::string& material : options.materials)
@@ -218,23 +208,26 @@ std::vector<Row> measure_rows(Registry& registry, const BenchOptions& options, S
           const std::size_t plus = name.find('+');
           const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
           const std::string stabilization = plus == name.npos ? "" : fmt::format("\nstabilization = \"{}\"", name.substr(plus + 1));
-          Row& row = rows.emplace_back(Row{name, material, dimension, cloud});
-          const std::string head = fmt::format("| {} | {} | {} | {} | ", name, material, dimension, cloud ? "cloud" : "lattice");
-          const auto run = [&](auto&& what) {
-            what(registry, row, fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
-                 fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()), options);
-          };
-          if (options.threads_model) {
-            fmt::print("{}", head);
-            run(model_threads);
-          } else {
-            run(measure);
-            fmt::print("{}", head);
-            show(row);
-          }
+          work(rows.emplace_back(Row{name, material, dimension, cloud}), fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
+               fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()));
           std::fflush(stdout);
         }
   return rows;
+}
+
+void print_head(const Row& row) {
+  fmt::print("| {} | {} | {} | {} | ", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice");
+}
+
+void model_threads(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
+  const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, 12), "bench.toml", registry);
+  Simulation simulation(scene, registry);
+  row.points = simulation.problem().body().points();
+  ThreadsModel model;
+  simulation.run(model);
+  print_head(row);
+  fmt::print("{} | ", row.points);
+  model.print();
 }
 
 std::string key_of(const Row& row, const BenchOptions& options) {
@@ -245,7 +238,9 @@ void count(Registry& registry, const BenchOptions& options) {
   fmt::print("{} points a side, horizon 3.015 spacings, verlet. Floating-point operations of a step.\n\n"
              "| kinematics | material | D | body | operations a point |\n|---|---|---|---|---|\n", options.cells);
   Operations operations;
-  measure_rows(registry, options, [&](const Row& row) {
+  for_each_row(registry, options, [&](Row& row, const std::string& kinematics, const std::string& material) {
+    measure(registry, row, kinematics, material, options);
+    print_head(row);
     fmt::print("{:.0f} |\n", row.operations);
     operations.set(key_of(row, options), row.operations);
   });
@@ -262,7 +257,9 @@ void bench(Registry& registry, const BenchOptions& options) {
                "| kinematics | material | D | body | points | loops | blocks | outside [%] |", options.cells);
     for (const int threads : modelled_threads) fmt::print(" {} |", threads);
     fmt::print("\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-    measure_rows(registry, options, [](const Row&) {});
+    for_each_row(registry, options, [&](Row& row, const std::string& kinematics, const std::string& material) {
+      model_threads(registry, row, kinematics, material, options);
+    });
     return;
   }
   const Operations operations(options.operations.empty() ? data_folder() / "operations.csv" : std::filesystem::path(options.operations));
@@ -278,7 +275,9 @@ void bench(Registry& registry, const BenchOptions& options) {
   fmt::print("| kinematics | material | D | body | step [ns] | bytes a point | traffic | operations a point | arithmetic | set-up [ns] | tangent action [ns] | assembly [ns] |\n"
              "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const auto whole = [](double value) { return std::isfinite(value) ? fmt::format("{:.0f}", value) : std::string("-"); };
-  const std::vector<Row> rows = measure_rows(registry, options, [&](Row& row) {
+  const std::vector<Row> rows = for_each_row(registry, options, [&](Row& row, const std::string& kinematics, const std::string& material) {
+    measure(registry, row, kinematics, material, options);
+    print_head(row);
     row.operations = operations.of(key_of(row, options));
     fmt::print("{:.1f} | {:.0f} | {} | {} | {} | {:.0f} | {:.1f} | {} |\n", 1e9 * row.step, row.bytes, rate(traffic(row), limits.triad_all), whole(row.operations),
                rate(arithmetic(row), limits.multiply_add_all), 1e9 * row.set_up, 1e9 * row.tangent, whole(1e9 * row.assembly));

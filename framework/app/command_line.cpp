@@ -75,13 +75,16 @@ void add_commands(CLI::App& app, Options& options) {
   bench_command->add_option("--cells", options.bench.cells, "Points along each side")
       ->check(CLI::Range(2, 100000000))
       ->capture_default_str();
-  bench_command->add_flag("--threads-model", options.bench.threads_model,
-                          "Instead: the efficiency of a step on 2 to 64 threads, from the times of its blocks on one");
   bench_command->add_flag("--assembly", options.bench.assembly,
                           "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");
   bench_command->add_option("--json", options.bench.json, "Write the figures to this file as well");
   bench_command->add_option("--operations", options.bench.operations,
                             "CSV of operations a point and step; default: the one that comes with perikit");
+  bench_command->add_flag("--threads-model", options.bench.threads_model,
+                          "Instead: the efficiency of a step on 2 to 64 threads, from the times of its blocks on one")
+      ->excludes("--assembly")
+      ->excludes("--json")
+      ->excludes("--operations");
   bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
   new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();

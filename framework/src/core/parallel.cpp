@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -16,7 +17,7 @@ namespace perikit {
 
 namespace {
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
-std::vector<std::vector<double>>* loop_times = nullptr;
+std::optional<std::vector<std::vector<double>>> loop_times;
 
 void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
   using Clock = std::chrono::steady_clock;
@@ -36,11 +37,8 @@ int thread_count() noexcept { return threads; }
 void set_thread_count(int n) noexcept { threads = counts_operations ? 1 : std::max(1, n); }
 int thread_index() noexcept { return detail::team_index(); }
 
-LoopTimes::LoopTimes() { loop_times = new std::vector<std::vector<double>>; }
-LoopTimes::~LoopTimes() {
-  delete loop_times;
-  loop_times = nullptr;
-}
+LoopTimes::LoopTimes() { loop_times.emplace(); }
+LoopTimes::~LoopTimes() { loop_times.reset(); }
 std::vector<std::vector<double>> LoopTimes::take() { return std::exchange(*loop_times, {}); }
 
 double makespan(const std::vector<double>& blocks, int threads) {
