@@ -56,7 +56,7 @@ struct Hencky {
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;
     const T plane = log1p(jacobian_minus_one(with_free_part(H, T(0.0))));
-    return expm1(-lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane);
+    return expm1(-lambda / free_modulus<S>(lambda, mu) * plane);
   }
 
  private:

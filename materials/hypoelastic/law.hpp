@@ -65,7 +65,7 @@ struct Hypoelastic {
       const Tensor<T, S> given = symmetric_part(increment(end) * middle_inverse(end));
       T plane = 0.0;
       for (int i = 0; i < S::dimension; ++i) plane += given(i, i);
-      const T e = -(stress(2, 2) + lambda * plane) / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu)));
+      const T e = -(stress(2, 2) + lambda * plane) / free_modulus<S>(lambda, mu);
       return (2.0 * stretch(2, 2) + e * (2.0 + stretch(2, 2))) / (2.0 - e);
     }
 

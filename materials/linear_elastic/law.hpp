@@ -2,6 +2,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/free_stretch.hpp"
 
 namespace perikit {
 
@@ -41,7 +42,7 @@ struct LinearElastic {
     const auto& [lambda, mu] = k;
     T plane = 0.0;
     for (int i = 0; i < S::dimension; ++i) plane += H(i, i);
-    return -lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane;
+    return -lambda / free_modulus<S>(lambda, mu) * plane;
   }
 };
 

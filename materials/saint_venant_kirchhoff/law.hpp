@@ -2,6 +2,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/elastic_constants.hpp"
+#include "perikit/sdk/free_stretch.hpp"
 
 namespace perikit {
 
@@ -41,7 +42,7 @@ struct SaintVenantKirchhoff {
     T plane = 0.0;
     const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
     for (int i = 0; i < S::dimension; ++i) plane += c(i, i);
-    const T square = -lambda / (S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu))) * plane;
+    const T square = -lambda / free_modulus<S>(lambda, mu) * plane;
     return square / (1.0 + sqrt(1.0 + square));
   }
 };

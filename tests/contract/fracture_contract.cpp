@@ -409,6 +409,40 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
         }
 }
 
+TEST_CASE("kinematics: forces that are renewed near failed bonds are those of the whole body, bit for bit") {
+  for (const Example& example : kinematics_examples())
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d)) continue;
+        // Large enough that most points lie far from the place where bonds fail.
+        BodyOptions options{.dimension = d, .cloud = cloud, .cells = d == 1 ? 400 : 60, .conditions = limit};
+        const auto simulation = build(scene_text(options, kinematics_table(example)));
+        BodyProblem& problem = simulation->problem();
+        const Body& body = problem.body();
+        const FieldView u = problem.state().displacement();
+        Noise random(23);
+        set_field(body, u, [&](const Point&) { return Point{0.02 * random(), 0.02 * random()}; });
+        Field force = problem.make_field(), whole = problem.make_field();
+        REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
+        // One point at the middle of the body goes far from its neighbours.
+        std::int32_t torn = body.internal().front();
+        const auto off = [&](std::int32_t p) {
+          const Point x = body.position(static_cast<std::size_t>(p));
+          return std::abs(x[0] - 0.5 * options.cells) + (d > 1 ? std::abs(x[1] - 0.5 * options.cells) : 0.0);
+        };
+        for (const std::int32_t p : body.internal())
+          if (off(p) < off(torn)) torn = p;
+        u.component(d - 1)[torn] += d == 1 ? 0.9 : 1.7;
+        const BondUpdate update = problem.terms().update_bonds(u);
+        CHECK(update.changed > 0);
+        const std::vector<std::int32_t> moved{torn};
+        const EvaluationStatus renewed = problem.terms().renew_forces(u, moved, update.ends, force), anew = problem.evaluate_forces(u, whole, nullptr);
+        REQUIRE(renewed.ok() == anew.ok());
+        if (anew.ok()) CHECK(difference(body, force, whole) == 0);
+      }
+}
+
 TEST_CASE("kinematics: points without bonds are free masses") {
   for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})

@@ -68,8 +68,10 @@ Outcomes flip(int count, unsigned seed, bool alone) {
     CHECK_MESSAGE(reason(why) != "taken", why);
     ++outcomes.with_manifest[reason(why)];
     if (!alone) continue;
-    // Without a manifest nothing says what the bytes should be: the library is tried.
+    // Without a manifest nothing says what the bytes should be: the library is tried, and opened where its part is wanted.
     fs::remove(desk.path("parts/flipped.parts"));
+    const Result wanted = desk.perikit("describe " + part + " --plugin-path parts");
+    CHECK_MESSAGE((wanted.status == 0 || wanted.status == 2), wanted.err);
     const Result asked = desk.perikit("describe material/none --plugin-path parts");
     CHECK(asked.status == 2);
     CHECK_MESSAGE(contains(asked.err, "neo_hookean"), asked.err);   // the parts of others are there

@@ -207,7 +207,7 @@ TEST_CASE("a library is opened only when one of its parts is asked for, once") {
   CHECK(omega[1] == 1.0);
 }
 
-TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and the library is opened instead") {
+TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and the library is asked instead") {
   const Folder folder;
   const fs::path library = folder.copy("good", "good.so");
   const fs::path manifest = manifest_path(library);
@@ -218,6 +218,8 @@ TEST_CASE("a stale manifest is not believed, a bad one is refused by name, and t
     Registry registry;
     registry.add_folder(folder.path);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
+    CHECK(registry.opened().empty());   // asked in another process, and opened in this one when a part is wanted
+    CHECK(registry.describe(Kind::influence, "sound").summary == "omega = 1");
     CHECK(registry.opened().size() == 1);
     CHECK(registry.refused().empty());
   }

@@ -3,7 +3,9 @@
 #include <elf.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +18,8 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <sstream>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -79,20 +83,64 @@ std::optional<int> wait_for(pid_t child) {
   }
 }
 
+/// A file without a name, for what a child has to say: unlike a pipe it takes any length without a reader.
+class Report {
+ public:
+  Report() : file_(::memfd_create("perikit", MFD_CLOEXEC)) {
+    if (file_ < 0) throw Refusal(fmt::format("no memory to try it in: {}", std::strerror(errno)));
+  }
+  ~Report() { ::close(file_); }
+  Report(const Report&) = delete;
+  Report& operator=(const Report&) = delete;
+
+  bool write(std::string_view text) const noexcept {
+    return ::pwrite(file_, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
+  }
+  std::string read() const {
+    struct stat of{};
+    if (::fstat(file_, &of) != 0 || of.st_size < 0 || of.st_size > longest) return {};
+    std::string text(static_cast<std::size_t>(of.st_size), ' ');
+    return ::pread(file_, text.data(), text.size(), 0) == of.st_size ? text : std::string();
+  }
+
+ private:
+  static constexpr off_t longest = 1 << 20;   // [bytes]: far more parts than any library brings
+  int file_;
+};
+
+constexpr char refused = '!';   ///< begins the report of a library that is refused; others are a line "kind name" for each part
+
 /// noexcept: nothing may unwind into the parent's stack frames.
-[[noreturn]] void probe_in_child(const fs::path& file) noexcept {
+[[noreturn]] void probe_in_child(const fs::path& file, const Report& report) noexcept {
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) std::signal(signal, SIG_DFL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   const int silence = ::open("/dev/null", O_WRONLY);
   dup2(silence, STDOUT_FILENO);
   dup2(silence, STDERR_FILENO);
+  std::string text;
   try {
     PartCollector collector([](Kind, std::string_view) { return fs::path(); });
     load_library(file, collector);
-  } catch (const Refusal&) {  // the caller meets it again, and reports it
+    for (const auto& part : collector.parts) text += fmt::format("{} {}\n", name(part->kind()), part->description.name);
+  } catch (const Refusal& reason) {
+    text = refused + std::string(reason.what());
   }
-  _exit(probe_ended);
+  _exit(report.write(text) ? probe_ended : EXIT_FAILURE);
+}
+
+/// The parts in the report of a child, which may have written anything. Throws Refusal.
+std::vector<NamedPart> reported(const std::string& text) {
+  if (!text.empty() && text.front() == refused) throw Refusal(text.substr(1));
+  std::vector<NamedPart> parts;
+  std::istringstream lines(text);
+  for (std::string kind_name, part_name; lines >> kind_name >> part_name;) {
+    const auto kind = kind_from_name(kind_name);
+    if (!kind || !is_snake_case(part_name)) throw Refusal("the process that tries it reports no names of parts");
+    parts.push_back({*kind, part_name, {}});
+  }
+  if (parts.empty()) throw Refusal("it registers no part");
+  return parts;
 }
 
 }  // namespace
@@ -142,10 +190,11 @@ void load_library(const fs::path& file, Registrar& registrar) {
   }
 }
 
-void probe_library(const fs::path& file) {
+std::vector<NamedPart> probe_library(const fs::path& file) {
   check_file(file);
+  const Report report;
   const pid_t child = fork();
-  if (child == 0) probe_in_child(file);
+  if (child == 0) probe_in_child(file, report);
   if (child < 0) throw Refusal(fmt::format("no process to try it in: {}", std::strerror(errno)));
   const std::optional<int> ended = wait_for(child);
   if (!ended) throw Refusal(fmt::format("its registration does not come to an end (within {} s), or stops the process", registration_limit.count()));
@@ -154,6 +203,7 @@ void probe_library(const fs::path& file) {
   if (WEXITSTATUS(status) != probe_ended) {
     throw Refusal(fmt::format("it ends the process that loads it (exit status {})", WEXITSTATUS(status)));
   }
+  return reported(report.read());
 }
 
 }  // namespace perikit

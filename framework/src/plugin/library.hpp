@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "perikit/plugin/part.hpp"
+#include "plugin/manifest.hpp"
 
 namespace perikit {
 
@@ -25,8 +27,9 @@ void check_abi(int version, const std::string& build_id);
 /// Loads `file` for good, compares its C symbols and calls its registration function. Throws Refusal.
 void load_library(const std::filesystem::path& file, Registrar& registrar);
 
-/// Loads and registers `file` in a child process first. Throws Refusal unless the child comes to its own end: a file damaged
-/// inside, a library that crashes or exits in its static constructors or its registration, no process to be had.
-void probe_library(const std::filesystem::path& file);
+/// Loads and registers `file` in a child process, and returns what it registers, summaries left out. Throws Refusal where the child
+/// refuses it or does not come to its own end: a file damaged inside, a library that crashes or exits in its static constructors or
+/// its registration, no process to be had.
+std::vector<NamedPart> probe_library(const std::filesystem::path& file);
 
 }  // namespace perikit

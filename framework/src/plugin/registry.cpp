@@ -89,15 +89,13 @@ struct Registry::Implementation {
     return nullptr;
   }
 
-  void name_parts(const fs::path& library, const Manifest& manifest) {
-    check_file(library);
-    check_abi(manifest.abi, manifest.build_id);
-    for (const NamedPart& part : manifest.parts) {
+  void name_parts(const fs::path& library, const std::vector<NamedPart>& parts) {
+    for (const NamedPart& part : parts) {
       if (const fs::path first = owner(part.kind, part.name); !first.empty()) {
         throw Refusal(fmt::format("{} '{}': duplicate: {} already brings it", name(part.kind), part.name, first.string()));
       }
     }
-    for (const NamedPart& part : manifest.parts) of(part.kind)[part.name] = {library, nullptr};
+    for (const NamedPart& part : parts) of(part.kind)[part.name] = {library, nullptr};
   }
 
   void load(const fs::path& library) {
@@ -140,18 +138,20 @@ struct Registry::Implementation {
     opened.push_back(library);
   }
 
-  /// What a folder holds is taken where it is good; what is refused is only kept in `refused`.
+  /// What a folder holds is taken where it is good; what is refused is only kept in `refused`. Nothing is opened here, or a damaged
+  /// library that nobody asks for could bring the program down: one without a manifest is asked in a child process what it brings.
   void add_candidate(const fs::path& library) {
     if (!candidates.insert(library).second) return;
     try {
       if (const Manifest* manifest = manifest_of(library)) {
-        name_parts(library, *manifest);
+        check_file(library);
+        check_abi(manifest->abi, manifest->build_id);
+        name_parts(library, manifest->parts);
       } else {
-        open(library);
+        name_parts(library, probe_library(library));
       }
     } catch (const Refusal& reason) {
       refuse(library, reason.what());
-    } catch (const InputError&) {  // open has kept the reason
     }
   }
 

@@ -28,7 +28,7 @@ class Registry final : public PartFactory, public PartCatalogue {
   static std::vector<std::filesystem::path> standard_search_path(const std::vector<std::filesystem::path>& first);
 
   /// Adds every *.so below `folder` (not recursive) as a candidate: reads the manifest beside it (X.so -> X.parts) where there is
-  /// one, so that names are known without opening; opens the library at once where there is none.
+  /// one, so that names are known without opening; where there is none, a child process opens the library and reports them.
   /// A manifest of a file of another size is stale and ignored; the bytes are compared when the library is opened, and a file
   /// that has changed is tried in a child process first. What is refused is kept in `refused`; a folder
   /// that cannot be read throws InputError. Of two libraries that bring the same part, the second is refused.

@@ -22,6 +22,14 @@ Tensor<T, S> with_free_part(Tensor<T, S> a, const U& s) noexcept {
   return a;
 }
 
+/// Stress along the free axes by the strain along them where the others are held, of a linear law: lambda + 2 mu, of a bar, whose free axes
+/// strain together, 2 (lambda + mu). lambda over it is the lateral contraction.
+template <class S, class T>
+T free_modulus(const T& lambda, const T& mu) noexcept {
+  static_assert(S::dimension < 3);
+  return S::dimension == 2 ? T(lambda + 2.0 * mu) : T(2.0 * (lambda + mu));
+}
+
 /// The largest component.
 template <class S>
 Pack largest(const Tensor<Pack, S>& H) noexcept {
