@@ -51,22 +51,22 @@ class ThreadsModel final : public Observer {
  public:
   bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
-    const std::vector<std::vector<double>> loops = times_.take();
+    const std::vector<TimedLoop> loops = times_.take();
     const auto now = std::chrono::steady_clock::now();
     const double seconds = std::chrono::duration<double>(now - last_).count();
     if (report.step > 2 && seconds < whole_) {
       whole_ = seconds;
       double inside = 0;
       blocks_ = 0;
-      for (const std::vector<double>& loop : loops) {
+      for (const TimedLoop& loop : loops) {
         inside += makespan(loop, 1);
-        blocks_ += loop.size();
+        blocks_ += loop.seconds.size();
       }
       outside_ = std::max(0.0, seconds - inside);
       loops_ = loops.size();
       for (std::size_t k = 0; k < std::size(modelled_threads); ++k) {
         double total = outside_;
-        for (const std::vector<double>& loop : loops) total += makespan(loop, modelled_threads[k]);
+        for (const TimedLoop& loop : loops) total += makespan(loop, modelled_threads[k]);
         efficiency_[k] = seconds / (modelled_threads[k] * total);
       }
     }

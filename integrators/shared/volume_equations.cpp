@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "block_product.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -15,11 +17,23 @@ constexpr double schur_accuracy = 0.1;  // of the two solves with L: a better on
 constexpr double correction_accuracy = 0.05;
 constexpr int most_products = 200, most_corrections = 3;
 
+/// Sum of term(k) over [0, n), block by block in their order: not exact, but the same on any number of threads, and mixed systems are on one rank.
+template <class Term>
+double sum_of(std::size_t n, Term&& term) {
+  std::vector<double> sums(n / padding + 1, 0.0);
+  over_blocks(n, [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t k = begin; k < end; ++k) sum += term(k);
+    sums[begin / padding] = sum;
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 }  // namespace
 
 VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
     : problem_(problem), volumes_(std::move(volumes)) {
-  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &scaled_, &direction_, &product_,
+  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &direction_, &product_,
                         &first_, &second_})
     *scalar = problem.body().make_field(1);
   for (Field* vector : {&inverse_D_, &force_, &action_}) *vector = problem.make_field();
@@ -71,12 +85,14 @@ void VolumeEquations::forces(ConstFieldView q, FieldView f) const {
   mask(free_, f);
 }
 
-void VolumeEquations::multiply(ConstFieldView p, FieldView Lp) {
-  forces(p, force_);
-  mask(inverse_D_, force_);
-  rates(force_, Lp);
-  over_blocks(p.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) Lp.data[k] += inverse_W_.data()[k] * p.data[k];
+/// L p, and p . L p.
+double VolumeEquations::multiply(ConstFieldView p, FieldView Lp) {
+  volumes_->forces(p, force_);
+  mask(inverse_D_, force_);   // 0 on prescribed components
+  volumes_->rates(force_, Lp);
+  return sum_of(p.size(), [&](std::size_t k) {
+    Lp.data[k] = active_.data()[k] * Lp.data[k] + inverse_W_.data()[k] * p.data[k];
+    return p.data[k] * Lp.data[k];
   });
 }
 
@@ -91,31 +107,53 @@ void VolumeEquations::multiply_commutator(ConstFieldView p, FieldView Mp) {
   });
 }
 
+double VolumeEquations::scaled_square(ConstFieldView b) const {
+  return sum_of(b.size(), [&](std::size_t k) { return b.data[k] * (inverse_diagonal_.data()[k] * b.data[k]); });
+}
+
+/// Conjugate gradients with the diagonal of L, each step in as few passes over the fields as there are sums to wait for.
+void VolumeEquations::improve(double target, FieldView x) {
+  const std::size_t n = x.size();
+  double* const residual = residual_.data();
+  double* const direction = direction_.data();
+  const double* const scale = inverse_diagonal_.data();
+  double size = scaled_square(residual_), last = INFINITY;
+  for (int products = 0; products < most_products && size > target; ++products) {
+    over_blocks(n, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) direction[k] = scale[k] * residual[k] + (products > 0 ? size / last * direction[k] : 0.0);
+    });
+    const double step = size / multiply(direction_, product_);
+    last = size;
+    size = sum_of(n, [&](std::size_t k) {
+      x.data[k] += step * direction[k];
+      residual[k] -= step * product_.data()[k];
+      return residual[k] * (scale[k] * residual[k]);
+    });
+  }
+}
+
 void VolumeEquations::solve(ConstFieldView b, double accuracy, FieldView x) {
   fill(0.0, x);
   copy(b, residual_);
-  const auto scale = [&] {
-    copy(residual_, scaled_);
-    mask(inverse_diagonal_, scaled_);
-    return dot(residual_, scaled_);
-  };
-  double size = scale();
-  const double target = accuracy * accuracy * size;
-  copy(scaled_, direction_);
-  for (int k = 0; k < most_products && size > target; ++k) {
-    multiply(direction_, product_);
-    const double step = size / dot(direction_, product_), last = size;
-    combine(1, x, step, direction_, x);
-    combine(1, residual_, -step, product_, residual_);
-    size = scale();
-    combine(1, scaled_, size / last, direction_, direction_);
-  }
+  improve(accuracy * accuracy * scaled_square(b), x);
 }
 
 void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
   solve(r, schur_accuracy, first_);
   multiply_commutator(first_, second_);
-  solve(second_, schur_accuracy, p);
+  // The second solve begins at the multiple of the first one's result that is best in the norm of L: L first is what its residual lacks.
+  const std::size_t n = r.size();
+  const auto of_first = [&](std::size_t k) { return r.data[k] - residual_.data()[k]; };
+  const double wanted = sum_of(n, [&](std::size_t k) { return second_.data()[k] * first_.data()[k]; }),
+               own = sum_of(n, [&](std::size_t k) { return of_first(k) * first_.data()[k]; });
+  const double share = own > 0 ? wanted / own : 0.0;
+  over_blocks(n, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      p.data[k] = share * first_.data()[k];
+      residual_.data()[k] = second_.data()[k] - share * of_first(k);
+    }
+  });
+  improve(schur_accuracy * schur_accuracy * scaled_square(second_), p);
 }
 
 std::pair<double, double> VolumeEquations::correct(ConstFieldView u, double enough, FieldView du) {

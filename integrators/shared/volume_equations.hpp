@@ -48,10 +48,14 @@ class VolumeEquations {
   std::pair<double, double> correct(ConstFieldView u, double enough, FieldView du);
 
  private:
-  void multiply(ConstFieldView p, FieldView Lp);
+  double multiply(ConstFieldView p, FieldView Lp);
   void multiply_commutator(ConstFieldView p, FieldView Mp);
-  /// x <- L^-1 b to `accuracy`, by conjugate gradients.
+  /// b . diag(L)^-1 b
+  double scaled_square(ConstFieldView b) const;
+  /// x <- L^-1 b until the scaled square of the residual is that of b times accuracy^2.
   void solve(ConstFieldView b, double accuracy, FieldView x);
+  /// The same from an x whose residual is in residual_, until its scaled square is at most `target`.
+  void improve(double target, FieldView x);
 
   Problem& problem_;
   std::unique_ptr<VolumetricPart> volumes_;
@@ -61,7 +65,7 @@ class VolumeEquations {
   Field inverse_D_;         ///< 0 on prescribed components
   Field inverse_diagonal_;  ///< of L
   Field force_, action_;
-  Field residual_, scaled_, direction_, product_;  ///< of conjugate gradients
+  Field residual_, direction_, product_;  ///< of conjugate gradients
   Field first_, second_;
 };
 

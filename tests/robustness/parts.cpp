@@ -52,6 +52,18 @@ TEST_CASE("parts: a registration that stops or never ends is refused, and every 
     CHECK_MESSAGE(contains(asked.err, name + ".so (its registration does not come to an end"), asked.err);
 }
 
+TEST_CASE("parts: a crash is laid at the door of the libraries that nothing vouches for, and they are opened only where they are wanted") {
+  const Desk desk;
+  bring(desk, "crasher");
+  const Result wanted = desk.perikit("run scene.toml --quiet -o out --plugin-path parts --set family.influence=crasher");
+  CHECK(wanted.status == 1);
+  CHECK_MESSAGE(contains(wanted.err, "crashed after it had opened libraries that have no manifest"), wanted.err);
+  CHECK_MESSAGE(contains(wanted.err, "parts/crasher.so"), wanted.err);
+  const Result list = desk.perikit("list influence --plugin-path parts");
+  CHECK(list.status == 0);
+  CHECK_MESSAGE(contains(list.out, "crasher"), list.out);
+}
+
 TEST_CASE("parts: a manifest that lies costs its own parts alone") {
   const Desk desk;
   bring(desk, "company");

@@ -94,19 +94,22 @@ TEST_CASE("colours of tiles: of one colour they are disjoint when grown by the r
 }
 
 TEST_CASE("times of loops: each index once, and how long they take on more threads") {
-  CHECK(makespan({3, 1, 1, 1}, 2) == 3);
-  CHECK(makespan({1, 1, 1, 3}, 2) == 4);   // in their order
-  CHECK(makespan({1, 2, 3}, 1) == 6);
-  CHECK(makespan({1, 2, 3}, 64) == 3);
+  CHECK(makespan({{3, 1, 1, 1}, {}}, 2) == 3);
+  CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);   // in their order
+  CHECK(makespan({{1, 2, 3}, {}}, 1) == 6);
+  CHECK(makespan({{1, 2, 3}, {}}, 64) == 3);
   CHECK(makespan({}, 4) == 0);
+  CHECK(makespan({{3, 1, 2, 1}, {{}, {}, {1}, {0, 2}}}, 2) == 4);
+  CHECK(makespan({{1, 1, 1}, {{}, {0}, {1}}}, 64) == 3);
   LoopTimes times;
   std::vector<int> seen(7, 0);
   parallel_for(seen.size(), [&](std::size_t i) { ++seen[i]; });
   const auto loops = times.take();
   CHECK(seen == std::vector<int>(7, 1));
   REQUIRE(loops.size() == 1);
-  CHECK(loops[0].size() == 7);
-  for (const double seconds : loops[0]) CHECK(seconds >= 0);
+  CHECK(loops[0].seconds.size() == 7);
+  CHECK(loops[0].waits_for.empty());
+  for (const double seconds : loops[0].seconds) CHECK(seconds >= 0);
   CHECK(times.take().empty());
 }
 

@@ -1,12 +1,9 @@
 #include "assembly/volumetric_rows.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <type_traits>
 
-#include "assembly/assembly.hpp"
+#include "assembly/volumetric_state.hpp"
 #include "perikit/core/dimension.hpp"
-#include "perikit/core/tensor.hpp"
 #include "spaces/shift.hpp"
 
 namespace perikit {
@@ -22,36 +19,30 @@ Vector widened(const Entry& b) noexcept {
 }
 
 template <int D>
-class Rows final : public VolumetricRows {
-  using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
-  using T = Tensor<double, S>;
+class StoredRows final : public VolumetricState<D> {
+  using Base = VolumetricState<D>;
+  using typename Base::Memory;
+  using typename Base::T;
+  using Base::rows_;
 
  public:
-  explicit Rows(const SpaceParts& parts)
-      : parts_(parts),
-        rows_(parts.families),
-        own_(rows_.size()),
-        row_(rows_.bonds()),
-        column_(rows_.bonds()),
-        H_(rows_.size()),
-        share_(rows_.size()),
-        logarithms_(rows_.body().make_field(1)),
-        stiffness_(rows_.body().make_field(1)) {
+  explicit StoredRows(const SpaceParts& parts)
+      : Base(parts), own_(rows_.size()), row_(rows_.bonds()), column_(rows_.bonds()) {
     for (const std::int32_t j : rows_.lists().neighbour)
       far_.push_back(static_cast<std::int32_t>(rows_.point(static_cast<std::size_t>(j))));
   }
 
   std::int64_t linearise(ConstFieldView u) override {
-    memory_.prepare([] { return std::make_unique<Memory>(); });
+    this->memory_.prepare([] { return std::make_unique<Memory>(); });
     FirstBad bad;
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        if (!make_row(i, u, memory_.mine())) return bad.report(static_cast<std::int64_t>(rows_.point(i)));
-      const std::int64_t point = find_stiffness(begin, end, memory_.mine());
+        if (!make_row(i, u, this->memory_.mine())) return bad.report(static_cast<std::int64_t>(rows_.point(i)));
+      const std::int64_t point = this->find_stiffness(begin, end, this->memory_.mine());
       if (point >= 0) bad.report(point);
     });
     if (bad.point() >= 0) return bad.point();
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) transpose_row(i);
     });
     return -1;
@@ -59,10 +50,10 @@ class Rows final : public VolumetricRows {
 
   void rates(ConstFieldView w, FieldView q) const override {
     mirror_.resize(rows_.body().stride());
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) mirror_[rows_.point(i)] = vector_at(w, rows_.point(i));
     });
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Vector sum = own_[i] * mirror_[rows_.point(i)];
         each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * mirror_[far]; });
@@ -72,7 +63,7 @@ class Rows final : public VolumetricRows {
   }
 
   void forces(ConstFieldView q, FieldView f) const override {
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t p = rows_.point(i);
         Vector sum = own_[i] * q.data[p];
@@ -83,7 +74,7 @@ class Rows final : public VolumetricRows {
   }
 
   void squares(ConstFieldView c, FieldView q) const override {
-    over_batches([&](std::size_t begin, std::size_t end) {
+    this->over_batches([&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t p = rows_.point(i);
         Vector sum = own_[i] * own_[i] * vector_at(c, p);
@@ -93,25 +84,7 @@ class Rows final : public VolumetricRows {
     });
   }
 
-  ConstFieldView logarithms() const override { return logarithms_; }
-  ConstFieldView stiffness() const override { return stiffness_; }
-
  private:
-  struct Memory {
-    FamilyArrays family;
-    std::vector<double> g;
-    LawScratch law;
-    alignas(64) double H[9 * batch_points] = {}, F[9 * batch_points] = {}, P[9 * batch_points], dP[9 * batch_points];
-    std::int32_t owner[batch_points];
-  };
-
-  template <class Body>
-  void over_batches(Body&& body) const {
-    constexpr auto batch = static_cast<std::size_t>(batch_points);
-    const std::size_t n = rows_.size();
-    parallel_for((n + batch - 1) / batch, [&](std::size_t b) { body(b * batch, std::min(n, (b + 1) * batch)); });
-  }
-
   template <class Visit>
   void each(std::size_t i, const std::vector<Entry>& entries, Visit&& visit) const {
     for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) visit(entries[k], static_cast<std::size_t>(far_[k]));
@@ -127,8 +100,8 @@ class Rows final : public VolumetricRows {
   /// b_ij = Fbar_i^-T g_ij; false where Jbar_i <= 0.
   bool make_row(std::size_t i, ConstFieldView u, Memory& m) {
     rows_.load(i, m.family);
-    point_gradient(m.family, rows_.body().horizon(), parts_.formulation.order, m.g);
-    if (parts_.shift.data) shift_gradient(m.family, rows_.point(i), parts_.shift, m.g);
+    point_gradient(m.family, rows_.body().horizon(), this->parts_.formulation.order, m.g);
+    if (this->parts_.shift.data) shift_gradient(m.family, rows_.point(i), this->parts_.shift, m.g);
     const std::size_t p = rows_.point(i), first = rows_.first(i);
     const auto neighbours = rows_.neighbours(i);
     T H{};
@@ -139,12 +112,8 @@ class Rows final : public VolumetricRows {
         for (int e = 0; e < D; ++e) H(c, e) += (u.component(c)[q] - u.component(c)[p]) * m.g[k * D + static_cast<std::size_t>(e)];
       for (std::size_t e = 0; e < D; ++e) regular |= m.g[k * D + e] != 0;
     }
-    H_[i] = H;
-    share_[i] = regular ? parts_.families.left(p) : 0.0;
-    const double j = jacobian_minus_one(H), J = 1 + j;
-    if (!(J > 0)) return false;
-    logarithms_.data()[p] = std::log1p(j);
-    const T inverse_transpose = 1 / J * cofactor(add_diagonal(H, 1.0));
+    T inverse_transpose{};
+    if (!this->keep(p, H, regular ? this->parts_.families.left(p) : 0.0, inverse_transpose)) return false;
     own_[i] = Vector{};
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Entry entry{};
@@ -159,36 +128,6 @@ class Rows final : public VolumetricRows {
     return true;
   }
 
-  /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. What a torn family
-  /// shares in the volumes of its evaluation points is c (maps/selective_map.hpp).
-  std::int64_t find_stiffness(std::size_t begin, std::size_t end, Memory& m) {
-    const int n = static_cast<int>(end - begin);
-    for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
-      const T H = l < n ? H_[begin + static_cast<std::size_t>(l)] : T{}, F = add_diagonal(H, 1.0);
-      for (int c = 0; c < S::components; ++c) m.H[c * batch_points + l] = H[c], m.F[c * batch_points + l] = l < n ? F[c] : 0.0;
-      m.owner[l] = static_cast<std::int32_t>(rows_.point(begin + static_cast<std::size_t>(std::min(l, n - 1))));
-    }
-    parts_.laws.prepare(m.law, false);
-    LawBatch batch;
-    batch.n = n;
-    batch.H = m.H;
-    batch.dH = m.F;
-    batch.points = m.owner;
-    batch.P = m.P;
-    batch.dP = m.dP;
-    const Status status = parts_.laws.evaluate(batch, m.law);
-    if (!status.ok()) return m.owner[status.inadmissible];
-    for (int l = 0; l < n; ++l) {
-      const std::size_t i = begin + static_cast<std::size_t>(l), p = rows_.point(i);
-      double sum = 0;
-      for (int c = 0; c < S::components; ++c)
-        sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
-      const double weight = rows_.volume(i) * (1 - parts_.families.damage(p));
-      stiffness_.data()[p] = weight * share_[i] * share_[i] * std::max(0.0, sum / 9);
-    }
-    return -1;
-  }
-
   /// b_ji of the neighbours j: families are symmetric.
   void transpose_row(std::size_t i) {
     for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) {
@@ -199,23 +138,20 @@ class Rows final : public VolumetricRows {
     }
   }
 
-  SpaceParts parts_;
-  BlockRows rows_;
   AlignedVector<Vector> own_;      ///< b_ii
   std::vector<std::int32_t> far_;  ///< field index by bond
   mutable AlignedVector<Vector> mirror_;
   std::vector<Entry> row_, column_;  ///< b_ij, b_ji by bond
-  std::vector<T> H_;                 ///< Fbar - I at the state of the rows
-  std::vector<double> share_;        ///< c of the selective map
-  Field logarithms_, stiffness_;
-  PerThread<Memory> memory_;
 };
 
 }  // namespace
 
 std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts) {
-  return with_dimension(parts.families.body().dimension(),
-                        [&](auto d) -> std::unique_ptr<VolumetricRows> { return std::make_unique<Rows<d>>(parts); });
+  const bool plain = parts.families.lattice() && parts.formulation.order == 1 && !parts.shift.data;
+  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<VolumetricRows> {
+    if (plain) return make_lattice_volumes<d>(parts);
+    return std::make_unique<StoredRows<d>>(parts);
+  });
 }
 
 }  // namespace perikit

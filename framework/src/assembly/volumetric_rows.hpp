@@ -1,5 +1,5 @@
 #pragma once
-/// B of VolumetricPart as sparse rows, for lattices and clouds.
+/// B of VolumetricPart, for lattices and clouds.
 
 #include <memory>
 #include <vector>
@@ -10,8 +10,9 @@
 
 namespace perikit {
 
-/// Row i of B: b_ij = Fbar_i^-T g_ij by neighbour and b_ii = -sum_j b_ij, g_ij the stencil of the point gradient. Entries are of
-/// single precision: products with them are limited by memory. B^T has the same numbers, so that both remain adjoint.
+/// Row i of B: b_ij = Fbar_i^-T g_ij by neighbour and b_ii = -sum_j b_ij, g_ij the stencil of the point gradient. Lattices need not store
+/// them; elsewhere entries are of single precision, since products with them are limited by memory. B^T has the same numbers, so that both
+/// remain adjoint.
 class VolumetricRows {
  public:
   virtual ~VolumetricRows() = default;

@@ -1,5 +1,5 @@
 #pragma once
-/// The threads of one loop: GCC's OpenMP, or, for the thread sanitizer, std::thread. The sanitizer does not see the barriers of the OpenMP
+/// The threads of one loop, each of which takes indices in ascending order: GCC's OpenMP, or, for the thread sanitizer, std::thread. The sanitizer does not see the barriers of the OpenMP
 /// runtime, which is built without it, and would call every value that one loop writes and a later one reads a race.
 
 #include <omp.h>
@@ -34,7 +34,7 @@ inline void team_for(int threads, std::size_t n, void* context, void (*body)(voi
 inline int team_index() noexcept { return omp_get_thread_num(); }
 
 inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t)) {
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+#pragma omp parallel for schedule(monotonic : dynamic, 1) num_threads(threads)
   for (std::size_t i = 0; i < n; ++i) body(context, i);
 }
 

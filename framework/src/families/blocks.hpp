@@ -1,6 +1,7 @@
 #pragma once
 /// Fixed blocks of work, which of them reach which, and their colours: blocks of one colour touch disjoint sets of points, so that
-/// they may scatter at the same time, and colours run one after the other, so that sums never depend on the number of threads.
+/// they may scatter at the same time. Blocks that may touch the same points scatter in the order of their colours, so that sums never
+/// depend on the number of threads.
 
 #include <cstdint>
 #include <vector>
@@ -21,18 +22,18 @@ class Colouring {
   Colouring() = default;
   explicit Colouring(const BlockReach& reach);
   /// Given colours, by block.
-  explicit Colouring(const std::vector<std::int32_t>& colour_of);
+  Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of);
 
+  /// body(b) for all blocks. A block does not wait for a whole colour, only for those of lower colours that touch what it touches.
   template <class Body>
   void for_each(Body&& body) const {
-    for (const std::vector<std::int32_t>& colour : colours_) {
-      parallel_for(colour.size(), [&](std::size_t i) { body(static_cast<std::size_t>(colour[i])); });
-    }
+    parallel_for(order_, [&](std::size_t i) { body(static_cast<std::size_t>(blocks_[i])); });
   }
-  std::size_t colours() const noexcept { return colours_.size(); }
-
+  std::size_t colours() const noexcept { return colours_; }
  private:
-  std::vector<std::vector<std::int32_t>> colours_;
+  std::size_t colours_ = 0;
+  std::vector<std::int32_t> blocks_;   ///< colour by colour
+  mutable LoopOrder order_;            ///< of `blocks_`
 };
 
 }  // namespace perikit

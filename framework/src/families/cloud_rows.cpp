@@ -40,7 +40,7 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
 
 Colouring cloud_colouring(const Body& body, const BlockReach& reach, std::size_t block_points) {
   const std::vector<std::int32_t>* prescribed = body.block_colours(block_points);
-  return prescribed ? Colouring(*prescribed) : Colouring(reach);
+  return prescribed ? Colouring(reach, *prescribed) : Colouring(reach);
 }
 
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {

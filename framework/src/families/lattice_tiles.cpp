@@ -101,7 +101,7 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }
-  colouring = Colouring(of_blocks);
+  colouring = Colouring(reach, of_blocks);
 }
 
 bool LatticeTiles::moves(std::size_t b, ConstFieldView u) const noexcept {

@@ -108,11 +108,13 @@ class Report {
   int file_;
 };
 
+constexpr int crash_signals[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
+
 constexpr char refused = '!';   ///< begins the report of a library that is refused; others are a line "kind name" for each part
 
 /// noexcept: nothing may unwind into the parent's stack frames.
 [[noreturn]] void probe_in_child(const fs::path& file, const Report& report) noexcept {
-  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) std::signal(signal, SIG_DFL);
+  for (const int signal : crash_signals) std::signal(signal, SIG_DFL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   const int silence = ::open("/dev/null", O_WRONLY);
@@ -143,7 +145,32 @@ std::vector<NamedPart> reported(const std::string& text) {
   return parts;
 }
 
+/// What is written in a crash, when nothing can be put together any more.
+struct LastWords {
+  char text[4096];
+  std::size_t length = 0;
+
+  void add(std::string_view words) noexcept {
+    const std::size_t n = std::min(words.size(), sizeof text - length);
+    std::memcpy(text + length, words.data(), n);
+    length += n;
+  }
+} last_words;
+
+void end_in_crash(int) {
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, last_words.text, last_words.length);
+  constexpr char end[] = "\n";
+  [[maybe_unused]] const ssize_t ended = ::write(STDERR_FILENO, end, 1);
+  ::_exit(EXIT_FAILURE);
+}
+
 }  // namespace
+
+void suspect_in_crashes(const fs::path& file) {
+  last_words.add(last_words.length == 0 ? "perikit crashed after it had opened libraries that have no manifest, one of which may be damaged: " : ", ");
+  last_words.add(file.string());
+  for (const int signal : crash_signals) std::signal(signal, end_in_crash);
+}
 
 void check_file(const fs::path& file) {
   std::error_code unreadable;

@@ -32,4 +32,8 @@ void load_library(const std::filesystem::path& file, Registrar& registrar);
 /// its registration, no process to be had.
 std::vector<NamedPart> probe_library(const std::filesystem::path& file);
 
+/// From now on a crash of this process ends it with status 1 and a message that names `file`, and all others for which this was called:
+/// libraries whose bytes no manifest vouches for. Without such a library signals are left alone.
+void suspect_in_crashes(const std::filesystem::path& file);
+
 }  // namespace perikit

@@ -110,6 +110,7 @@ struct Registry::Implementation {
                                   manifest_path(library).filename().string()));
       forget(library);
       probe_library(library);
+      suspect_in_crashes(library);
     }
     PartCollector collector([&](Kind kind, std::string_view name) {
       const fs::path first = owner(kind, name);

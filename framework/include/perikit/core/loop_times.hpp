@@ -1,11 +1,18 @@
 #pragma once
 /// How long each block of each parallel loop takes, and what that makes on more threads than this machine has.
 
+#include <cstdint>
 #include <vector>
 
 namespace perikit {
 
-/// While one of these lives, loops run on one thread and the seconds of each of their indices are kept, loop by loop. One at a time.
+/// A loop: the seconds of each index, and which indices it waits for (empty: none wait).
+struct TimedLoop {
+  std::vector<double> seconds;
+  std::vector<std::vector<std::int32_t>> waits_for;
+};
+
+/// While one of these lives, loops run on one thread and are kept. One at a time.
 class LoopTimes {
  public:
   LoopTimes();
@@ -14,11 +21,11 @@ class LoopTimes {
   LoopTimes& operator=(const LoopTimes&) = delete;
 
   /// The loops since the last call.
-  std::vector<std::vector<double>> take();
+  std::vector<TimedLoop> take();
 };
 
-/// Seconds until the last thread is done when threads take blocks in their order, each the next one as soon as it is free, as
-/// parallel_for hands them out. Starting and ending the loop costs nothing here.
-double makespan(const std::vector<double>& blocks, int threads);
+/// Seconds until the last thread is done when threads take indices in their order, each the next one as soon as it is free, and wait
+/// with it for what it waits for, as parallel_for does. Starting and ending the loop costs nothing here.
+double makespan(const TimedLoop& loop, int threads);
 
 }  // namespace perikit

@@ -2,8 +2,13 @@
 /// The one place that starts threads. Bodies must not throw; loops are over fixed blocks, so results never depend on the
 /// number of threads.
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <type_traits>
+#include <vector>
 
 namespace perikit {
 
@@ -13,14 +18,47 @@ void set_thread_count(int n) noexcept;
 /// 0 ... thread_count() - 1 inside a parallel_for, else 0: for choosing scratch memory, never for choosing work.
 int thread_index() noexcept;
 
+/// Which indices of a loop wait for which: an index begins when all those that it waits for have ended. What two of them do to the same
+/// memory comes in the order of the indices where one waits for the other, if only by way of others, on any number of threads.
+class LoopOrder {
+ public:
+  LoopOrder() = default;
+  /// By index: those that it waits for, lower ones.
+  explicit LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for);
+
+  std::size_t size() const noexcept { return first_.size() - 1; }
+  std::span<const std::int32_t> waits_for(std::size_t i) const noexcept {
+    return std::span(waits_for_).subspan(static_cast<std::size_t>(first_[i]), static_cast<std::size_t>(first_[i + 1] - first_[i]));
+  }
+
+  /// For parallel_for: a new round, in which nothing has ended yet; wait until `i` may begin; it has ended.
+  void begin() noexcept { ++round_; }
+  void wait(std::size_t i) const noexcept;
+  void end(std::size_t i) noexcept { ended_[i].store(round_, std::memory_order_release); }
+
+ private:
+  std::vector<std::int64_t> first_{0};
+  std::vector<std::int32_t> waits_for_;
+  std::unique_ptr<std::atomic<std::uint32_t>[]> ended_;   ///< the last round in which it did
+  std::uint32_t round_ = 0;
+};
+
 namespace detail {
 void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t));
-}
+void parallel_for(LoopOrder& order, void* context, void (*body)(void*, std::size_t));
+}  // namespace detail
 
 /// body(i) for i in [0, n), in any order, on all threads. body must be noexcept in effect.
 template <class Body>
 void parallel_for(std::size_t n, Body&& body) {
   detail::parallel_for(n, &body,
+                       [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
+}
+
+/// body(i) for i in [0, order.size()), those that wait for others after them.
+template <class Body>
+void parallel_for(LoopOrder& order, Body&& body) {
+  detail::parallel_for(order, &body,
                        [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
 }
 

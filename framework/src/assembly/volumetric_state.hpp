@@ -1,0 +1,112 @@
+#pragma once
+/// What VolumetricRows keep of every point, whatever their products are made of.
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "assembly/assembly.hpp"
+#include "assembly/volumetric_rows.hpp"
+#include "perikit/core/tensor.hpp"
+
+namespace perikit {
+
+template <int D>
+class VolumetricState : public VolumetricRows {
+ public:
+  ConstFieldView logarithms() const final { return logarithms_; }
+  ConstFieldView stiffness() const final { return stiffness_; }
+
+ protected:
+  using S = std::conditional_t<D == 3, Solid, std::conditional_t<D == 2, Plane, Line>>;
+  using T = Tensor<double, S>;
+
+  /// Memory of a thread.
+  struct Memory {
+    FamilyArrays family;
+    std::vector<double> g;
+    LawScratch law;
+    alignas(64) double H[9 * batch_points] = {}, F[9 * batch_points] = {}, P[9 * batch_points], dP[9 * batch_points];
+    std::int32_t owner[batch_points];
+  };
+
+  explicit VolumetricState(const SpaceParts& parts)
+      : parts_(parts),
+        rows_(parts.families),
+        H_(rows_.body().make_field(D * D)),
+        share_(rows_.body().make_field(1)),
+        logarithms_(rows_.body().make_field(1)),
+        stiffness_(rows_.body().make_field(1)) {}
+
+  /// Block rows in batches of the law.
+  template <class Body>
+  void over_batches(Body&& body) const {
+    constexpr auto batch = static_cast<std::size_t>(batch_points);
+    const std::size_t n = rows_.size();
+    parallel_for((n + batch - 1) / batch, [&](std::size_t b) { body(b * batch, std::min(n, (b + 1) * batch)); });
+  }
+
+  /// Fbar - I of point p.
+  T gradient(std::size_t p) const noexcept {
+    T H{};
+    for (int c = 0; c < D * D; ++c) H(c / D, c % D) = H_.component(c)[p];
+    return H;
+  }
+
+  /// Keeps Fbar - I of point p, and its share c in the volumes of evaluation points (maps/selective_map.hpp). Fbar^-T; false where
+  /// Jbar <= 0.
+  bool keep(std::size_t p, const T& H, double share, T& inverse_transpose) noexcept {
+    for (int c = 0; c < D * D; ++c) H_.component(c)[p] = H(c / D, c % D);
+    share_.data()[p] = share;
+    const double j = jacobian_minus_one(H);
+    if (!(j > -1)) return false;
+    logarithms_.data()[p] = std::log1p(j);
+    inverse_transpose = 1 / (1 + j) * cofactor(add_diagonal(H, 1.0));
+    return true;
+  }
+
+  /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. Field index of a point
+  /// where the law has none, or -1.
+  std::int64_t find_stiffness(std::size_t begin, std::size_t end, Memory& m) {
+    const int n = static_cast<int>(end - begin);
+    for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
+      const T H = l < n ? gradient(rows_.point(begin + static_cast<std::size_t>(l))) : T{}, F = add_diagonal(H, 1.0);
+      for (int c = 0; c < S::components; ++c) m.H[c * batch_points + l] = H[c], m.F[c * batch_points + l] = l < n ? F[c] : 0.0;
+      m.owner[l] = static_cast<std::int32_t>(rows_.point(begin + static_cast<std::size_t>(std::min(l, n - 1))));
+    }
+    parts_.laws.prepare(m.law, false);
+    LawBatch batch;
+    batch.n = n;
+    batch.H = m.H;
+    batch.dH = m.F;
+    batch.points = m.owner;
+    batch.P = m.P;
+    batch.dP = m.dP;
+    const Status status = parts_.laws.evaluate(batch, m.law);
+    if (!status.ok()) return m.owner[status.inadmissible];
+    for (int l = 0; l < n; ++l) {
+      const std::size_t i = begin + static_cast<std::size_t>(l), p = rows_.point(i);
+      double sum = 0;
+      for (int c = 0; c < S::components; ++c)
+        sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
+      const double weight = rows_.volume(i) * (1 - parts_.families.damage(p)), share = share_.data()[p];
+      stiffness_.data()[p] = weight * share * share * std::max(0.0, sum / 9);
+    }
+    return -1;
+  }
+
+  SpaceParts parts_;
+  BlockRows rows_;
+  mutable PerThread<Memory> memory_;
+
+ private:
+  Field H_;                        ///< Fbar - I at the state of the rows
+  Field share_;                    ///< c of the selective map
+  Field logarithms_, stiffness_;
+};
+
+/// On a lattice, with point gradients of order 1: products of whole rows of points, without stored stencils.
+template <int D>
+std::unique_ptr<VolumetricRows> make_lattice_volumes(const SpaceParts& parts);
+
+}  // namespace perikit
