@@ -19,7 +19,7 @@ KINEMATICS = {
     "baqp": 'type = "baqp"',
     "baqp, order 2": 'type = "baqp"\norder = 2',
     "projection": 'type = "projection"',
-    "bond_augmented": 'type = "bond_augmented"\nlambda = 0.7',
+    "bond_augmented": 'type = "bond_augmented"\nlambda = 1.3',
     "non_spherical": 'type = "non_spherical"',
     "sub_horizon": 'type = "sub_horizon"',
     "bond_associated": 'type = "bond_associated"',
@@ -39,6 +39,56 @@ CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
 def with_inclusion(text):
     return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
+
+
+def with_face(text):
+    """The layer of held points becomes a face that moves as it did."""
+    begin, end = text.index("[[boundary]]"), text.index("[[load]]")
+    motion = text[text.index("displacement = ", begin):end]
+    return text[:begin] + '[[boundary]]\nset = "all"\nface = "-x"\n' + motion + text[end:]
+
+
+SYMMETRY = '[[symmetry]]\naxis = "y"\n'
+BEYOND = {
+    "face": with_face,
+    "face and symmetry": lambda text: with_face(text) + SYMMETRY,
+    "two planes of symmetry": lambda text: text + SYMMETRY + '[[symmetry]]\naxis = "x"\n',
+    "periodic": lambda text: text + '[[periodic]]\naxis = "y"\n',
+}
+
+
+def pressed(text, where, follower):
+    """A pressure in place of the force."""
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    return text[:begin] + '[[load]]\n%s\npressure = "0.02 + 0.01*t"\nfollower = %s\n' % (where, "true" if follower else "false") + text[end:]
+
+
+def beyond(everything):
+    """Held faces, planes of symmetry and periodic sides; pressures beside them."""
+    if not everything:
+        yield "baqp, face and symmetry, cloud", BEYOND["face and symmetry"](scene(KINEMATICS["baqp"], 2, True))
+        yield "bond_based, torn, periodic", BEYOND["periodic"](torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], False))
+        yield "projection, pressure, symmetry", pressed(scene(KINEMATICS["projection"], 2), 'set = "all"', True) + SYMMETRY
+        return
+    for (name, kinematics), (plane, change), cloud in itertools.product(KINEMATICS.items(), BEYOND.items(), (False, True)):
+        yield "%s, %s, %s" % (name, plane, "cloud" if cloud else "lattice"), change(scene(kinematics, 2, cloud))
+    for (plane, change), cloud in itertools.product(BEYOND.items(), (False, True)):
+        kind = "%s, %s" % (plane, "cloud" if cloud else "lattice")
+        for name in ("bond_based", "silling", "baqp"):
+            yield "%s, torn, %s" % (name, kind), change(torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud))
+        for name in ("bond_based", "ordinary", "projection"):
+            yield "%s, inclusion, %s" % (name, kind), change(with_inclusion(scene(KINEMATICS[name], 2, cloud)) + CRACK)
+        yield "conventional, hypoelastic, " + kind, change(scene(KINEMATICS["conventional"], 2, cloud, material=HYPOELASTIC))
+        yield "projection, 3D, " + kind, change(scene(KINEMATICS["projection"], 3, cloud))
+    for name, cloud in itertools.product(("conventional", "bond_based"), (False, True)):
+        yield "%s, face, 1D %s" % (name, "cloud" if cloud else "lattice"), with_face(scene(KINEMATICS[name], 1, cloud))
+    for where, follower, cloud in itertools.product(('set = "all"', 'set = "high"\nface = "+x"'), (False, True), (False, True)):
+        for name in ("conventional", "baqp") + (() if cloud or follower else ("ordinary",)):
+            kind = "%s, %s, %s, %s" % (name, where.replace("\n", " "), "following" if follower else "fixed", "cloud" if cloud else "lattice")
+            text = pressed(scene(KINEMATICS[name], 2, cloud), where, follower)
+            yield "pressure, " + kind, text
+            yield "pressure, symmetry, " + kind, text + SYMMETRY
+            yield "pressure, periodic, " + kind, BEYOND["periodic"](text)
 
 
 def torn(kinematics, damage, cloud):
@@ -72,6 +122,8 @@ def cases(everything):
     for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
+    for name, text in beyond(everything):
+        yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
 

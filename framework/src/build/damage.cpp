@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -161,15 +162,15 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, partition, *damage);
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
-  if (images)
-    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
-      if (field->size() > 0) images->copy_from_sources(*field);
+  const std::array limits_of_points{&damage->onset, &damage->failure, &damage->crack_speed};
   if (partition) {
     Ghosts ghosts(*partition, body, 1);
-    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+    for (Field* field : limits_of_points)
       if (field->size() > 0) ghosts.forward(*field);
     equal = communicator().largest(equal ? 0 : 1) == 0;
   }
+  for (Field* field : limits_of_points)
+    if (images && field->size() > 0) images->copy_from_sources(*field);
   if (equal) damage->failure = Field();
   return damage;
 }

@@ -43,6 +43,7 @@ namespace {
 
 /// A failure on one rank is one on all of them, which must say the same: that of the point that comes first.
 void agree(EvaluationStatus& status) {
+  if (communicator().size() == 1 || communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return;
   std::vector<std::byte> mine;
   if (!status.ok()) {
     ByteWriter out;
@@ -79,10 +80,8 @@ ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) {
 void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
   if (images() && status.ok()) images()->fold(force);
   if (!ghosts_) return;
-  if (communicator().largest(status.ok() ? 0.0 : 1.0) != 0)
-    agree(status);
-  else
-    ghosts_->clear(force);
+  agree(status);
+  if (status.ok()) ghosts_->clear(force);
 }
 
 template <class Fill>
@@ -120,13 +119,22 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
 EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldView force) {
   if (!loads().follow()) {
     loads().evaluate(t, force);
+    if (ghosts_ && images()) ghosts_->clear(force);
     return {};
   }
   PointSamples samples;
   EvaluationStatus status = terms().sample(seen(u, seen_), samples);
+  agree(status);
   if (!status.ok()) return status;
+  if (ghosts_ && images()) {
+    // Sources may be ghosts. As many components at a time as displacements have.
+    const FieldView H = samples.H;
+    for (int c = 0; c < H.components; c += dimension())
+      ghosts_->forward({H.component(c), H.stride, std::min(dimension(), H.components - c)});
+  }
   if (images()) images()->mirror_gradients(samples.H);
   loads().evaluate(t, force, &samples.H);
+  if (ghosts_) ghosts_->clear(force);
   return status;
 }
 
@@ -257,9 +265,10 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
 
 namespace {
 
-/// What laws remember, rank by rank: evaluation points have numbers of their own on each.
+/// What laws remember, rank by rank: evaluation points have numbers of their own on each. Nothing is what one rank has of it.
 void write_history(std::span<const double> mine, ByteWriter& out) {
-  const auto of_ranks = communicator().gather(std::as_bytes(mine));
+  auto of_ranks = communicator().gather(std::as_bytes(mine));
+  if (std::ranges::all_of(of_ranks, [](const auto& of_rank) { return of_rank.empty(); })) of_ranks.resize(1);
   out.value(static_cast<std::uint64_t>(of_ranks.size()));
   for (const std::vector<std::byte>& of_rank : of_ranks) {
     out.value(static_cast<std::uint64_t>(of_rank.size() / sizeof(double)));
