@@ -13,6 +13,8 @@ KINEMATICS = {
     "silling": 'type = "conventional"\nstabilization = { type = "silling", coefficient = 0.5 }',
     "wan": 'type = "conventional"\nstabilization = { type = "wan" }',
     "order 2": 'type = "conventional"\norder = 2',
+    "silling, order 2": 'type = "conventional"\norder = 2\nstabilization = { type = "silling", coefficient = 0.5 }',
+    "wan, order 3": 'type = "conventional"\norder = 3\nstabilization = { type = "wan" }',
     "bond_based": 'type = "bond_based"',
     "surface correction": 'type = "bond_based"\nsurface_correction = "energy"',
     "ordinary": 'type = "ordinary"',
@@ -27,10 +29,14 @@ KINEMATICS = {
     "selective sub_horizon": 'type = "selective"\nbase = { type = "sub_horizon" }',
 }
 
+PAIRS = ("bond_based", "surface correction", "ordinary")
 INCLUSION = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = "1 + x/100", bulk_modulus = 3.0 }\n'
 DAMAGE = {
     "critical_stretch": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n',
     "gradual": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\ngradual = true\n',
+    "critical_energy": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\n',
+    "critical_energy, equal, gradual": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\nlimit = "equal"\ngradual = true\n',
+    "max_stress": '[damage]\ntype = "max_stress"\nstrength = 0.05\n',
     "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
 }
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
@@ -64,8 +70,11 @@ def pressed(text, where, follower):
 
 
 def beyond(everything):
-    """Held faces, planes of symmetry and periodic sides; pressures beside them."""
+    """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
     if not everything:
+        yield "silling, critical_energy, lattice", torn(KINEMATICS["silling"], DAMAGE["critical_energy"], False)
+        yield "baqp, max_stress, cloud", torn(KINEMATICS["baqp"], DAMAGE["max_stress"], True)
+        yield "silling, order 2, lattice", scene(KINEMATICS["silling, order 2"], 2)
         yield "baqp, face and symmetry, cloud", BEYOND["face and symmetry"](scene(KINEMATICS["baqp"], 2, True))
         yield "bond_based, torn, periodic", BEYOND["periodic"](torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], False))
         yield "projection, pressure, symmetry", pressed(scene(KINEMATICS["projection"], 2), 'set = "all"', True) + SYMMETRY
@@ -113,11 +122,13 @@ def cases(everything):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
             yield "%s, inclusion and pre-crack, %s" % (name, "cloud" if cloud else "lattice"), text + CRACK, ranks, threads
     for name in KINEMATICS if everything else ("bond_based", "baqp"):
-        if name == "order 2" or "sub_horizon" in name or "selective" in name:
+        if "order" in name or "sub_horizon" in name or "selective" in name:
             criteria = ("critical_stretch",)
         else:
             criteria = DAMAGE if everything else ("critical_stretch",)
         for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
+            if criterion == "max_stress" and name in PAIRS:
+                continue
             yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), torn(KINEMATICS[name], DAMAGE[criterion], cloud), ranks, threads
     for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
         for cloud in (False, True) if everything else (False,):
@@ -126,6 +137,31 @@ def cases(everything):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
+
+
+def carried(program, work, everything):
+    """Runs from the end of another one, with its broken bonds and with the history of its laws; the latter on as many ranks. What differs."""
+    begun = "frames = 3\ncheckpoint_every = 50"
+    scenes = {"broken bonds": (torn(KINEMATICS["bond_based"], DAMAGE["critical_energy"], False), False),
+              "history": (scene(KINEMATICS["conventional"], 2, material=HYPOELASTIC), True)}
+    if everything:
+        scenes["gradual"] = torn(KINEMATICS["projection"], DAMAGE["gradual"], False), False
+        scenes["weakened bonds"] = torn(KINEMATICS["bond_based"], DAMAGE["smooth_degradation"], True), False
+    for name, (text, has_history) in scenes.items():
+        text = text.replace("frames = 3", begun)
+        folder = work + "/carried"
+        begin, end = text.index("[initial]"), text.index("[[boundary]]")
+        later = text[:begin] + '[initial]\nfrom = "first/results.h5"\n' + text[end:]
+        found = []
+        for ranks in (0, 3):
+            # Of the same name, for results hold their scenes.
+            first = run(program, text, folder + "/first", ranks if has_history else 0)
+            second = run(program, later, folder + "/%d" % ranks, ranks)
+            found += [done.stderr.strip() for done in (first, second) if done.returncode != 0]
+        found = found or differences(folder + "/0", folder + "/3")
+        with open(folder + "/3/run.log") as log:
+            found += [] if "carried" in log.read() else ["nothing was carried"]
+        yield "initial.from, " + name, found
 
 
 def main():
@@ -149,6 +185,11 @@ def main():
                 print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
         if name not in failed:
             print("same    " + name, flush=True)
+    for name, found in carried(program, work, which == "all"):
+        count += 1
+        if found:
+            failed.append(name)
+        print(("FAILED  %s: " % name + "; ".join(found[:3])) if found else "same    " + name, flush=True)
     print("%d runs compared, %d cases failed" % (count, len(set(failed))))
     sys.exit(1 if failed or count == 0 else 0)
 

@@ -41,12 +41,11 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images, bool ranks) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   const std::string criterion = fmt::format("\"{}\"", scene.damage->type);
-  if (ranks && (traits.stress || traits.energy)) refuse(criterion + " on several ranks", "one rank, or criteria by stretch");
   if (traits.stress && formulation.pairs)
     refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
            "kinematics with gradients, or criteria by stretch or energy");
@@ -128,7 +127,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr, partition != nullptr);
+  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);

@@ -198,7 +198,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   ProblemParts parts;
   TermParts of_terms{
       .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
-  refuse_on_ranks(scene, of_terms.formulation, integrator);
+  refuse_on_ranks(scene, integrator);
   steps.begin("points");
   Beyond beyond = place_points(scene, factory, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;

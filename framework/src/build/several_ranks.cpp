@@ -6,7 +6,7 @@
 
 namespace perikit {
 
-void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const IntegratorTraits& integrator) {
+void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
   const int ranks = communicator().size();
   if (ranks == 1) return;
   const auto refuse = [&](const SourcePosition& position, const std::string& key, const std::string& what,
@@ -21,9 +21,6 @@ void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const I
   if (scene.damage && integrator.quasi_static)
     refuse(scene.damage->values.position(""), "damage", fmt::format("bonds that may fail with \"{}\"", scene.integrator->type),
            fmt::format("explicit integrators, or {}", threads));
-  if (scene.stabilization && formulation.order > 1)
-    refuse(scene.kinematics->values.position("stabilization"), "kinematics.stabilization",
-           "a penalty over gradients of an order above 1", fmt::format("order = 1, or {}", threads));
 }
 
 }  // namespace perikit

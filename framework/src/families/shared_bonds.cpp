@@ -90,8 +90,13 @@ std::vector<BondId> SharedBonds::of_all(std::span<const BondId> bonds) const {
   std::vector<BondChange> mine;
   for (const BondId bond : bonds) mine.push_back({bond, 0.0});
   std::vector<BondId> here;
-  for (const BondChange& change : inward(told_to_all(merged(mine)))) here.push_back(change.bond);
+  for (const BondChange& change : of_all(mine)) here.push_back(change.bond);
   return here;
+}
+
+std::vector<BondChange> SharedBonds::of_all(std::span<const BondChange> changes) const {
+  if (!part()) return {changes.begin(), changes.end()};
+  return inward(told_to_all(merged(changes)));
 }
 
 }  // namespace perikit

@@ -158,6 +158,7 @@ std::string Simulation::summary() {
     text += ranks_summary(*problem_);
     // Counts of bonds and of evaluation points are of each rank, with its ghosts.
     for (const std::string& line : said_by_all(lines)) text += line + "\n";
+    if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
     return text + plan();
   }
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds,
