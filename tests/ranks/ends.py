@@ -55,8 +55,8 @@ def refusals():
     for what, text, words in (
             ("a scene with a mistake", scene('type = "conventonal"'), "did you mean"),
             ("newton", without_velocity(scene(conventional, integrator='type = "newton"')), 'found "newton" on 3 ranks'),
-            ("a plane of symmetry", scene(conventional, extra='[[symmetry]]\naxis = "y"\n'), "found a plane of symmetry on 3 ranks"),
-            ("periodic sides", scene(conventional, extra='[[periodic]]\naxis = "y"\n'), "found periodic sides on 3 ranks"),
+            ("damage in statics", without_velocity(scene(conventional, integrator='type = "dynamic_relaxation"', extra='[damage]\ntype = "critical_stretch"\nstretch = 0.1\n')), 'found bonds that may fail with "dynamic_relaxation" on 3 ranks'),
+            ("jfnk with a preconditioner", without_velocity(scene(conventional, integrator='type = "jfnk"\npreconditioner = "companion"')), 'found "jfnk" on 3 ranks'),
             ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
             ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0\nallow_unstable = true'), "the run failed: step 1")):
         began = time.time()

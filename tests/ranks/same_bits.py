@@ -13,13 +13,15 @@ KINEMATICS = {
     "silling": 'type = "conventional"\nstabilization = { type = "silling", coefficient = 0.5 }',
     "wan": 'type = "conventional"\nstabilization = { type = "wan" }',
     "order 2": 'type = "conventional"\norder = 2',
+    "silling, order 2": 'type = "conventional"\norder = 2\nstabilization = { type = "silling", coefficient = 0.5 }',
+    "wan, order 3": 'type = "conventional"\norder = 3\nstabilization = { type = "wan" }',
     "bond_based": 'type = "bond_based"',
     "surface correction": 'type = "bond_based"\nsurface_correction = "energy"',
     "ordinary": 'type = "ordinary"',
     "baqp": 'type = "baqp"',
     "baqp, order 2": 'type = "baqp"\norder = 2',
     "projection": 'type = "projection"',
-    "bond_augmented": 'type = "bond_augmented"\nlambda = 0.7',
+    "bond_augmented": 'type = "bond_augmented"\nlambda = 1.3',
     "non_spherical": 'type = "non_spherical"',
     "sub_horizon": 'type = "sub_horizon"',
     "bond_associated": 'type = "bond_associated"',
@@ -27,10 +29,14 @@ KINEMATICS = {
     "selective sub_horizon": 'type = "selective"\nbase = { type = "sub_horizon" }',
 }
 
+PAIRS = ("bond_based", "surface correction", "ordinary")
 INCLUSION = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = "1 + x/100", bulk_modulus = 3.0 }\n'
 DAMAGE = {
     "critical_stretch": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n',
     "gradual": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\ngradual = true\n',
+    "critical_energy": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\n',
+    "critical_energy, equal, gradual": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\nlimit = "equal"\ngradual = true\n',
+    "max_stress": '[damage]\ntype = "max_stress"\nstrength = 0.05\n',
     "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
 }
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
@@ -39,6 +45,59 @@ CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
 def with_inclusion(text):
     return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
+
+
+def with_face(text):
+    """The layer of held points becomes a face that moves as it did."""
+    begin, end = text.index("[[boundary]]"), text.index("[[load]]")
+    motion = text[text.index("displacement = ", begin):end]
+    return text[:begin] + '[[boundary]]\nset = "all"\nface = "-x"\n' + motion + text[end:]
+
+
+SYMMETRY = '[[symmetry]]\naxis = "y"\n'
+BEYOND = {
+    "face": with_face,
+    "face and symmetry": lambda text: with_face(text) + SYMMETRY,
+    "two planes of symmetry": lambda text: text + SYMMETRY + '[[symmetry]]\naxis = "x"\n',
+    "periodic": lambda text: text + '[[periodic]]\naxis = "y"\n',
+}
+
+
+def pressed(text, where, follower):
+    """A pressure in place of the force."""
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    return text[:begin] + '[[load]]\n%s\npressure = "0.02 + 0.01*t"\nfollower = %s\n' % (where, "true" if follower else "false") + text[end:]
+
+
+def beyond(everything):
+    """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
+    if not everything:
+        yield "silling, critical_energy, lattice", torn(KINEMATICS["silling"], DAMAGE["critical_energy"], False)
+        yield "baqp, max_stress, cloud", torn(KINEMATICS["baqp"], DAMAGE["max_stress"], True)
+        yield "silling, order 2, lattice", scene(KINEMATICS["silling, order 2"], 2)
+        yield "baqp, face and symmetry, cloud", BEYOND["face and symmetry"](scene(KINEMATICS["baqp"], 2, True))
+        yield "bond_based, torn, periodic", BEYOND["periodic"](torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], False))
+        yield "projection, pressure, symmetry", pressed(scene(KINEMATICS["projection"], 2), 'set = "all"', True) + SYMMETRY
+        return
+    for (name, kinematics), (plane, change), cloud in itertools.product(KINEMATICS.items(), BEYOND.items(), (False, True)):
+        yield "%s, %s, %s" % (name, plane, "cloud" if cloud else "lattice"), change(scene(kinematics, 2, cloud))
+    for (plane, change), cloud in itertools.product(BEYOND.items(), (False, True)):
+        kind = "%s, %s" % (plane, "cloud" if cloud else "lattice")
+        for name in ("bond_based", "silling", "baqp"):
+            yield "%s, torn, %s" % (name, kind), change(torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud))
+        for name in ("bond_based", "ordinary", "projection"):
+            yield "%s, inclusion, %s" % (name, kind), change(with_inclusion(scene(KINEMATICS[name], 2, cloud)) + CRACK)
+        yield "conventional, hypoelastic, " + kind, change(scene(KINEMATICS["conventional"], 2, cloud, material=HYPOELASTIC))
+        yield "projection, 3D, " + kind, change(scene(KINEMATICS["projection"], 3, cloud))
+    for name, cloud in itertools.product(("conventional", "bond_based"), (False, True)):
+        yield "%s, face, 1D %s" % (name, "cloud" if cloud else "lattice"), with_face(scene(KINEMATICS[name], 1, cloud))
+    for where, follower, cloud in itertools.product(('set = "all"', 'set = "high"\nface = "+x"'), (False, True), (False, True)):
+        for name in ("conventional", "baqp") + (() if cloud or follower else ("ordinary",)):
+            kind = "%s, %s, %s, %s" % (name, where.replace("\n", " "), "following" if follower else "fixed", "cloud" if cloud else "lattice")
+            text = pressed(scene(KINEMATICS[name], 2, cloud), where, follower)
+            yield "pressure, " + kind, text
+            yield "pressure, symmetry, " + kind, text + SYMMETRY
+            yield "pressure, periodic, " + kind, BEYOND["periodic"](text)
 
 
 def torn(kinematics, damage, cloud):
@@ -63,17 +122,46 @@ def cases(everything):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
             yield "%s, inclusion and pre-crack, %s" % (name, "cloud" if cloud else "lattice"), text + CRACK, ranks, threads
     for name in KINEMATICS if everything else ("bond_based", "baqp"):
-        if name == "order 2" or "sub_horizon" in name or "selective" in name:
+        if "order" in name or "sub_horizon" in name or "selective" in name:
             criteria = ("critical_stretch",)
         else:
             criteria = DAMAGE if everything else ("critical_stretch",)
         for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
+            if criterion == "max_stress" and name in PAIRS:
+                continue
             yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), torn(KINEMATICS[name], DAMAGE[criterion], cloud), ranks, threads
     for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
+    for name, text in beyond(everything):
+        yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
+
+
+def carried(program, work, everything):
+    """Runs from the end of another one, with its broken bonds and with the history of its laws; the latter on as many ranks. What differs."""
+    begun = "frames = 3\ncheckpoint_every = 50"
+    scenes = {"broken bonds": (torn(KINEMATICS["bond_based"], DAMAGE["critical_energy"], False), False),
+              "history": (scene(KINEMATICS["conventional"], 2, material=HYPOELASTIC), True)}
+    if everything:
+        scenes["gradual"] = torn(KINEMATICS["projection"], DAMAGE["gradual"], False), False
+        scenes["weakened bonds"] = torn(KINEMATICS["bond_based"], DAMAGE["smooth_degradation"], True), False
+    for name, (text, has_history) in scenes.items():
+        text = text.replace("frames = 3", begun)
+        folder = work + "/carried"
+        begin, end = text.index("[initial]"), text.index("[[boundary]]")
+        later = text[:begin] + '[initial]\nfrom = "first/results.h5"\n' + text[end:]
+        found = []
+        for ranks in (0, 3):
+            # Of the same name, for results hold their scenes.
+            first = run(program, text, folder + "/first", ranks if has_history else 0)
+            second = run(program, later, folder + "/%d" % ranks, ranks)
+            found += [done.stderr.strip() for done in (first, second) if done.returncode != 0]
+        found = found or differences(folder + "/0", folder + "/3")
+        with open(folder + "/3/run.log") as log:
+            found += [] if "carried" in log.read() else ["nothing was carried"]
+        yield "initial.from, " + name, found
 
 
 def main():
@@ -97,6 +185,11 @@ def main():
                 print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
         if name not in failed:
             print("same    " + name, flush=True)
+    for name, found in carried(program, work, which == "all"):
+        count += 1
+        if found:
+            failed.append(name)
+        print(("FAILED  %s: " % name + "; ".join(found[:3])) if found else "same    " + name, flush=True)
     print("%d runs compared, %d cases failed" % (count, len(set(failed))))
     sys.exit(1 if failed or count == 0 else 0)
 

@@ -30,9 +30,7 @@ def vector(values):
 
 def scene(kinematics, dimension=2, cloud=False, integrator='type = "verlet"\nend_time = 6.0', material="", extra="", cells=None):
     """A block that is held, pulled and shaken: `kinematics` are the lines of its section."""
-    cells = cells or {1: [400], 2: [32, 26], 3: [14, 12, 11]}[dimension]
-    if cloud and dimension == 1:
-        cells = [1200]
+    cells = cells or {1: [1200], 2: [32, 26], 3: [14, 12, 11]}[dimension]
     axes = "xyz"[:dimension]
     shake = {1: ["0.01*sin(x/3)"], 2: ["0.01*sin(x)*cos(y/2)", "0.004*cos(x/5 + y)"],
              3: ["0.01*sin(x)*cos(y/2)", "0.004*cos(x/5 + y)", "0.003*sin(z - x/4)"]}[dimension]

@@ -64,6 +64,7 @@ Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
     const auto p = static_cast<std::size_t>(internal_[n]);
     places_[p] = whole.internal_[static_cast<std::size_t>(numbers_[n])];
     own_[p] = role(numbers_[n]) == Role::own;
+    if (role(numbers_[n]) >= Role::image) complete_.push_back(internal_[n]);
     if (role(numbers_[n]) >= Role::near) place[static_cast<std::size_t>(places_[p])] = internal_[n];
   }
   copy_sets(whole, place, far_material);
@@ -192,7 +193,7 @@ bool Body::cut(const Point& a, const Point& b) const noexcept {
 }
 
 std::size_t Body::bytes() const noexcept {
-  return (internal_.size() + input_.size() + places_.size() + numbers_.size()) * sizeof(std::int32_t) + own_.size() +
+  return (internal_.size() + input_.size() + places_.size() + numbers_.size() + complete_.size()) * sizeof(std::int32_t) + own_.size() +
          positions_.size() * sizeof(double) + alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
 }
 

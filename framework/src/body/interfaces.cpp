@@ -348,7 +348,10 @@ Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfa
     const auto original = static_cast<std::size_t>(whole.internal()[static_cast<std::size_t>(part.number(p))]);
     here[original] = index;
     found.material[p] = known.material[original];
-    found.source[p] = index;
+  }
+  for (const std::int32_t index : part.internal()) {
+    const auto original = static_cast<std::size_t>(whole.internal()[static_cast<std::size_t>(part.number(static_cast<std::size_t>(index)))]);
+    found.source[static_cast<std::size_t>(index)] = here[static_cast<std::size_t>(known.source[original])];
   }
   for (const Interface& from : known.all) {
     std::vector<std::pair<std::int32_t, std::size_t>> points;

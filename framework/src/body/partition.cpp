@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 
+#include "body/cell_mask.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -71,20 +73,23 @@ class Bisection {
 
 }  // namespace
 
-Partition::Partition(Body whole, const Reach& reach) : whole_(std::move(whole)), owner_(whole_.points(), 0) {
+Partition::Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources)
+    : whole_(std::move(whole)), sources_(std::move(sources)), owner_(whole_.points(), 0) {
   const int size = communicator().size();
   whole_.lattice() ? share_lattice(size) : share_cloud(size);
   points_.assign(static_cast<std::size_t>(size), 0);
-  for (const std::int32_t rank : owner_) ++points_[static_cast<std::size_t>(rank)];
+  const std::size_t real = whole_.points_of_all_ranks();
+  for (std::size_t n = 0; n < real; ++n) ++points_[static_cast<std::size_t>(owner_[n])];
   if (std::ranges::find(points_, 0) != points_.end())
     throw std::domain_error(
         fmt::format("found {} ranks for a body of {} points, which is shared out in blocks of points that are "
                     "evaluated together; allowed: fewer ranks, and threads on each (--threads)",
-                    size, whole_.points()));
+                    size, real));
   part_.roles.assign(whole_.points(), Role::absent);
   for (std::size_t n = 0; n < owner_.size(); ++n)
     if (owner_[n] == communicator().rank()) part_.roles[n] = Role::own;
-  whole_.lattice() ? keep_box(reach) : keep_families(reach);
+  choose_images();
+  whole_.lattice() ? keep_cells(reach) : keep_families(reach);
   exchange_borders();
 }
 
@@ -93,7 +98,7 @@ void Partition::share_lattice(int size) {
   const LatticeTiling tiling(lattice);
   const auto tile = [&](std::int32_t p) { return static_cast<std::size_t>(tiling.number(tiling.of(lattice.cell(p)))); };
   std::vector<std::int64_t> points(static_cast<std::size_t>(tiling.tiles()), 0);
-  for (const std::int32_t p : whole_.internal()) ++points[tile(p)];
+  for (const std::int32_t p : whole_.owned()) ++points[tile(p)];
   Bisection bisection(tiling, points);
   bisection.share({}, tiling.count, 0, size);
   for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = bisection.rank(tile(whole_.internal()[n]));
@@ -108,53 +113,70 @@ void Partition::share_cloud(int size) {
   }
 }
 
-/// Cells within reach of the box of the owned ones.
-void Partition::keep_box(const Reach& reach) {
+template <class Visit>
+void Partition::over_images(Visit&& visit) const {
+  const std::size_t real = whole_.points() - sources_.size();
+  for (std::size_t k = 0; k < sources_.size(); ++k) visit(real + k, static_cast<std::size_t>(sources_[k]));
+}
+
+/// Forces on images are forces on their sources.
+void Partition::choose_images() {
+  over_images([&](std::size_t image, std::size_t source) {
+    if (part_.roles[source] == Role::own) part_.roles[image] = std::max(part_.roles[image], Role::image);
+  });
+}
+
+/// Cells within reach of the box of the owned ones and of the images of these.
+void Partition::keep_cells(const Reach& reach) {
   const Lattice& lattice = *whole_.lattice();
   const LatticeTiling tiling(lattice);
   const auto group = static_cast<std::int64_t>(padding);
+  const auto cell = [&](std::size_t n) { return lattice.cell(whole_.internal()[n]); };
+  CellMask mask(lattice.extent);
   Cells low = lattice.extent, high{};
   for (std::size_t n = 0; n < owner_.size(); ++n) {
     if (part_.roles[n] != Role::own) continue;
-    const Cells k = lattice.cell(whole_.internal()[n]);
+    const Cells k = cell(n);
     for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], k[a]), high[a] = std::max(high[a], k[a] + 1);
   }
+  mask.add(low, high);
+  for (std::size_t n = 0; n < owner_.size(); ++n)
+    if (part_.roles[n] == Role::image) mask.add(cell(n));
   const auto bond = static_cast<std::int64_t>(std::floor(whole_.horizon() / lattice.spacing * (1 + 1e-10)));
   const auto grow = [&](std::int64_t by) {
-    for (std::size_t a = 0; a < static_cast<std::size_t>(lattice.dimension); ++a) {
-      low[a] = std::max<std::int64_t>(0, low[a] - by);
-      high[a] = std::min(lattice.extent[a], high[a] + by);
-    }
+    for (std::size_t a = 0; a < static_cast<std::size_t>(lattice.dimension); ++a) mask.grow(a, by);
+  };
+  const auto keep = [&](Role role) {
+    for (std::size_t n = 0; n < owner_.size(); ++n)
+      if (mask.holds(cell(n))) part_.roles[n] = std::max(part_.roles[n], role);
+  };
+  // Of images that are there, the sources are, too.
+  const auto add_sources = [&] {
+    over_images([&](std::size_t image, std::size_t source) {
+      if (mask.holds(cell(image))) mask.add(cell(source));
+    });
   };
   grow((reach.bonds - 1) * bond);
-  for (std::size_t a = 0; a < 3 && reach.blocks; ++a) {
-    const std::int64_t side = tiling.size[a] * (a == 0 ? group : 1);
-    low[a] = low[a] / side * side;
-    high[a] = std::min(lattice.extent[a], (high[a] + side - 1) / side * side);
-  }
-  const Cells near_low = low, near_high = high;
+  if (reach.blocks) mask.fill({tiling.size[0] * group, tiling.size[1], tiling.size[2]});
+  if (reach.sources) add_sources();
+  keep(Role::near);
   grow(bond);
-  low[0] = low[0] / group * group;
-  high[0] = std::min(lattice.extent[0], (high[0] + group - 1) / group * group);
-  part_.first = low;
-  part_.last = high;
-  const auto within = [](const Cells& k, const Cells& from, const Cells& to) {
-    return k[0] >= from[0] && k[0] < to[0] && k[1] >= from[1] && k[1] < to[1] && k[2] >= from[2] && k[2] < to[2];
-  };
-  for (std::size_t n = 0; n < owner_.size(); ++n) {
-    const Cells k = lattice.cell(whole_.internal()[n]);
-    if (part_.roles[n] != Role::own && within(k, low, high))
-      part_.roles[n] = within(k, near_low, near_high) ? Role::near : Role::far;
-  }
+  mask.fill({group, 1, 1});
+  add_sources();
+  keep(Role::far);
+  std::tie(part_.first, part_.last) = mask.bounds();
+  part_.first[0] = part_.first[0] / group * group;
+  part_.last[0] = std::min(lattice.extent[0], (part_.last[0] + group - 1) / group * group);
 }
 
 /// Points that bonds lead to, in whole blocks.
 void Partition::keep_families(const Reach& reach) {
   const std::size_t points = whole_.points();
   std::vector<std::uint8_t> reached(points, 0);  // by internal index
+  const auto at = [&](std::size_t n) -> std::uint8_t& { return reached[static_cast<std::size_t>(whole_.internal()[n])]; };
   const auto mark = [&](Role role) {
     for (std::size_t n = 0; n < points; ++n)
-      if (reached[static_cast<std::size_t>(whole_.internal()[n])]) part_.roles[n] = std::max(part_.roles[n], role);
+      if (at(n)) part_.roles[n] = std::max(part_.roles[n], role);
   };
   const auto fill_blocks = [&] {
     for (std::size_t b = 0; b < points; b += cloud_blocks[0]) {
@@ -166,12 +188,26 @@ void Partition::keep_families(const Reach& reach) {
   const auto step = [&] {
     reached = with_families(whole_.rows(), points, whole_.dimension(), whole_.horizon(), std::move(reached));
   };
-  for (std::size_t n = 0; n < points; ++n) reached[static_cast<std::size_t>(whole_.internal()[n])] = part_.roles[n] == Role::own;
+  for (std::size_t n = 0; n < points; ++n) at(n) = part_.roles[n] >= Role::image;
   for (int k = 1; k < reach.bonds; ++k) step();
   if (reach.blocks) fill_blocks();
+  // Of images that are there, the sources are, too.
+  bool more = false;
+  const auto add_sources = [&] {
+    more = false;
+    over_images([&](std::size_t image, std::size_t source) {
+      if (!at(image) || at(source)) return;
+      at(source) = 1;
+      more = true;
+    });
+  };
+  if (reach.sources) add_sources();
   mark(Role::near);
   step();
-  fill_blocks();
+  do {
+    fill_blocks();
+    add_sources();
+  } while (more);
   mark(Role::far);
   for (const std::size_t block : cloud_blocks) {
     const auto touches = block_reach(whole_, block);
@@ -187,7 +223,7 @@ void Partition::exchange_borders() {
   lent_.resize(size);
   borrowed_.resize(size);
   for (std::size_t n = 0; n < owner_.size(); ++n)
-    if (part_.roles[n] == Role::near || part_.roles[n] == Role::far)
+    if (part_.roles[n] != Role::absent && part_.roles[n] != Role::own)
       borrowed_[static_cast<std::size_t>(owner_[n])].push_back(static_cast<std::int32_t>(n));
   std::vector<std::vector<double>> to(size), from(size);
   std::vector<double> asked(size), wanted(size);

@@ -26,12 +26,12 @@ namespace {
 /// A point at a held face that a layer holds too would be held at two places.
 void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
                   const std::vector<std::size_t>& boundary_of) {
-  std::vector<std::uint8_t> held(body.stride(), 0);   // by point, a bit a component
+  std::vector<std::uint8_t> held(body.points_of_all_ranks(), 0);   // by point of the whole body, a bit a component
   for (const ImageTerm& term : images.terms)
-    if (term.motion >= 0) held[static_cast<std::size_t>(body.internal()[static_cast<std::size_t>(term.surface)])] |= static_cast<std::uint8_t>(1 << term.component);
+    if (term.motion >= 0) held[static_cast<std::size_t>(term.surface)] |= static_cast<std::uint8_t>(1 << term.component);
   for (std::size_t k = 0; k < prescriptions.size(); ++k)
     for (const std::int32_t p : prescriptions[k].points) {
-      if (!(held[static_cast<std::size_t>(p)] >> prescriptions[k].component & 1)) continue;
+      if (!(held[static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)))] >> prescriptions[k].component & 1)) continue;
       const Point x = body.position(static_cast<std::size_t>(p));
       throw InputError(scene.boundaries[boundary_of[k]].position, fmt::format("boundary.{}", boundary_of[k]),
                        fmt::format("found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "

@@ -1,8 +1,14 @@
 #include "build/crossing_bonds.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <numbers>
+#include <optional>
+#include <vector>
 
+#include "perikit/core/communicator.hpp"
 #include "terms/energy_shares.hpp"
 
 namespace perikit {
@@ -47,6 +53,35 @@ CrossingBonds count(const FamilyArrays& family, const AlignedVector<double>& sha
   return crossing;
 }
 
+/// Of one point of a cloud, by its number in the whole body.
+struct OfPoint {
+  std::int32_t number;
+  CrossingBonds crossing;
+};
+
+/// The mean over the points of all ranks, in their order; nothing where there are none. All ranks must call it.
+std::optional<CrossingBonds> mean_of_all(const std::vector<OfPoint>& mine) {
+  std::vector<OfPoint> all;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
+    const std::size_t before = all.size();
+    all.resize(before + of_rank.size() / sizeof(OfPoint));
+    if (!of_rank.empty()) std::memcpy(all.data() + before, of_rank.data(), of_rank.size());
+  }
+  std::ranges::sort(all, {}, &OfPoint::number);
+  std::array<double, 3> sum{};  // plain, shares, points
+  for (const OfPoint& point : all) {
+    sum[0] += point.crossing.plain;
+    sum[1] += point.crossing.shares;
+    ++sum[2];
+  }
+  const auto bytes = std::as_bytes(std::span(sum));
+  std::vector<std::byte> of_first(bytes.begin(), bytes.end());
+  communicator().broadcast(of_first);
+  std::memcpy(sum.data(), of_first.data(), sizeof sum);
+  if (sum[2] == 0) return std::nullopt;
+  return CrossingBonds{sum[0] / sum[2], sum[1] / sum[2]};
+}
+
 double ball_volume(const Body& body) {
   constexpr double unit[] = {0, 2, std::numbers::pi, 4 * std::numbers::pi / 3};
   return body.section() * unit[body.dimension()] * std::pow(body.horizon(), body.dimension());
@@ -61,19 +96,15 @@ CrossingBonds crossing_bonds(const Families& families, const Formulation& formul
   // Half of the mean of |cos| over all directions: 1/4 in 3D, 1/pi in 2D, 1/2 in 1D.
   const double mean = d == 3 ? 0.25 : d == 2 ? 1 / std::numbers::pi : 0.5;
   if (!body.lattice()) {
-    CrossingBonds sum;
-    double points = 0;
+    std::vector<OfPoint> points;
     FamilyArrays family;
     for (const std::int32_t p : body.owned()) {
       if (families.normaliser(static_cast<std::size_t>(p), BondWeight::volume) < 0.95 * ball_volume(body)) continue;
       families.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
       energy_shares(formulation, d, family, share);
-      const CrossingBonds of_point = count(family, share, [&](std::size_t k) { return mean * family.length[k]; });
-      sum.plain += of_point.plain;
-      sum.shares += of_point.shares;
-      ++points;
+      points.push_back({body.number(static_cast<std::size_t>(p)), count(family, share, [&](std::size_t k) { return mean * family.length[k]; })});
     }
-    if (points > 0) return {sum.plain / points, sum.shares / points};
+    if (const std::optional<CrossingBonds> of_all = mean_of_all(points)) return *of_all;
   }
   const FamilyArrays family = regular_family(families);
   energy_shares(formulation, d, family, share);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -40,12 +41,11 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images, bool ranks) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
   const std::string criterion = fmt::format("\"{}\"", scene.damage->type);
-  if (ranks && (traits.stress || traits.energy)) refuse(criterion + " on several ranks", "one rank, or criteria by stretch");
   if (traits.stress && formulation.pairs)
     refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
            "kinematics with gradients, or criteria by stretch or energy");
@@ -127,7 +127,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
-  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr, partition != nullptr);
+  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
@@ -161,15 +161,15 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, partition, *damage);
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
-  if (images)
-    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
-      if (field->size() > 0) images->copy_from_sources(*field);
+  const std::array limits_of_points{&damage->onset, &damage->failure, &damage->crack_speed};
   if (partition) {
     Ghosts ghosts(*partition, body, 1);
-    for (Field* field : {&damage->onset, &damage->failure, &damage->crack_speed})
+    for (Field* field : limits_of_points)
       if (field->size() > 0) ghosts.forward(*field);
     equal = communicator().largest(equal ? 0 : 1) == 0;
   }
+  for (Field* field : limits_of_points)
+    if (images && field->size() > 0) images->copy_from_sources(*field);
   if (equal) damage->failure = Field();
   return damage;
 }

@@ -44,8 +44,19 @@ Field face_areas(TermParts parts, int axis) {
   record.constants.resize(1);
   std::vector<MaterialRecord> records;
   records.push_back(std::move(record));
-  std::vector<std::uint16_t> ids;   // images store nothing here either
-  if (body.owned().size() < body.points()) {
+  std::vector<std::uint16_t> ids;   // images and far points store nothing here either
+  if (!body.places().place.empty()) {
+    const Laws& known = *parts.laws;
+    for (const bool far : {false, true}) {
+      records.push_back(silent_record());
+      records.back().far = far;
+    }
+    ids.assign(body.stride(), 0);
+    for (const std::int32_t index : body.internal()) {
+      const auto p = static_cast<std::size_t>(index);
+      ids[p] = known.far(p) ? 2 : known.record_of(p).silent ? 1 : 0;
+    }
+  } else if (body.owned().size() < body.points()) {
     records.push_back(silent_record());
     ids.assign(body.stride(), 1);
     for (const std::int32_t p : body.owned()) ids[static_cast<std::size_t>(p)] = 0;

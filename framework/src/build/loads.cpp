@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <optional>
 
 #include "build/conditions.hpp"
 #include "build/face_shares.hpp"
@@ -31,24 +33,26 @@ Load distributed(const LoadDescription& description, const Body& body, const Ter
   return load;
 }
 
-/// By internal index of the whole body: where the owned points of a part are in it; -1: others.
+/// By internal index of the whole body: where the points are in a part whose forces it must know; -1: others. Loads on images are loads on
+/// their sources.
 std::vector<std::int32_t> own_places(const Partition& partition, const Body& part) {
   std::vector<std::int32_t> own(partition.whole().stride(), -1);
-  for (const std::int32_t p : part.owned()) own[static_cast<std::size_t>(part.places().place[static_cast<std::size_t>(p)])] = p;
+  for (const std::int32_t p : part.complete()) own[static_cast<std::size_t>(part.places().place[static_cast<std::size_t>(p)])] = p;
   return own;
 }
 
-/// What of a load on the whole body falls on the points of a part.
-void keep_owned(const std::vector<std::int32_t>& own, Load& load) {
+/// What of a load on the whole body falls on the points of a part: points, and what each has of it.
+template <class Share>
+void keep_owned(const std::vector<std::int32_t>& own, std::vector<std::int32_t>& points, std::vector<Share>& shares) {
   std::size_t kept = 0;
-  for (std::size_t k = 0; k < load.points.size(); ++k) {
-    const std::int32_t place = own[static_cast<std::size_t>(load.points[k])];
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::int32_t place = own[static_cast<std::size_t>(points[k])];
     if (place < 0) continue;
-    load.points[kept] = place;
-    load.share[kept++] = load.share[k];
+    points[kept] = place;
+    shares[kept++] = shares[k];
   }
-  load.points.resize(kept);
-  load.share.resize(kept);
+  points.resize(kept);
+  shares.resize(kept);
 }
 
 void refuse_pressure(const Scene& scene, const LoadDescription& load, const TermParts& parts) {
@@ -62,17 +66,11 @@ void refuse_pressure(const Scene& scene, const LoadDescription& load, const Term
         "allowed: a boundary that holds a set");
 }
 
-void add_pressure(const Scene& scene, const LoadDescription& description, const TermParts& parts, const ImageMap* images,
-                  bool quasi_static, std::vector<Load>& loads, std::vector<FollowingPressure>& pressures) {
-  refuse_pressure(scene, description, parts);
-  const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
-  SurfaceAreas areas = surface_areas(description, parts, images);
-  if (description.follower) {
-    pressures.push_back({value, std::move(areas.points), std::move(areas.area)});
-    return;
-  }
-  for (int axis = 0; axis < parts.families->body().dimension(); ++axis) {
-    Load load;
+/// A pressure that does not follow: a load along each axis.
+std::vector<Load> loads_along_axes(const SpaceTimeFunction& value, const SurfaceAreas& areas, int dimension) {
+  std::vector<Load> loads;
+  for (int axis = 0; axis < dimension; ++axis) {
+    Load& load = loads.emplace_back();
     load.components.push_back({axis, value});
     for (std::size_t k = 0; k < areas.points.size(); ++k) {
       const double area = areas.area[k][static_cast<std::size_t>(axis)];
@@ -80,32 +78,54 @@ void add_pressure(const Scene& scene, const LoadDescription& description, const 
       load.points.push_back(areas.points[k]);
       load.share.push_back(-area);
     }
-    if (!load.points.empty()) loads.push_back(std::move(load));
   }
+  return loads;
 }
+
+/// Where shares and areas are found: the body of all ranks.
+struct Whole {
+  TermParts parts;
+  std::unique_ptr<Families> families;           ///< null: those of `parts` are of all ranks
+  std::optional<const ImageMap> images_of_all;
+  const ImageMap* images;
+
+  Whole(const Scene& scene, const TermParts& of_rank, const Partition* partition, const ImageMap* of_body, const Images& of_whole)
+      : parts(of_rank), images(of_body) {
+    using Type = LoadDescription::Type;
+    const bool surfaces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; });
+    if (!partition || !surfaces) return;
+    families = Families::make(partition->whole(), of_rank.families->influence(), of_rank.families->needs());
+    parts.families = families.get();
+    if (!images) return;
+    images_of_all.emplace(partition->whole(), of_whole);
+    images = &*images_of_all;
+  }
+};
 
 }  // namespace
 
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, bool quasi_static) {
+Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, const Images& of_whole,
+                  bool quasi_static) {
   const Body& body = parts.families->body();
-  TermParts whole = parts;
-  std::unique_ptr<Families> of_whole;
-  const bool faces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::traction; });
-  if (partition && faces) {
-    of_whole = Families::make(partition->whole(), parts.families->influence(), parts.families->needs());
-    whole.families = of_whole.get();
-  }
+  const Whole whole(scene, parts, partition, images, of_whole);
   const std::vector<std::int32_t> own = partition ? own_places(*partition, body) : std::vector<std::int32_t>();
   std::vector<Load> loads;
   std::vector<FollowingPressure> pressures;
   for (const LoadDescription& description : scene.loads) {
     refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
     if (description.type == LoadDescription::Type::pressure) {
-      add_pressure(scene, description, parts, images, quasi_static, loads, pressures);
+      refuse_pressure(scene, description, parts);
+      const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
+      SurfaceAreas areas = surface_areas(description, whole.parts, parts, whole.images);
+      if (partition) keep_owned(own, areas.points, areas.area);
+      if (description.follower)
+        pressures.push_back({value, std::move(areas.points), std::move(areas.area)});
+      else
+        std::ranges::move(loads_along_axes(value, areas, body.dimension()), std::back_inserter(loads));
       continue;
     }
-    Load load = distributed(description, partition ? partition->whole() : body, whole, images);
-    if (partition) keep_owned(own, load);
+    Load load = distributed(description, partition ? partition->whole() : body, whole.parts, whole.images);
+    if (partition) keep_owned(own, load.points, load.share);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;

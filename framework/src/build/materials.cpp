@@ -124,12 +124,13 @@ MaterialRecord silent_record() {
   return record;
 }
 
-std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool others) {
+std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool images) {
   std::vector<MaterialRecord> records;
   for (const auto& part : materials(scene)) records.push_back(build_record(*part, scene, factory, body, records.size()));
-  if (others) {
+  if (images) records.push_back(silent_record());
+  if (!body.places().place.empty()) {
     records.push_back(silent_record());
-    records.back().far = !body.places().place.empty();
+    records.back().far = true;
   }
   return std::make_unique<Laws>(body.space(), std::move(records), body.material_ids(), body.stride());
 }

@@ -16,9 +16,9 @@ namespace perikit {
 /// The materials of the scene in the order of Body::material_ids: [material], then those of the regions.
 std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene);
 
-/// Their laws, with constants at the points of `body`. others: one more, which stores nothing, for ghosts and images. Throws
-/// InputError.
-std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool others);
+/// Their laws, with constants at the points of `body`; then those that store nothing: of images, and of the far points of a part of a
+/// body. Throws InputError.
+std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool images);
 
 /// A law that stores nothing.
 MaterialRecord silent_record();

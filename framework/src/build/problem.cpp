@@ -23,12 +23,13 @@ namespace perikit {
 
 namespace {
 
-/// The number of the material of ghosts and images, after those of the scene.
+/// The number of the material of images, after those of the scene; that of the far points of a part of a body comes after all.
 std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint16_t>(scene.regions.size() + 1); }
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
   Images images;
+  Images here;   ///< of several ranks: what this one has of them
   std::vector<FaceMotion> motions;
   std::shared_ptr<const Interfaces> interfaces;   ///< null: no laminates
 };
@@ -46,13 +47,14 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
     const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? any : *of_part;
     throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
   }
-  return {std::move(images), std::move(planes.motions), nullptr};
+  return {std::move(images), {}, std::move(planes.motions), nullptr};
 }
 
 /// How far the forces of a formulation reach (partition.hpp).
-Partition::Reach reach_of(const Formulation& formulation) {
+Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
   return {.bonds = formulation.bond && formulation.far_share > 0 ? 3 : 2,
-          .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1)};
+          .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1),
+          .sources = formulation.pairs && !scene.regions.empty()};  // bonds across interfaces know the moduli of both sides
 }
 
 /// The bodies of this rank and, where there are several, of all of them.
@@ -68,11 +70,16 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
     return beyond;
   }
   try {
-    parts.partition = std::make_unique<const Partition>(std::move(whole), reach_of(formulation));
+    parts.partition = std::make_unique<const Partition>(std::move(whole), reach_of(scene, formulation), beyond.images.source);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
   }
-  parts.body = std::make_unique<const Body>(parts.partition->part(image_material(scene)));
+  const bool images = beyond.images.size() > 0;
+  parts.body = std::make_unique<const Body>(parts.partition->part(static_cast<std::uint16_t>(image_material(scene) + (images ? 1 : 0))));
+  if (images) {
+    beyond.here = images_of_part(beyond.images, *parts.body);
+    parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);
+  }
   beyond.interfaces = std::make_shared<const Interfaces>(interfaces_of_part(*parts.body, parts.partition->whole(), *beyond.interfaces));
   return beyond;
 }
@@ -147,16 +154,22 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
     return nullptr;
   }
   auto consistency = std::make_shared<CloudConsistency>();
-  if (parts.partition) {
-    const auto ghosts = std::make_shared<Ghosts>(*parts.partition, *parts.body, parts.body->dimension() + 1);
-    consistency->extend = consistency->copy_from_sources = [ghosts](FieldView values) { ghosts->forward(values); };
-    consistency->fold = [ghosts](FieldView force) { ghosts->clear(force); };
-  }
-  if (const ImageMap* images = parts.images.get()) {
-    consistency->extend = [images](FieldView u) { images->extend(u); };
-    consistency->fold = [images](FieldView force) { images->fold(force); };
-    consistency->copy_from_sources = [images](FieldView field) { images->copy_from_sources(field); };
-  }
+  constexpr int most = 4;  // components: of a place in space, and of the weights' unknowns
+  const auto ghosts = parts.partition ? std::make_shared<Ghosts>(*parts.partition, *parts.body, most) : nullptr;
+  const ImageMap* const images = parts.images.get();
+  if (!ghosts && !images) return consistency;
+  consistency->extend = [ghosts, images](FieldView u) {
+    if (ghosts) ghosts->forward(u);
+    if (images) images->extend(u);
+  };
+  consistency->fold = [ghosts, images](FieldView force) {
+    if (images) images->fold(force);
+    if (ghosts) ghosts->clear(force);
+  };
+  consistency->copy_from_sources = [ghosts, images](FieldView field) {
+    if (ghosts) ghosts->forward(field);
+    if (images) images->copy_from_sources(field);
+  };
   return consistency;
 }
 
@@ -185,15 +198,15 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   ProblemParts parts;
   TermParts of_terms{
       .formulation = make_formulation(factory.kinematics(*scene.kinematics)), .skip = scene.skip, .share = scene.share};
-  refuse_on_ranks(scene, of_terms.formulation, integrator);
+  refuse_on_ranks(scene, integrator);
   steps.begin("points");
   Beyond beyond = place_points(scene, factory, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
-  const bool others = partition || parts.images;  // points that store nothing
+  const Images& images = partition ? beyond.here : beyond.images;
   refuse_stress(scene, body, of_terms.formulation);
   steps.begin("laws");
-  parts.laws = build_laws(scene, factory, body, others);
+  parts.laws = build_laws(scene, factory, body, parts.images != nullptr);
   refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
   steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
@@ -212,15 +225,15 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
-  if (others) parts.materials.push_back(scene.material->type);
+  parts.materials.resize(parts.laws->records().size(), scene.material->type);
 
   steps.begin("boundaries and loads");
-  Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
+  Constraints constraints = build_constraints(scene, body, images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
-  Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), quasi_static);
+  Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), beyond.images, quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));

@@ -6,7 +6,7 @@
 
 namespace perikit {
 
-void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const IntegratorTraits& integrator) {
+void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
   const int ranks = communicator().size();
   if (ranks == 1) return;
   const auto refuse = [&](const SourcePosition& position, const std::string& key, const std::string& what,
@@ -21,19 +21,6 @@ void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const I
   if (scene.damage && integrator.quasi_static)
     refuse(scene.damage->values.position(""), "damage", fmt::format("bonds that may fail with \"{}\"", scene.integrator->type),
            fmt::format("explicit integrators, or {}", threads));
-  if (scene.stabilization && formulation.order > 1)
-    refuse(scene.kinematics->values.position("stabilization"), "kinematics.stabilization",
-           "a penalty over gradients of an order above 1", fmt::format("order = 1, or {}", threads));
-  for (std::size_t k = 0; k < scene.boundaries.size(); ++k)
-    if (!scene.boundaries[k].face.empty())
-      refuse(scene.boundaries[k].face_position, fmt::format("boundary.{}.face", k), "a held face",
-             fmt::format("a layer of held points, or {}", threads));
-  for (std::size_t k = 0; k < scene.loads.size(); ++k)
-    if (scene.loads[k].type == LoadDescription::Type::pressure)
-      refuse(scene.loads[k].position, fmt::format("load.{}.pressure", k), "a pressure",
-             fmt::format("traction on a face, or {}", threads));
-  if (!scene.symmetries.empty()) refuse(scene.symmetries.front().position, "symmetry.0", "a plane of symmetry", threads);
-  if (!scene.periodics.empty()) refuse(scene.periodics.front().position, "periodic.0", "periodic sides", threads);
 }
 
 }  // namespace perikit

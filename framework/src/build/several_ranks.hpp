@@ -1,13 +1,12 @@
 #pragma once
 /// What a scene may not ask for on several ranks.
 
-#include "perikit/model/formulation.hpp"
 #include "perikit/problem/integrator.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
 
 /// Throws InputError, naming the key, for what needs the whole body on one rank. Nothing is refused where there is one.
-void refuse_on_ranks(const Scene& scene, const Formulation& formulation, const IntegratorTraits& integrator);
+void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator);
 
 }  // namespace perikit

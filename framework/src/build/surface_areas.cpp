@@ -49,15 +49,19 @@ std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
   return areas;
 }
 
-/// By internal index, images among them.
-std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts) {
+/// By internal index, images among them. Of a cloud on several ranks those of this rank alone, which knows their consistent weights.
+std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts, const TermParts& of_rank) {
   const Body& body = parts.families->body();
   if (!parts.formulation.pairs) {
     std::vector<Point> areas(body.stride(), Point{});
     for (int axis = 0; axis < body.dimension(); ++axis) {
-      const Field of_axis = face_areas(parts, axis);
-      for (const std::int32_t p : body.internal())
-        areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = of_axis.data()[p];
+      const TermParts& from = body.lattice() ? parts : of_rank;
+      const Field of_axis = face_areas(from, axis);
+      const auto place = from.families->body().places().place;
+      for (const std::int32_t p : from.families->body().internal()) {
+        const auto i = static_cast<std::size_t>(p);
+        areas[place.empty() ? i : static_cast<std::size_t>(place[i])][static_cast<std::size_t>(axis)] = of_axis.data()[p];
+      }
     }
     return areas;
   }
@@ -87,12 +91,12 @@ void correct_total(const Body& body, const std::vector<bool>& in_set, SurfaceAre
 
 }  // namespace
 
-SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
+SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const TermParts& of_rank, const ImageMap* images) {
   if (!load.face.empty()) return of_face(load, parts, images);
   const Body& body = parts.families->body();
   std::vector<bool> in_set(body.stride(), false);
   for (const std::int32_t p : body.set(load.set)) in_set[static_cast<std::size_t>(p)] = true;
-  const std::vector<Point> areas = all_areas(load, parts);
+  const std::vector<Point> areas = all_areas(load, parts, of_rank);
   const std::vector<std::int32_t> surface = free_surface(body);
   if (std::ranges::none_of(surface, [&](std::int32_t p) { return in_set[static_cast<std::size_t>(p)]; })) {
     throw InputError(load.position, "load.pressure",

@@ -24,8 +24,11 @@ Fracture::Fracture(Families& families, const BodyDamage& damage, std::unique_ptr
 std::vector<double> Fracture::moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u) {
   // Bonds that let go in the course of steps, or weaken, do so all through the step.
   if (gradual_) return std::vector<double>(changes.size(), 0.5);
+  // Energies and stresses are right at the points of this rank: each rank knows the moments of bonds that begin there.
+  const bool share = shared_.part() && !damage_.by_stretch();
   std::vector<BondId> bonds;
-  for (const BondChange& change : changes) bonds.push_back(change.bond);
+  for (const BondChange& change : changes)
+    if (!share || families_.body().owns(static_cast<std::size_t>(change.bond.point))) bonds.push_back(change.bond);
   std::vector<double> start(bonds.size()), end(bonds.size()), moments;
   finder_->values(bonds, before, start);
   finder_->values(bonds, u, end);
@@ -40,6 +43,11 @@ std::vector<double> Fracture::moments(std::span<const BondChange> changes, Const
     const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
     moments.push_back(0.5 * (crossing(limits.onset) + crossing(limits.failure)));
   }
+  if (!share) return moments;
+  std::vector<BondChange> mine;
+  for (std::size_t k = 0; k < bonds.size(); ++k) mine.push_back({bonds[k], moments[k]});
+  moments.clear();
+  for (const BondChange& moment : shared_.of_all(mine)) moments.push_back(moment.integrity);
   return moments;
 }
 
@@ -47,6 +55,8 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
                             const Body& body) {
   ++updates_;
   std::vector<BondChange> changes = finder_->find(u);
+  // Ranks see what bonds of their own points hold, but all must know which bonds fail.
+  if (shared_.part() && !damage_.by_stretch() && on_any_rank(!changes.empty())) changes = shared_.of_all(changes);
   if (gradual_) changes = gradual_->let_go(changes, time_step);
   if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;

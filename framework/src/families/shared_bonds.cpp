@@ -59,8 +59,8 @@ void SharedBonds::find_here() const {
 void SharedBonds::mark(GroupMarks& marks) const {
   if (!part()) return;
   std::vector<std::int32_t> mine;
-  for (const std::int32_t p : body_.owned())
-    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
+  for (const std::int32_t p : body_.internal())
+    if (body_.owns(static_cast<std::size_t>(p)) && marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
   find_here();
   for (const std::int32_t place : told_to_all(gathered<std::int32_t>(mine)))
     if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
@@ -90,8 +90,13 @@ std::vector<BondId> SharedBonds::of_all(std::span<const BondId> bonds) const {
   std::vector<BondChange> mine;
   for (const BondId bond : bonds) mine.push_back({bond, 0.0});
   std::vector<BondId> here;
-  for (const BondChange& change : inward(told_to_all(merged(mine)))) here.push_back(change.bond);
+  for (const BondChange& change : of_all(mine)) here.push_back(change.bond);
   return here;
+}
+
+std::vector<BondChange> SharedBonds::of_all(std::span<const BondChange> changes) const {
+  if (!part()) return {changes.begin(), changes.end()};
+  return inward(told_to_all(merged(changes)));
 }
 
 }  // namespace perikit

@@ -23,11 +23,13 @@ class SharedBonds {
   std::vector<BondChange> inward(std::span<const BondChange> changes) const;
   /// Of the bonds that any rank names those with both ends here, ascending. All ranks must call it.
   std::vector<BondId> of_all(std::span<const BondId> bonds) const;
+  std::vector<BondChange> of_all(std::span<const BondChange> changes) const;
   /// Marks the groups of eight points that hold points of groups which any rank has marked among its own. All ranks must call it.
   void mark(GroupMarks& marks) const;
+  /// Whether other ranks have bonds, too.
+  bool part() const noexcept { return !body_.places().place.empty(); }
 
  private:
-  bool part() const noexcept { return !body_.places().place.empty(); }
   std::vector<BondChange> merged(std::span<const BondChange> mine) const;
   void find_here() const;
 

@@ -1,7 +1,6 @@
 #include "perikit/operators/laws.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "perikit/core/simd.hpp"
 
@@ -9,7 +8,8 @@ namespace perikit {
 
 Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std::uint16_t> ids, std::size_t stride)
     : space_(space), records_(std::move(records)), ids_(ids), stride_(stride),
-      single_(ids.empty() && records_.front().uniform) {
+      single_(ids.empty() && records_.front().uniform),
+      silent_(static_cast<std::size_t>(std::ranges::find(records_, true, &MaterialRecord::silent) - records_.begin())) {
   for (const MaterialRecord& record : records_) {
     state_ = std::max(state_, record.material->state_components(space));
     dissipates_ |= record.traits.dissipates;
@@ -83,8 +83,7 @@ Status Laws::evaluate_among_silent(const MaterialRecord& record, const LawBatch&
   const Status status = evaluate_one(record, batch, scratch);
   if (!status.ok()) return status;
   alignas(64) double stores[batch_points];
-  const std::size_t silent = records_.size() - 1;
-  for (int l = 0; l < batch.n; ++l) stores[l] = ids_[static_cast<std::size_t>(batch.points[l])] == silent ? 0.0 : 1.0;
+  for (int l = 0; l < batch.n; ++l) stores[l] = ids_[static_cast<std::size_t>(batch.points[l])] >= silent_ ? 0.0 : 1.0;
   for (int l = batch.n; l < static_cast<int>(padded(static_cast<std::size_t>(batch.n))); ++l) stores[l] = 1.0;
   const auto keep = [&](double* x, int rows) {
     for (int r = 0; x && r < rows; ++r)
@@ -100,14 +99,14 @@ Status Laws::evaluate_among_silent(const MaterialRecord& record, const LawBatch&
 
 Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept {
   if (ids_.empty()) return evaluate_one(records_[0], batch, scratch);
-  const std::uint16_t silent = records_.back().silent ? static_cast<std::uint16_t>(records_.size() - 1) : std::numeric_limits<std::uint16_t>::max();
+  const auto silent = static_cast<std::uint16_t>(silent_);
   std::uint16_t only = silent;   // the one law of all lanes that store something
   bool mixed = false, any_silent = false;
   for (int l = 0; l < batch.n; ++l) {
     const std::uint16_t id = ids_[static_cast<std::size_t>(batch.points[l])];
-    any_silent |= id == silent;
-    mixed |= id != silent && only != silent && id != only;
-    if (id != silent) only = id;
+    any_silent |= id >= silent;
+    mixed |= id < silent && only != silent && id != only;
+    if (id < silent) only = id;
   }
   if (!mixed && (!any_silent || only == silent)) return evaluate_one(records_[only], batch, scratch);
   if (!mixed) {

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "families/families.hpp"
+#include "families/shared_bonds.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
@@ -43,6 +44,7 @@ namespace {
 
 /// A failure on one rank is one on all of them, which must say the same: that of the point that comes first.
 void agree(EvaluationStatus& status) {
+  if (communicator().size() == 1 || communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return;
   std::vector<std::byte> mine;
   if (!status.ok()) {
     ByteWriter out;
@@ -79,10 +81,8 @@ ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) {
 void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
   if (images() && status.ok()) images()->fold(force);
   if (!ghosts_) return;
-  if (communicator().largest(status.ok() ? 0.0 : 1.0) != 0)
-    agree(status);
-  else
-    ghosts_->clear(force);
+  agree(status);
+  if (status.ok()) ghosts_->clear(force);
 }
 
 template <class Fill>
@@ -120,13 +120,22 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
 EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldView force) {
   if (!loads().follow()) {
     loads().evaluate(t, force);
+    if (ghosts_ && images()) ghosts_->clear(force);
     return {};
   }
   PointSamples samples;
   EvaluationStatus status = terms().sample(seen(u, seen_), samples);
+  agree(status);
   if (!status.ok()) return status;
+  if (ghosts_ && images()) {
+    // Sources may be ghosts. As many components at a time as displacements have.
+    const FieldView H = samples.H;
+    for (int c = 0; c < H.components; c += dimension())
+      ghosts_->forward({H.component(c), H.stride, std::min(dimension(), H.components - c)});
+  }
   if (images()) images()->mirror_gradients(samples.H);
   loads().evaluate(t, force, &samples.H);
+  if (ghosts_) ghosts_->clear(force);
   return status;
 }
 
@@ -246,7 +255,9 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
 std::vector<std::byte> BodyProblem::bonds() const {
   ByteWriter out;
   if (parts_.fracture.damage()) parts_.fracture.write(terms(), out);
-  return out.take();
+  std::vector<std::byte> of_all = out.take();  // rank 0 has them
+  if (ghosts_) communicator().broadcast(of_all);
+  return of_all;
 }
 
 void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
@@ -257,9 +268,10 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
 
 namespace {
 
-/// What laws remember, rank by rank: evaluation points have numbers of their own on each.
+/// What laws remember, rank by rank: evaluation points have numbers of their own on each. Nothing is what one rank has of it.
 void write_history(std::span<const double> mine, ByteWriter& out) {
-  const auto of_ranks = communicator().gather(std::as_bytes(mine));
+  auto of_ranks = communicator().gather(std::as_bytes(mine));
+  if (std::ranges::all_of(of_ranks, [](const auto& of_rank) { return of_rank.empty(); })) of_ranks.resize(1);
   out.value(static_cast<std::uint64_t>(of_ranks.size()));
   for (const std::vector<std::byte>& of_rank : of_ranks) {
     out.value(static_cast<std::uint64_t>(of_rank.size() / sizeof(double)));
@@ -317,18 +329,23 @@ namespace {
 struct BeforeState {
   std::uint64_t stride = 0;
   std::vector<BondChange> bonds;
-  std::vector<double> history;
+  std::vector<std::vector<double>> history;   ///< by rank; see write_history
 
   explicit BeforeState(std::span<const std::byte> snapshot) {
     ByteReader in(snapshot);
     stride = in.value<std::uint64_t>();
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
-    for (auto ranks = in.value<std::uint64_t>(); ranks > 0; --ranks) {  // see write_history
-      const auto count = std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double));
-      history.resize(history.size() + count);
-      in.bytes(history.data() + history.size() - count, count * sizeof(double));
+    for (auto ranks = in.value<std::uint64_t>(); ranks > 0; --ranks) {
+      std::vector<double>& of_rank = history.emplace_back();
+      of_rank.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
+      in.bytes(of_rank.data(), of_rank.size() * sizeof(double));
     }
+  }
+  std::size_t numbers() const {
+    std::size_t sum = 0;
+    for (const std::vector<double>& of_rank : history) sum += of_rank.size();
+    return sum;
   }
 };
 
@@ -336,20 +353,28 @@ struct BeforeState {
 
 BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot) {
   const BeforeState before(snapshot);
-  return {before.bonds.size(), before.history.size()};
+  return {before.bonds.size(), before.numbers()};
 }
 
 void BodyProblem::carry(std::span<const std::byte> snapshot) {
-  if (ghosts_) throw InputError("several ranks cannot take them over");
   const BeforeState before(snapshot);
   const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
-  if (before.stride != body().stride()) throw InputError("the earlier run had another body");
-  if (before.history.size() != history.size()) throw InputError("the earlier run had other laws");
+  if (before.stride != whole().stride()) throw InputError("the earlier run had another body");
+  if (before.numbers() > 0 && before.history.size() != static_cast<std::size_t>(communicator().size()))
+    throw InputError(fmt::format("the laws of the earlier run have their history on {} ranks", before.history.size()));
+  const auto rank = static_cast<std::size_t>(communicator().rank());
+  const std::vector<double> own = before.numbers() > 0 ? before.history[rank] : std::vector<double>();
+  if (own.size() != history.size()) throw InputError("the earlier run had other laws");
+  const SharedBonds shared(body());
   std::vector<BondChange> lost;   // of the bonds that cracks of this scene leave
-  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) { return parts_.families->integrity(b.bond) > b.integrity; });
-  if (!lost.empty()) terms().restore_bonds(lost);
+  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) {
+    const std::vector<BondChange> here = shared.inward({&b, 1});
+    return !here.empty() && parts_.families->integrity(here.front().bond) > b.integrity;
+  });
+  // On several ranks all of them restore, whoever has such bonds.
+  if (!lost.empty() || (ghosts_ && !before.bonds.empty())) terms().restore_bonds(lost);
   if (history.empty()) return;
-  std::ranges::copy(before.history, history.begin());
+  std::ranges::copy(own, history.begin());
   terms().history_restored();
 }
 

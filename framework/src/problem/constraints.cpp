@@ -35,7 +35,9 @@ Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptio
 void Constraints::add_images(const Images& images) {
   const std::size_t real = body_->points() - images.size();
   for (const ImageTerm& term : images.terms) {
-    const std::int64_t dof = term.component * static_cast<std::int64_t>(body_->stride()) + body_->internal()[real + static_cast<std::size_t>(term.image)];
+    const std::int32_t point = body_->internal()[real + static_cast<std::size_t>(term.image)];
+    if (!body_->owns(static_cast<std::size_t>(point))) continue;  // its rank says where it is
+    const std::int64_t dof = term.component * static_cast<std::int64_t>(body_->stride()) + point;
     // Terms of one component of an image follow each other.
     if (image_dofs_.empty() || image_dofs_.back().dof != dof) {
       image_dofs_.push_back({dof, false, false, shares_.size(), shares_.size()});

@@ -1,12 +1,14 @@
 #include "perikit/problem/image_map.hpp"
 
 #include <algorithm>
+#include <cstring>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
 
-ImageMap::ImageMap(const Body& body, const Images& images) : map_(body.stride(), -1) {
+ImageMap::ImageMap(const Body& body, const Images& images) : body_(&body), map_(body.stride(), -1) {
   const std::size_t real = body.points() - images.size();
   for (std::size_t k = 0; k < images.size(); ++k) {
     image_.push_back(body.internal()[real + k]);
@@ -14,10 +16,9 @@ ImageMap::ImageMap(const Body& body, const Images& images) : map_(body.stride(),
     sign_.push_back({static_cast<double>(images.sign[k][0]), static_cast<double>(images.sign[k][1]), static_cast<double>(images.sign[k][2])});
     map_[static_cast<std::size_t>(image_.back())] = static_cast<std::int32_t>(k);
   }
-  const auto stride = static_cast<std::int64_t>(body.stride());
   for (const ImageTerm& term : images.terms) {
-    shares_.push_back({term.component * stride + image_[static_cast<std::size_t>(term.image)],
-                       term.component * stride + body.internal()[static_cast<std::size_t>(term.surface)], term.factor});
+    const std::int32_t image = image_[static_cast<std::size_t>(term.image)];
+    if (body.owns(static_cast<std::size_t>(image))) shares_.push_back({image, term.surface, term.component, term.factor});
   }
 }
 
@@ -59,8 +60,30 @@ void ImageMap::append_images(std::vector<std::int32_t>& points) const {
     if (chosen[static_cast<std::size_t>(source_[k])]) points.push_back(image_[k]);
 }
 
+/// Of all ranks. The point at a plane may be another rank's than the image, and others add to it.
+std::vector<ImageMap::Part> ImageMap::parts_of_all(ConstFieldView reaction) const {
+  std::vector<Part> parts;
+  for (const Share& share : shares_)
+    parts.push_back({body_->number(static_cast<std::size_t>(share.image)), share.surface, share.component,
+                     share.factor * reaction.component(share.component)[share.image]});
+  if (body_->places().place.empty()) return parts;
+  std::vector<std::byte> bytes;
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(parts))))
+    bytes.insert(bytes.end(), of_rank.begin(), of_rank.end());
+  communicator().broadcast(bytes);
+  parts.resize(bytes.size() / sizeof(Part));
+  if (!bytes.empty()) std::memcpy(parts.data(), bytes.data(), bytes.size());
+  std::ranges::stable_sort(parts, {}, &Part::image);
+  return parts;
+}
+
 void ImageMap::gather(FieldView reaction) const {
-  for (const Share& share : shares_) reaction.data[share.surface] += share.factor * reaction.data[share.image];
+  std::vector<std::pair<std::int32_t, std::int32_t>> own;  // numbers in the whole body, internal indices
+  for (const std::int32_t p : body_->owned()) own.emplace_back(body_->number(static_cast<std::size_t>(p)), p);
+  for (const Part& part : parts_of_all(reaction)) {
+    const auto at = std::ranges::lower_bound(own, part.surface, {}, &std::pair<std::int32_t, std::int32_t>::first);
+    if (at != own.end() && at->first == part.surface) reaction.component(part.component)[at->second] += part.value;
+  }
   for (int c = 0; c < reaction.components; ++c)
     for (const std::int32_t p : image_) reaction.component(c)[p] = 0;
 }

@@ -33,7 +33,7 @@ Field accelerations(Problem& problem, double t) {
 
 Field reactions(Problem& problem, bool dynamic, double t) {
   Field r = problem.make_field();
-  if (!problem.constraints().any()) return r;
+  if (!problem.constraints().any() && !problem.images()) return r;
   const ConstFieldView internal = problem.state().internal_force();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
   const Field a = dynamic ? accelerations(problem, t) : Field();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
@@ -45,10 +46,18 @@ std::vector<double> gathered(const std::vector<double>& mine) {
   return together;
 }
 
+/// Points and images that no other rank has.
+std::vector<std::int32_t> own_points(const Body& body) {
+  std::vector<std::int32_t> own;
+  std::ranges::copy_if(body.internal(), std::back_inserter(own),
+                       [&](std::int32_t p) { return body.owns(static_cast<std::size_t>(p)); });
+  return own;
+}
+
 }  // namespace
 
 void State::write(const Body& whole, ByteWriter& out) const {
-  const std::vector<std::int32_t>& owned = body_->owned();
+  const std::vector<std::int32_t> owned = own_points(*body_);
   const auto places = body_->places().place;
   std::vector<double> values, to;  // of owned points; where those of all ranks go
   if (!places.empty()) {
@@ -108,7 +117,7 @@ void State::read(const Body& whole, ByteReader& in) {
     std::vector<double> all(whole.stride());
     for (int c = 0; c < field.components; ++c) {
       in.bytes(all.data(), all.size() * sizeof(double));
-      for (const std::int32_t p : body_->owned())
+      for (const std::int32_t p : own_points(*body_))
         field.component(c)[p] = all[static_cast<std::size_t>(places[static_cast<std::size_t>(p)])];
     }
   }

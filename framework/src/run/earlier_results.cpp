@@ -8,7 +8,6 @@
 
 #include "output/result_file.hpp"
 #include "output/sealed_file.hpp"
-#include "perikit/core/communicator.hpp"
 #include "run/checkpoint.hpp"
 #include "run/output_folder.hpp"
 #include "scene/scene_differences.hpp"
@@ -56,7 +55,6 @@ class EarlierRun {
     const std::string what = carried.bonds > 0 ? fmt::format("results of a run in which {} bonds had failed", carried.bonds)
                                                : "results of a run whose laws have a history";
     if (carried.bonds > 0 && !scene_.damage) refuse(what, "a scene with [damage], without which they would be whole again");
-    if (communicator().size() > 1) refuse(what, "with one rank");
     // Points, bonds and evaluation points must have the numbers that they had.
     std::vector<std::string> others = scene_differences(checkpoint.scene, scene_.resolved);
     const auto of = [](const std::string& difference, std::initializer_list<const char*> sections) {
@@ -84,7 +82,7 @@ class EarlierRun {
     const std::vector<double> positions = hdf5::Source(folder_ / "reference.h5").read("position").data;
     const Body& body = problem_.body();
     return std::ranges::all_of(body.owned(), [&](std::int32_t p) {
-      const auto row = static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(p)));
+      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
       const Point x = body.position(static_cast<std::size_t>(p));
       return std::equal(x.begin(), x.end(), &positions[3 * row]);
     });
@@ -103,8 +101,8 @@ class EarlierRun {
     const Field damage = problem_.terms().damage();
     const Body& body = problem_.body();
     for (const std::int32_t p : body.owned()) {
-      const auto row = static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(p)));
-      if (body.points_of_all_ranks() != body.owned().size() || found->second.data[row] <= damage.data()[p] + 1e-9) continue;
+      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
+      if (found->second.data[row] <= damage.data()[p] + 1e-9) continue;
       const Point x = body.position(static_cast<std::size_t>(p));
       refuse(fmt::format("results of a run in which bonds were cut or had failed that are whole in this scene, at the point "
                          "({:.6g}, {:.6g}, {:.6g}) for one",

@@ -30,7 +30,7 @@ std::vector<double> merge(std::span<const double> mine, std::size_t width, std::
 std::vector<double> gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width) {
   if (!problem.partition()) return {mine.begin(), mine.end()};
   const auto owners = problem.partition()->owners();
-  return merge(mine, width, owners.size(), [&](std::size_t n) { return owners[n]; });
+  return merge(mine, width, problem.whole().owned().size(), [&](std::size_t n) { return owners[n]; });
 }
 
 std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine) {

@@ -116,7 +116,7 @@ std::vector<std::string> said_by_all(const std::vector<std::string>& lines) {
 std::string ranks_summary(const BodyProblem& problem) {
   const Partition& partition = *problem.partition();
   const std::vector<std::int64_t>& points = partition.points();
-  const double mean = static_cast<double>(partition.whole().points()) / static_cast<double>(points.size());
+  const double mean = static_cast<double>(partition.whole().points_of_all_ranks()) / static_cast<double>(points.size());
   const auto ghosts = static_cast<double>(problem.ghosts()->size());
   const auto bytes = static_cast<double>(problem.bytes());
   const double most_ghosts = communicator().largest(ghosts), most_bytes = communicator().largest(bytes);
@@ -141,7 +141,8 @@ std::string Simulation::summary() {
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
   if (problem_->images())
     text +=
-        fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n", problem_->images()->size());
+        fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n",
+                    problem_->whole().points() - body.points_of_all_ranks());
   std::int64_t singular = static_cast<std::int64_t>(report.singular_families);
   communicator().sum({&singular, 1});
   std::vector<std::string> lines;
@@ -157,6 +158,7 @@ std::string Simulation::summary() {
     text += ranks_summary(*problem_);
     // Counts of bonds and of evaluation points are of each rank, with its ghosts.
     for (const std::string& line : said_by_all(lines)) text += line + "\n";
+    if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
     return text + plan();
   }
   text += fmt::format("bonds         {} ({:.1f} a point)\n", report.bonds,

@@ -19,12 +19,12 @@ void over_bonds(const LatticeFamilies& families, const LatticeChunk& chunk, Visi
     }
 }
 
-/// By point: 1 where it is owned or within a horizon of an owned one, whether a bond leads there or not: the divergence sends along bonds
-/// that are cut, too, and takes back what it sent.
-std::vector<std::uint8_t> felt_by_owned(const LatticeFamilies& families) {
+/// By point: 1 where its force is to be complete or it lies within a horizon of such a point, whether a bond leads there or not: the
+/// divergence sends along bonds that are cut, too, and takes back what it sent.
+std::vector<std::uint8_t> felt_here(const LatticeFamilies& families) {
   const Body& body = families.body();
   std::vector<std::uint8_t> felt(body.stride(), 0);
-  for (const std::int32_t p : body.owned()) {
+  for (const std::int32_t p : body.complete()) {
     felt[static_cast<std::size_t>(p)] = 1;
     for (const std::int64_t shift : families.slots.shifts)
       if (families.live_bits(p + shift) & 1) felt[static_cast<std::size_t>(p + shift)] = 1;
@@ -38,7 +38,7 @@ ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws) {
   if (laws.single()) return;
   const auto& chunks = families.tiles.chunks;
   const bool ghosts = laws.any_far();
-  const std::vector<std::uint8_t> felt = ghosts ? felt_by_owned(families) : std::vector<std::uint8_t>();
+  const std::vector<std::uint8_t> felt = ghosts ? felt_here(families) : std::vector<std::uint8_t>();
   const auto stores_nothing = [&](std::size_t p, std::size_t j) {
     if (laws.record_of(p).silent && laws.record_of(j).silent) return true;
     return ghosts && (laws.far(p) || laws.far(j) || (!felt[p] && !felt[j]));

@@ -31,7 +31,7 @@ BondCriterion::BondCriterion(const Families& families, const Formulation& formul
   const std::size_t count = body_.stride() / padding;
   for (std::size_t g = 0; g < count; ++g) {
     bool any = false;
-    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l);
+    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l) && body_.owns(g * padding + l);
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
@@ -46,7 +46,7 @@ void BondCriterion::set_screen() {
   FamilyArrays family;
   AlignedVector<double> share;
   screen_.limit = infinite;
-  for (const std::int32_t p : body_.owned()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
+  for (const std::int32_t p : body_.internal()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
   for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.limits.onset);
   screen_.over_share = traits_.bound == ValueBound::energy_over_share;
   screen_.near.assign(body_.stride() / padding, 0);
@@ -235,9 +235,13 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
 }
 
 void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
-  if (u.data == found_at_) {
-    for (std::size_t k = 0; k < bonds.size(); ++k)
-      values[k] = std::ranges::lower_bound(found_, bonds[k], {}, [](const Found& f) { return f.change.bond; })->value;
+  const auto known = [&](BondId bond) {
+    const auto at = std::ranges::lower_bound(found_, bond, {}, [](const Found& f) { return f.change.bond; });
+    return at != found_.end() && at->change.bond == bond ? &*at : nullptr;
+  };
+  // Another rank may have found a bond that was not looked at here.
+  if (u.data == found_at_ && std::ranges::all_of(bonds, known)) {
+    for (std::size_t k = 0; k < bonds.size(); ++k) values[k] = known(bonds[k])->value;
     return;
   }
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());

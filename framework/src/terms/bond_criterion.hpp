@@ -69,7 +69,7 @@ class BondCriterion final : public BondFinder {
   DamageTraits traits_;
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
-  std::vector<std::int32_t> groups_;  ///< with live points
+  std::vector<std::int32_t> groups_;  ///< with live points of this rank
   GroupMarks own_;
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;

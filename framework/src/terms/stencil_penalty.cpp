@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "families/cloud_rows.hpp"
+#include "families/lattice_families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "terms/zero_energy_penalty.hpp"
 
@@ -24,9 +25,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
  public:
   explicit StencilPenalty(const PenaltyParts& parts) : ZeroEnergyPenalty(parts), rows_(parts.families), stencil_(rows_.size(), -1) {
-    const BlockReach reach = cloud_reach(rows_.lists(), rows_.size());
-    colouring_ = Colouring(reach);
-    if (parts.skip) quiet_ = QuietBlocks(reach);
+    set_blocks();
     for (std::size_t r = 0; r < rows_.size(); ++r) set_stencil(r);
   }
 
@@ -62,7 +61,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
   void add_density(ConstFieldView u, double* density) override {
     read(u);
-    parallel_for(cloud_blocks(rows_.size()), [&](std::size_t b) {
+    parallel_for(blocks(), [&](std::size_t b) {
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
         if (stencil_[r] >= 0) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
@@ -71,7 +70,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   }
 
   std::size_t bytes() const noexcept override {
-    std::size_t total = rows_.bytes() + stencil_.size() * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
+    std::size_t total = rows_.bytes() + (stencil_.size() + row_order_.size()) * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
     for (const Stencil& s : stencils_) total += sizeof(Stencil) + 2 * s.spring.size() * sizeof(Row);
     return total;
   }
@@ -120,9 +119,34 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     }
   }
 
+  /// Blocks are those that the body has on any number of ranks: tiles of a lattice, pieces of the curve of a cloud.
+  void set_blocks() {
+    BlockReach reach;
+    if (const LatticeFamilies* lattice = parts_.families.lattice()) {
+      const LatticeTiles& tiles = lattice->tiles;
+      std::vector<std::int32_t> row_of(rows_.body().stride(), -1);
+      for (std::size_t r = 0; r < rows_.size(); ++r) row_of[rows_.point(r)] = static_cast<std::int32_t>(r);
+      for (const LatticeBlock& block : tiles.blocks) {
+        for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c)
+          for (int l = 0; l < chunk_points; ++l)
+            if (const std::int32_t r = row_of[static_cast<std::size_t>(tiles.chunks[c].first + l)]; r >= 0) row_order_.push_back(r);
+        block_end_.push_back(row_order_.size());
+      }
+      reach = tiles.reach;
+      colouring_ = tiles.colouring;
+    } else {
+      for (std::size_t r = 0; r < rows_.size(); ++r) row_order_.push_back(static_cast<std::int32_t>(r));
+      for (std::size_t b = 0; b < cloud_blocks(rows_.size()); ++b) block_end_.push_back(std::min(rows_.size(), (b + 1) * cloud_block_points));
+      reach = cloud_reach(rows_.lists(), rows_.size());
+      colouring_ = cloud_colouring(rows_.body(), reach, cloud_block_points);
+    }
+    if (parts_.skip) quiet_ = QuietBlocks(std::move(reach));
+  }
+
+  std::size_t blocks() const noexcept { return block_end_.size(); }
   template <class Use>
   void over_rows(std::size_t b, Use&& use) const {
-    for (std::size_t r = b * cloud_block_points; r < std::min(rows_.size(), (b + 1) * cloud_block_points); ++r) use(r);
+    for (std::size_t k = b == 0 ? 0 : block_end_[b - 1]; k < block_end_[b]; ++k) use(static_cast<std::size_t>(row_order_[k]));
   }
 
   /// t <- t_k by bond; sum_k z_ik . t_k.
@@ -167,6 +191,8 @@ class StencilPenalty final : public ZeroEnergyPenalty {
 
   BlockRows rows_;
   PenaltyElement<D> element_;
+  std::vector<std::int32_t> row_order_;  ///< block by block
+  std::vector<std::size_t> block_end_;   ///< into row_order_
   Colouring colouring_;
   QuietBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient

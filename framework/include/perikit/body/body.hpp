@@ -38,8 +38,8 @@ class Crack {
 struct Images;
 
 /// What a point is to a rank: nothing; one whose displacement alone it needs; one that it evaluates, as its own points feel it;
-/// its own.
-enum class Role : std::uint8_t { absent, far, near, own };
+/// an image of one of its own, whose force it needs in full; its own.
+enum class Role : std::uint8_t { absent, far, near, image, own };
 
 /// A rank's part of a body.
 struct BodyPart {
@@ -114,6 +114,8 @@ class Body {
   }
   /// Whether no other rank owns the point.
   bool owns(std::size_t internal_index) const noexcept { return own_.empty() || own_[internal_index]; }
+  /// Internal indices of the points whose forces are complete here: those of this rank, and the images of them. One rank: all.
+  std::span<const std::int32_t> complete() const noexcept { return own_.empty() ? internal_ : complete_; }
   /// Of a part of a cloud; null: the colours of blocks are not prescribed.
   const std::vector<std::int32_t>* block_colours(std::size_t block_points) const noexcept {
     const auto known = colours_.find(block_points);
@@ -153,6 +155,7 @@ class Body {
   std::vector<std::int32_t> places_;   ///< by internal index
   std::vector<std::int32_t> numbers_;  ///< by input number
   std::vector<std::uint8_t> own_;      ///< by internal index
+  std::vector<std::int32_t> complete_;
   std::size_t stride_of_whole_ = 0;
   std::map<std::size_t, std::vector<std::int32_t>> colours_;
 };

@@ -31,7 +31,7 @@ struct ImageTerm {
   int component, motion;
   double factor;
   Point at;
-  std::int32_t surface;                        ///< input number
+  std::int32_t surface;                        ///< input number, in the whole body
 };
 
 struct Images {
@@ -49,5 +49,8 @@ double halo(const Body& body);
 
 /// Images of the points that lie no farther than the halo from planes, axis after axis, so that edges and corners have images of images.
 Images make_images(const Body& body, std::span<const ImagePlane> planes);
+
+/// Those of the images of the whole body that a part of it has, by the numbers of the part.
+Images images_of_part(const Images& images, const Body& part);
 
 }  // namespace perikit

@@ -1,7 +1,7 @@
 #pragma once
 /// One rank's share of a body. It owns whole blocks of points, and evaluates by itself all that its points feel: what lies within
-/// reach of them is there too, its ghosts. Then forces of owned points are complete, and sums come in the order that they have on
-/// one rank.
+/// reach of them and of their images is there too, its ghosts. Then forces of owned points are complete, and sums come in the order
+/// that they have on one rank.
 
 #include <cstdint>
 #include <span>
@@ -18,10 +18,11 @@ class Partition {
   struct Reach {
     int bonds = 2;
     bool blocks = false;
+    bool sources = false;  ///< evaluation of an image asks for more of its source than the displacement
   };
-  /// All ranks of the communicator must call it with the same body. Throws std::domain_error where it has too few blocks for
-  /// them.
-  Partition(Body whole, const Reach& reach);
+  /// All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
+  /// images, and whoever owns a block has them. Throws std::domain_error where the body has too few blocks for the ranks.
+  Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
 
   const Body& whole() const noexcept { return whole_; }
   /// The points of this rank and its ghosts; far ones have the material number `far_material`.
@@ -30,20 +31,26 @@ class Partition {
   /// Input numbers of the whole body, by rank: points that rank k has as ghosts and this one owns, and the other way round.
   const std::vector<std::vector<std::int32_t>>& lent() const noexcept { return lent_; }
   const std::vector<std::vector<std::int32_t>>& borrowed() const noexcept { return borrowed_; }
-  /// By input number: the rank that owns the point.
+  /// By input number: the rank that owns the point or image.
   std::span<const std::int32_t> owners() const noexcept { return owner_; }
   bool owns(std::int32_t input) const noexcept { return part_.roles[static_cast<std::size_t>(input)] == Role::own; }
-  /// Points of each rank.
+  /// Points of each rank, without images.
   const std::vector<std::int64_t>& points() const noexcept { return points_; }
 
  private:
   void share_lattice(int size);
   void share_cloud(int size);
-  void keep_box(const Reach& reach);
+  void choose_images();
+  void keep_cells(const Reach& reach);
   void keep_families(const Reach& reach);
   void exchange_borders();
 
+  /// visit(input number, input number of the source) of the images.
+  template <class Visit>
+  void over_images(Visit&& visit) const;
+
   Body whole_;
+  std::vector<std::int32_t> sources_;
   BodyPart part_;
   std::vector<std::int32_t> owner_;
   std::vector<std::int64_t> points_;

@@ -23,7 +23,7 @@ struct MaterialRecord {
   bool uniform = true;
   double density = 0;                    ///< [kg/m^3]; 0: not given. Where it varies, see `densities`
   AlignedVector<double> densities;       ///< by point; empty where uniform
-  bool silent = false;                   ///< stores nothing: of ghosts and images. At most one, the last
+  bool silent = false;                   ///< stores nothing: of ghosts and images. At most two, the last
   bool far = false;                      ///< of points whose families are incomplete on this rank: their bonds store nothing either
 };
 
@@ -107,6 +107,7 @@ class Laws {
   std::span<const std::uint16_t> ids_;
   std::size_t stride_;
   bool single_;
+  std::size_t silent_;                   ///< the first record that stores nothing
   int state_ = 0;                        ///< components of history, the most of any law
   bool dissipates_ = false;
 };

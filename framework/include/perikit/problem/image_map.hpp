@@ -13,7 +13,7 @@ namespace perikit {
 
 class ImageMap {
  public:
-  /// `body` has these images.
+  /// `body` has these images; of the image points of a part of a body, images_of_part.
   ImageMap(const Body& body, const Images& images);
 
   std::size_t size() const noexcept { return image_.size(); }
@@ -30,14 +30,24 @@ class ImageMap {
   void mirror_gradients(FieldView H) const;
   /// Appends the images of the points, internal indices.
   void append_images(std::vector<std::int32_t>& points) const;
-  /// Reactions of images, by component, go to the points at the planes: what holds the planes in place [N].
+  /// Reactions of images, by component, go to the points at the planes: what holds the planes in place [N]. All ranks must call it.
   void gather(FieldView reaction) const;
 
  private:
   struct Share {
-    std::int64_t image, surface;               ///< components of points
+    std::int32_t image, surface;               ///< internal index; input number in the whole body
+    std::int32_t component;
     double factor;
   };
+  /// What goes to the points at the planes, in the order of their images.
+  struct Part {
+    std::int32_t image, surface;               ///< numbers in the whole body
+    std::int32_t component;
+    double value;
+  };
+  std::vector<Part> parts_of_all(ConstFieldView reaction) const;
+
+  const Body* body_;
   std::vector<std::int32_t> image_, source_;   ///< internal indices
   std::vector<std::array<double, 3>> sign_;
   std::vector<Share> shares_;
