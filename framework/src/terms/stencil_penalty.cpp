@@ -44,7 +44,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       over_rows(b, [&](std::size_t r) { for (int c = 0; c < D; ++c) any |= u_[r][c] != 0; });
       return any;
     });
-    colouring_.for_each([&](std::size_t b) {
+    colouring_->for_each([&](std::size_t b) {
       if (!quiet_.awake(b, 1)) return;
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
@@ -133,12 +133,12 @@ class StencilPenalty final : public ZeroEnergyPenalty {
         block_end_.push_back(row_order_.size());
       }
       reach = tiles.reach;
-      colouring_ = tiles.colouring;
+      colouring_ = &tiles.colouring;
     } else {
       for (std::size_t r = 0; r < rows_.size(); ++r) row_order_.push_back(static_cast<std::int32_t>(r));
       for (std::size_t b = 0; b < cloud_blocks(rows_.size()); ++b) block_end_.push_back(std::min(rows_.size(), (b + 1) * cloud_block_points));
       reach = cloud_reach(rows_.lists(), rows_.size());
-      colouring_ = cloud_colouring(rows_.body(), reach, cloud_block_points);
+      of_cloud_ = cloud_colouring(rows_.body(), reach, cloud_block_points);
     }
     if (parts_.skip) quiet_ = QuietBlocks(std::move(reach));
   }
@@ -193,7 +193,8 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   PenaltyElement<D> element_;
   std::vector<std::int32_t> row_order_;  ///< block by block
   std::vector<std::size_t> block_end_;   ///< into row_order_
-  Colouring colouring_;
+  Colouring of_cloud_;
+  const Colouring* colouring_ = &of_cloud_;   ///< or that of a lattice
   QuietBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient
   std::vector<Stencil> stencils_;
