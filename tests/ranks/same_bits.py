@@ -101,8 +101,8 @@ def beyond(everything):
 
 
 def torn(kinematics, damage, cloud):
-    """Pulled apart so fast that bonds fail, pieces among them."""
-    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 6.0\ntime_step = 0.05')
+    """Pulled apart so fast that bonds fail, pieces among them, and points are turned inside out before they are let go."""
+    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 10.0\ntime_step = 0.05')
     text = text.replace("[[boundary]]", 'velocity = ["0.15*(x - 16)/16", "0.1*sin(x/3)*(y - 13)/13"]\n[[boundary]]', 1)
     return text.replace('"reaction"]', '"reaction", "damage"]') + CRACK + damage
 

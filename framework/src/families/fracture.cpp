@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/field_operations.hpp"
 
 namespace perikit {
 
@@ -101,9 +102,41 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   return update;
 }
 
-/// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there.
+/// Groups that depend on the bonds of these points; on all ranks the same. More of them around families that have lost much: bonds of
+/// fragments may follow.
+GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, bool wide) const {
+  GroupMarks marks(families_.body().stride() / padding, 0);
+  families_.mark(ends, marks);
+  shared_.mark(marks);
+  constexpr double much = 0.5;
+  const auto poor = [&](std::int32_t p) {
+    const auto point = static_cast<std::size_t>(p);
+    return families_.body().owns(point) && families_.damage(point) > much;
+  };
+  if (!wide || !on_any_rank(std::ranges::any_of(ends, poor))) return marks;
+  for (int ring = 0; ring < 2; ++ring) {
+    marks = families_.around(marks);
+    shared_.mark(marks);
+  }
+  return marks;
+}
+
+/// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there. Between the first bonds
+/// and the last ones of fragments nothing is evaluated where that can be helped: points that are about to go may be turned inside out.
 void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
                     BondUpdate& update) {
+  if (impulse.data && part_.size() == 0) part_ = families_.body().make_field(impulse.components);
+  const FieldView part = impulse.data ? FieldView(part_) : FieldView{};
+  GroupMarks marks;   // empty: no forces are waiting for those without the bonds
+  double before = 0;
+  const auto settle = [&] {
+    if (marks.empty()) return;
+    const double after = body.forces(at, marks, -owed, part);
+    marks.clear();
+    if (!std::isfinite(before) || !std::isfinite(after)) return;
+    update.dissipated += before - after;
+    if (impulse.data) combine(1, impulse, 1, part, impulse);
+  };
   while (on_any_rank(!changes.empty())) {
     std::vector<std::int32_t> ends;
     for (const BondChange& c : changes) {
@@ -112,23 +145,27 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double o
     }
     std::sort(ends.begin(), ends.end());
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    GroupMarks marks(families_.body().stride() / padding, 0);
-    families_.mark(ends, marks);
-    shared_.mark(marks);
-    const double before = body.forces(at, marks, owed, impulse);
+    const GroupMarks of_these = dependent_on(ends, false);
+    const auto marked = [](std::uint8_t wanted, std::uint8_t have) { return !wanted || have; };
+    if (on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
+      settle();
+      marks = dependent_on(ends, true);
+      if (impulse.data) fill(0.0, part);
+      before = body.forces(at, marks, owed, part);
+    }
     families_.lower(changes);
     body.changed(ends);
     update.ends.insert(update.ends.end(), ends.begin(), ends.end());
     update.changed += std::max<std::size_t>(changes.size(), 1);
-    update.dissipated += before - body.forces(at, marks, -owed, impulse);
-    const std::vector<BondId> of_fragments = fragments(ends);
     if (gradual_) {
-      gradual_->fade(of_fragments);
+      settle();
+      gradual_->fade(fragments(ends));
       break;
     }
     changes.clear();
-    for (const BondId bond : of_fragments) changes.push_back({bond, 0.0});
+    for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
+  settle();
 }
 
 std::vector<BondId> Fracture::fragments(std::span<const std::int32_t> points) const {

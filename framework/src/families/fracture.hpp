@@ -24,7 +24,7 @@ class Fracture {
   /// What it needs of those who know the forces. Marks: groups of points that depend on bonds that fail.
   struct Body {
     /// force += factor times the forces of the evaluation points of the marked groups and of some others, the same ones whatever the
-    /// bonds are; without data nothing is added. Their energy, over all ranks.
+    /// bonds are; without data nothing is added. Their energy, over all ranks; not a number, and nothing is added, where a point is inadmissible.
     std::function<double(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
@@ -46,6 +46,7 @@ class Fracture {
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
   /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
+  GroupMarks dependent_on(std::span<const std::int32_t> ends, bool wide) const;
   void fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body, BondUpdate& update);
 
   Families& families_;
@@ -55,6 +56,7 @@ class Fracture {
   std::optional<GradualFailure> gradual_;
   std::size_t updates_ = 0;
   Field before_, at_;  ///< displacement at the beginning of the step, and where bonds fail
+  Field part_;         ///< of an impulse, as long as nobody knows whether it is whole
 };
 
 }  // namespace perikit

@@ -60,7 +60,7 @@ void SharedBonds::mark(GroupMarks& marks) const {
   if (!part()) return;
   std::vector<std::int32_t> mine;
   for (const std::int32_t p : body_.internal())
-    if (body_.owns(static_cast<std::size_t>(p)) && marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
+    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
   find_here();
   for (const std::int32_t place : told_to_all(gathered<std::int32_t>(mine)))
     if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;

@@ -24,7 +24,7 @@ class SharedBonds {
   /// Of the bonds that any rank names those with both ends here, ascending. All ranks must call it.
   std::vector<BondId> of_all(std::span<const BondId> bonds) const;
   std::vector<BondChange> of_all(std::span<const BondChange> changes) const;
-  /// Marks the groups of eight points that hold points of groups which any rank has marked among its own. All ranks must call it.
+  /// Marks the groups of eight points that hold points of groups which any rank has marked. All ranks must call it.
   void mark(GroupMarks& marks) const;
   /// Whether other ranks have bonds, too.
   bool part() const noexcept { return !body_.places().place.empty(); }

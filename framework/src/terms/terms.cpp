@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "assembly/block_pattern.hpp"
@@ -241,7 +242,9 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBeg
     ExactSum energy;
     // A bond may be evaluated once for both ends, at either.
     const GroupMarks only = families.around(marks), near = families.around(only);
-    for (const auto& term : terms_) term->add_forces_of(at, only, near, own, &energy);
+    std::int64_t bad = -1;
+    for (const auto& term : terms_) bad = std::max(bad, term->add_forces_of(at, only, near, own, &energy));
+    if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
     if (force.data) combine(1, force, factor, own, force);
     return total_over_ranks(energy);
   };
