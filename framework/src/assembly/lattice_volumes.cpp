@@ -25,15 +25,17 @@ class LatticeVolumes final : public VolumetricState<D> {
   std::int64_t linearise(ConstFieldView u) override {
     this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });
     FirstBad bad;
-    over_lanes(u, [&](const LatticeChunk& chunk, int l, const double* H) {
+    over_chunks(u, [&](const LatticeChunk& chunk, const double* H) {
       const LatticePattern& pattern = families_.pattern(chunk);
-      if (!(families_.live_bits(chunk.first) >> l & 1)) return;
-      const auto p = static_cast<std::size_t>(chunk.first + l);
-      T gradient{}, inverse_transpose{};
-      for (int c = 0; c < D * D; ++c) gradient(c / D, c % D) = H[c * batch_points];
-      if (!this->keep(p, gradient, pattern.singular >> l & 1 ? 0.0 : pattern.left[l], inverse_transpose))
-        return bad.report(static_cast<std::int64_t>(p));
-      for (int c = 0; c < D * D; ++c) inverse_transpose_.component(c)[p] = inverse_transpose(c / D, c % D);
+      for (int l = 0; l < chunk_points; ++l) {
+        if (!(families_.live_bits(chunk.first) >> l & 1)) continue;
+        const auto p = static_cast<std::size_t>(chunk.first + l);
+        T gradient{};
+        for (int c = 0; c < D * D; ++c) gradient(c / D, c % D) = H[c * batch_points + l];
+        const std::optional<T> inverse_transpose = this->keep(p, gradient, pattern.singular >> l & 1 ? 0.0 : pattern.left[l]);
+        if (!inverse_transpose) return bad.report(static_cast<std::int64_t>(p));
+        for (int c = 0; c < D * D; ++c) inverse_transpose_.component(c)[p] = (*inverse_transpose)(c / D, c % D);
+      }
     });
     if (bad.point() >= 0) return bad.point();
     this->over_batches([&](std::size_t begin, std::size_t end) {
@@ -96,12 +98,6 @@ class LatticeVolumes final : public VolumetricState<D> {
         operator_.gradient(&tiles_.chunks[first], static_cast<int>(n), w, H, batch_points);
         for (std::size_t k = 0; k < n; ++k) visit(tiles_.chunks[first + k], H + k * chunk_points);
       }
-    });
-  }
-  template <class Visit>
-  void over_lanes(ConstFieldView w, Visit&& visit) const {
-    over_chunks(w, [&](const LatticeChunk& chunk, const double* H) {
-      for (int l = 0; l < chunk_points; ++l) visit(chunk, l, H + l);
     });
   }
 

@@ -112,14 +112,14 @@ class StoredRows final : public VolumetricState<D> {
         for (int e = 0; e < D; ++e) H(c, e) += (u.component(c)[q] - u.component(c)[p]) * m.g[k * D + static_cast<std::size_t>(e)];
       for (std::size_t e = 0; e < D; ++e) regular |= m.g[k * D + e] != 0;
     }
-    T inverse_transpose{};
-    if (!this->keep(p, H, regular ? this->parts_.families.left(p) : 0.0, inverse_transpose)) return false;
+    const std::optional<T> inverse_transpose = this->keep(p, H, regular ? this->parts_.families.left(p) : 0.0);
+    if (!inverse_transpose) return false;
     own_[i] = Vector{};
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Entry entry{};
       for (int c = 0; c < D; ++c) {
         double b = 0;
-        for (int e = 0; e < D; ++e) b += inverse_transpose(c, e) * m.g[k * D + static_cast<std::size_t>(e)];
+        for (int e = 0; e < D; ++e) b += (*inverse_transpose)(c, e) * m.g[k * D + static_cast<std::size_t>(e)];
         entry[c] = static_cast<float>(b);
       }
       row_[first + k] = entry;

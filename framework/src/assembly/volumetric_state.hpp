@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 
 #include "assembly/assembly.hpp"
@@ -53,16 +54,15 @@ class VolumetricState : public VolumetricRows {
     return H;
   }
 
-  /// Keeps Fbar - I of point p, and its share c in the volumes of evaluation points (maps/selective_map.hpp). Fbar^-T; false where
+  /// Keeps Fbar - I of point p, and its share c in the volumes of evaluation points (maps/selective_map.hpp). Fbar^-T; none where
   /// Jbar <= 0.
-  bool keep(std::size_t p, const T& H, double share, T& inverse_transpose) noexcept {
+  std::optional<T> keep(std::size_t p, const T& H, double share) noexcept {
     for (int c = 0; c < D * D; ++c) H_.component(c)[p] = H(c / D, c % D);
     share_.data()[p] = share;
     const double j = jacobian_minus_one(H);
-    if (!(j > -1)) return false;
+    if (!(j > -1)) return std::nullopt;
     logarithms_.data()[p] = std::log1p(j);
-    inverse_transpose = 1 / (1 + j) * cofactor(add_diagonal(H, 1.0));
-    return true;
+    return 1 / (1 + j) * cofactor(add_diagonal(H, 1.0));
   }
 
   /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. Field index of a point

@@ -1,14 +1,12 @@
 #include "build/crossing_bonds.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 #include <optional>
 #include <vector>
 
-#include "perikit/core/communicator.hpp"
+#include "core/rank_values.hpp"
 #include "terms/energy_shares.hpp"
 
 namespace perikit {
@@ -61,25 +59,17 @@ struct OfPoint {
 
 /// The mean over the points of all ranks, in their order; nothing where there are none. All ranks must call it.
 std::optional<CrossingBonds> mean_of_all(const std::vector<OfPoint>& mine) {
-  std::vector<OfPoint> all;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
-    const std::size_t before = all.size();
-    all.resize(before + of_rank.size() / sizeof(OfPoint));
-    if (!of_rank.empty()) std::memcpy(all.data() + before, of_rank.data(), of_rank.size());
-  }
+  std::vector<OfPoint> all = gathered<OfPoint>(mine);
   std::ranges::sort(all, {}, &OfPoint::number);
-  std::array<double, 3> sum{};  // plain, shares, points
+  CrossingBonds sum;
   for (const OfPoint& point : all) {
-    sum[0] += point.crossing.plain;
-    sum[1] += point.crossing.shares;
-    ++sum[2];
+    sum.plain += point.crossing.plain;
+    sum.shares += point.crossing.shares;
   }
-  const auto bytes = std::as_bytes(std::span(sum));
-  std::vector<std::byte> of_first(bytes.begin(), bytes.end());
-  communicator().broadcast(of_first);
-  std::memcpy(sum.data(), of_first.data(), sizeof sum);
-  if (sum[2] == 0) return std::nullopt;
-  return CrossingBonds{sum[0] / sum[2], sum[1] / sum[2]};
+  const auto points = static_cast<double>(all.size());
+  const std::vector<CrossingBonds> mean = told_to_all(all.empty() ? std::vector<CrossingBonds>() : std::vector{CrossingBonds{sum.plain / points, sum.shares / points}});
+  if (mean.empty()) return std::nullopt;
+  return mean.front();
 }
 
 double ball_volume(const Body& body) {

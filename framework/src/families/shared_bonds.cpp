@@ -1,39 +1,11 @@
 #include "families/shared_bonds.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <iterator>
 
-#include "perikit/core/communicator.hpp"
+#include "core/rank_values.hpp"
 
 namespace perikit {
-
-namespace {
-
-/// On rank 0 what all ranks have, rank by rank.
-template <class T>
-std::vector<T> gathered(std::span<const T> mine) {
-  std::vector<T> all;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(mine))) {
-    const std::size_t before = all.size();
-    all.resize(before + of_rank.size() / sizeof(T));
-    if (!of_rank.empty()) std::memcpy(all.data() + before, of_rank.data(), of_rank.size());
-  }
-  return all;
-}
-
-/// What rank 0 has.
-template <class T>
-std::vector<T> told_to_all(const std::vector<T>& mine) {
-  const auto own = std::as_bytes(std::span(mine));
-  std::vector<std::byte> bytes(own.begin(), own.end());
-  communicator().broadcast(bytes);
-  std::vector<T> told(bytes.size() / sizeof(T));
-  if (!bytes.empty()) std::memcpy(told.data(), bytes.data(), bytes.size());
-  return told;
-}
-
-}  // namespace
 
 /// On rank 0 those of all ranks, by places in the whole body.
 std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) const {

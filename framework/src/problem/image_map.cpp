@@ -1,9 +1,8 @@
 #include "perikit/problem/image_map.hpp"
 
 #include <algorithm>
-#include <cstring>
 
-#include "perikit/core/communicator.hpp"
+#include "core/rank_values.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
@@ -67,22 +66,17 @@ std::vector<ImageMap::Part> ImageMap::parts_of_all(ConstFieldView reaction) cons
     parts.push_back({body_->number(static_cast<std::size_t>(share.image)), share.surface, share.component,
                      share.factor * reaction.component(share.component)[share.image]});
   if (body_->places().place.empty()) return parts;
-  std::vector<std::byte> bytes;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(parts))))
-    bytes.insert(bytes.end(), of_rank.begin(), of_rank.end());
-  communicator().broadcast(bytes);
-  parts.resize(bytes.size() / sizeof(Part));
-  if (!bytes.empty()) std::memcpy(parts.data(), bytes.data(), bytes.size());
+  parts = told_to_all(gathered<Part>(parts));
   std::ranges::stable_sort(parts, {}, &Part::image);
   return parts;
 }
 
 void ImageMap::gather(FieldView reaction) const {
-  std::vector<std::pair<std::int32_t, std::int32_t>> own;  // numbers in the whole body, internal indices
-  for (const std::int32_t p : body_->owned()) own.emplace_back(body_->number(static_cast<std::size_t>(p)), p);
+  const std::vector<std::int32_t>& own = body_->owned();
+  const auto number = [&](std::int32_t p) { return body_->number(static_cast<std::size_t>(p)); };
   for (const Part& part : parts_of_all(reaction)) {
-    const auto at = std::ranges::lower_bound(own, part.surface, {}, &std::pair<std::int32_t, std::int32_t>::first);
-    if (at != own.end() && at->first == part.surface) reaction.component(part.component)[at->second] += part.value;
+    const auto at = std::ranges::lower_bound(own, part.surface, {}, number);
+    if (at != own.end() && number(*at) == part.surface) reaction.component(part.component)[*at] += part.value;
   }
   for (int c = 0; c < reaction.components; ++c)
     for (const std::int32_t p : image_) reaction.component(c)[p] = 0;

@@ -1,10 +1,9 @@
 #include "perikit/problem/state.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <iterator>
 
-#include "perikit/core/communicator.hpp"
+#include "core/rank_values.hpp"
 #include "perikit/core/errors.hpp"
 #include "problem/snapshot.hpp"
 
@@ -35,17 +34,6 @@ std::size_t State::bytes() const noexcept {
 
 namespace {
 
-/// From all ranks, one after the other, on rank 0.
-std::vector<double> gathered(const std::vector<double>& mine) {
-  std::vector<double> together;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
-    const std::size_t before = together.size();
-    together.resize(before + of_rank.size() / sizeof(double));
-    if (!of_rank.empty()) std::memcpy(together.data() + before, of_rank.data(), of_rank.size());
-  }
-  return together;
-}
-
 /// Points and images that no other rank has.
 std::vector<std::int32_t> own_points(const Body& body) {
   std::vector<std::int32_t> own;
@@ -62,7 +50,7 @@ void State::write(const Body& whole, ByteWriter& out) const {
   std::vector<double> values, to;  // of owned points; where those of all ranks go
   if (!places.empty()) {
     for (const std::int32_t p : owned) values.push_back(places[static_cast<std::size_t>(p)]);
-    to = gathered(values);
+    to = gathered<double>(values);
   }
   out.value(time);
   out.value(step);
@@ -82,7 +70,7 @@ void State::write(const Body& whole, ByteWriter& out) const {
     }
     for (int c = 0; c < field.components(); ++c) {
       for (std::size_t n = 0; n < owned.size(); ++n) values[n] = field.component(c)[owned[n]];
-      const std::vector<double> from = gathered(values);
+      const std::vector<double> from = gathered<double>(values);
       if (from.empty()) continue;
       std::vector<double> all(whole.stride(), 0.0);
       for (std::size_t n = 0; n < from.size(); ++n) all[static_cast<std::size_t>(to[n])] = from[n];
