@@ -249,3 +249,26 @@ TEST_CASE("bonds that fail give what they owe to every point, the first one too:
     CHECK(std::abs(after - before) <= 1e-12 * size);
   }
 }
+
+TEST_CASE("bonds that fail while their points are inside out: nothing is taken of them that is not a number, and the summary says so") {
+  registry();
+  for (const bool cloud : {false, true}) {
+    INFO(std::string(cloud ? "cloud" : "lattice"));
+    contract::BodyOptions body{.dimension = 2, .cloud = cloud, .cells = 12};
+    body.material = "type = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
+    body.conditions = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.5\n";
+    const auto simulation = contract::build(contract::scene_text(body, "type = \"baqp\""));
+    BodyProblem& problem = simulation->problem();
+    REQUIRE(problem.fracture_summary().find("inside out") == std::string::npos);
+    // One half is mirrored, which leaves its bonds their lengths, and goes away from the other.
+    const FieldView u = problem.state().displacement();
+    for (const std::int32_t p : problem.body().internal()) {
+      const double x = problem.body().position(static_cast<std::size_t>(p))[0];
+      if (x > 6) u.component(0)[p] = 12 - 2 * x, u.component(1)[p] = 40;
+    }
+    CHECK(problem.advance(0));
+    CHECK(problem.terms().bond_checks().failed > 0);
+    CHECK(problem.state().energies.dissipated == 0);
+    CHECK(problem.fracture_summary().find("warning       1 times points were turned inside out where bonds failed") != std::string::npos);
+  }
+}

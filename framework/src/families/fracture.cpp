@@ -98,7 +98,6 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     fail(std::move(of_half), at_, owed, impulse, body, update);
     for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
   }
-  reaction->ends = update.ends;
   return update;
 }
 
@@ -133,7 +132,10 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double o
     if (marks.empty()) return;
     const double after = body.forces(at, marks, -owed, part);
     marks.clear();
-    if (!std::isfinite(before) || !std::isfinite(after)) return;
+    if (!std::isfinite(before) || !std::isfinite(after)) {
+      ++update.inside_out;
+      return;
+    }
     update.dissipated += before - after;
     if (impulse.data) combine(1, impulse, 1, part, impulse);
   };

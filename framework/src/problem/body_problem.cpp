@@ -204,16 +204,17 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
   };
   const bool explicit_step = velocity.data != nullptr;
   BondReaction reaction;
-  const bool changed =
+  const BondUpdate update =
       parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
-  if (changed && explicit_step) react(reaction, velocity);
-  if (changed && weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
-  return changed;
+  if (update.changed == 0) return false;
+  if (explicit_step) react(reaction, update.ends, velocity);
+  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
+  return true;
 }
 
 /// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
 /// the impulse upon it; its work is that of all other forces, with the opposite sign.
-void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
+void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> ends, FieldView velocity) {
   EvaluationStatus status;
   const FieldView impulse = reaction.impulse, drift = reaction.drift;
   finish(impulse, status);
@@ -237,7 +238,7 @@ void BodyProblem::react(BondReaction& reaction, FieldView velocity) {
   if (energy_wanted_ || ghosts_ || images() || weak_springs_) {
     status = evaluate_forces(u, state().internal_force(), energy_wanted_ ? &state().energies.strain : nullptr);
   } else {
-    status = terms().renew_forces(u, moved, reaction.ends, state().internal_force());
+    status = terms().renew_forces(u, moved, ends, state().internal_force());
     describe(status);
   }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);

@@ -6,16 +6,17 @@
 
 namespace perikit {
 
-bool FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
-                            BondReaction* reaction) {
-  const BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
+BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
+                                  BondReaction* reaction) {
+  BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.dissipated;  // explicit steps take it anew
   if (update.dissipated < 0) {
     ++gains_;
     gained_ -= update.dissipated;
   }
-  return update.changed > 0;
+  inside_out_ += update.inside_out;
+  return update;
 }
 
 std::string FractureRecord::summary(const BondChecks& checks, double dissipated) const {
@@ -33,12 +34,17 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
         fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n",
                     gains_, gained_, dissipated + gained_);
   }
+  if (inside_out_ > 0) {
+    text += fmt::format("warning       {} times points were turned inside out where bonds failed: the energy and the impulse of these bonds are lost\n",
+                        inside_out_);
+  }
   return text;
 }
 
 void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   out.value(gains_);
   out.value(gained_);
+  out.value(inside_out_);
   const std::vector<BondChange> bonds = terms.changed_bonds();
   out.value(static_cast<std::uint64_t>(bonds.size()));
   for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
@@ -65,14 +71,19 @@ std::vector<BondChange> read_changes(ByteReader& in) {
 }  // namespace
 
 void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
-  in.value<std::int64_t>();  // updates that gained energy, and what they gained
-  in.value<double>();
+  FractureRecord record;
+  record.read_account(in);
   bonds = read_changes(in);
 }
 
-void FractureRecord::read(Terms& terms, ByteReader& in) {
+void FractureRecord::read_account(ByteReader& in) {
   gains_ = in.value<std::int64_t>();
   gained_ = in.value<double>();
+  inside_out_ = in.value<std::int64_t>();
+}
+
+void FractureRecord::read(Terms& terms, ByteReader& in) {
+  read_account(in);
   terms.restore_bonds(read_changes(in));
 }
 

@@ -70,7 +70,6 @@ using StepBegin = std::function<void(FieldView)>;
 /// What bonds that failed inside of a step mean for it. Its forces were taken with them.
 struct BondReaction {
   Field impulse;  ///< what they still owed when they failed, or had given too much [N s]
-  std::vector<std::int32_t> ends;  ///< of the bonds
   Field drift;    ///< that of the first half of the step times its length: by mass, what it has moved the points [N s^2]
 };
 
@@ -78,6 +77,7 @@ struct BondUpdate {
   std::size_t changed = 0;  ///< bonds, each once
   double dissipated = 0;    ///< strain energy before less after, at the displacement where they failed [J]
   std::vector<std::int32_t> ends = {};  ///< points whose bonds have changed, some of them more than once
+  int inside_out = 0;       ///< times that a point was inadmissible where bonds failed: no energy and no impulse is taken of them
 };
 
 /// How the checks went: what the conservative skip saved.

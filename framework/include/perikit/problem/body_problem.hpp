@@ -106,7 +106,7 @@ class BodyProblem final : public Problem {
   /// What evaluations of forces say of inadmissible deformation.
   void describe(EvaluationStatus& status) const;
   /// What bonds that failed inside of the last step mean for forces, velocity and work.
-  void react(BondReaction& reaction, FieldView velocity);
+  void react(BondReaction& reaction, std::span<const std::int32_t> ends, FieldView velocity);
 
   Field seen_, seen_direction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces

@@ -17,9 +17,8 @@ class FractureRecord {
 
   /// Null where bonds never fail.
   const BodyDamage* damage() const noexcept { return damage_.get(); }
-  /// Lets bonds of `terms` fail at u, the displacement as they see it; energies of the state follow; true where any changed. The
-  /// rest: see Terms.
-  bool update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin, BondReaction* reaction);
+  /// Lets bonds of `terms` fail at u, the displacement as they see it; energies of the state follow. The rest: see Terms.
+  BondUpdate update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin, BondReaction* reaction);
   /// How bonds failed so far, in words; empty where they never fail.
   std::string summary(const BondChecks& checks, double dissipated) const;
 
@@ -29,9 +28,12 @@ class FractureRecord {
   static void read_bonds(ByteReader& in, std::vector<BondChange>& bonds);
 
  private:
+  void read_account(ByteReader& in);
+
   std::unique_ptr<const BodyDamage> damage_;
   std::int64_t gains_ = 0;  ///< updates that raised the strain energy
   double gained_ = 0;       ///< what they added [J]
+  std::int64_t inside_out_ = 0;  ///< see BondUpdate
 };
 
 }  // namespace perikit
