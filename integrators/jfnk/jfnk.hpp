@@ -64,8 +64,7 @@ class Jfnk final : public Integrator {
  public:
   explicit Jfnk(const JfnkOptions& options) : options_(options) {}
   IntegratorTraits traits() const noexcept override {
-    const bool matrix = options_.preconditioner != "auto" && options_.preconditioner != "none";
-    return {.dynamic = false, .quasi_static = true, .several_ranks = !matrix};
+    return {.dynamic = false, .quasi_static = true, .several_ranks = !needs_one_rank(options_.preconditioner)};
   }
   void run(Problem& problem, Observer& observer) override;
 

@@ -278,9 +278,8 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
 
 void Kinsol::run(Problem& problem, Observer& observer) {
   std::string chosen;
-  const bool krylov = options_.strategy != "fixed_point" && options_.linear_solver != "klu";
-  auto preconditioner = krylov ? make_preconditioner(options_.preconditioner, problem, chosen) : nullptr;
-  if (krylov) observer.log("kinsol: preconditioner " + chosen);
+  auto preconditioner = krylov() ? make_preconditioner(options_.preconditioner, problem, chosen) : nullptr;
+  if (krylov()) observer.log("kinsol: preconditioner " + chosen);
   KinsolSolver solver(problem, options_, std::move(preconditioner));
   run_load_steps("kinsol", options_.load_steps, problem, observer, solver);
 }

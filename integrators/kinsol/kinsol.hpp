@@ -77,10 +77,15 @@ class KinsolSolver final : public EquilibriumSolver {
 class Kinsol final : public Integrator {
  public:
   explicit Kinsol(const KinsolOptions& options) : options_(options) {}
-  IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  IntegratorTraits traits() const noexcept override {
+    const bool matrix = krylov() ? needs_one_rank(options_.preconditioner) : options_.strategy != "fixed_point";
+    return {.dynamic = false, .quasi_static = true, .several_ranks = !matrix};
+  }
   void run(Problem& problem, Observer& observer) override;
 
  private:
+  bool krylov() const noexcept { return options_.strategy != "fixed_point" && options_.linear_solver != "klu"; }
+
   KinsolOptions options_;
 };
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "assembled_tangent.hpp"
+#include "first_rank.hpp"
 #include "multigrid.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -97,22 +99,40 @@ class BlockJacobi final : public Preconditioner {
   std::vector<double> inverse_;
 };
 
-/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly.
+/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly. Where there are several
+/// ranks the first one makes and applies that of the whole body: a solve takes the iterations that it takes on one.
 class CompanionCycle final : public Preconditioner {
  public:
-  explicit CompanionCycle(Problem& problem) : Preconditioner(problem) {}
-  void apply(ConstFieldView r, FieldView z) override { multigrid_.apply(r, z); }
+  explicit CompanionCycle(Problem& problem) : Preconditioner(problem) {
+    if (communicator().size() > 1) first_rank_.emplace(problem.body());
+  }
+
+  void apply(ConstFieldView r, FieldView z) override {
+    if (!first_rank_) return multigrid_.apply(r, z);
+    Field whole = first_rank_->gather(r);
+    if (communicator().rank() == 0) multigrid_.apply(whole, whole);
+    first_rank_->scatter(whole, z);
+  }
 
  private:
   bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
     equilibrium.problem().assemble_companion(u, springs_, std::numeric_limits<double>::infinity());
-    multigrid_.make(springs_, equilibrium.free(), rigid_motions(equilibrium.problem().body(), u));
+    std::vector<Field> rigid = rigid_motions(equilibrium.problem().body(), u);
+    if (!first_rank_) {
+      multigrid_.make(springs_, equilibrium.free(), rigid);
+      return true;
+    }
+    const BlockMatrix whole = first_rank_->gather(springs_);
+    const Field free = first_rank_->gather(equilibrium.free());
+    for (Field& motion : rigid) motion = first_rank_->gather(motion);
+    if (communicator().rank() == 0) multigrid_.make(whole, free, rigid);
     return true;
   }
   double patience() const noexcept override { return 1.3; }  // it is cheap
 
   BlockMatrix springs_;
   Multigrid multigrid_;
+  std::optional<FirstRank> first_rank_;  ///< where there are several
 };
 
 /// Largest ratio of bulk to shear modulus.
@@ -182,13 +202,14 @@ bool mixed_pays(Problem& problem) {
   return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
+bool needs_one_rank(const std::string& preconditioner) noexcept {
+  return preconditioner != "auto" && preconditioner != "none" && preconditioner != "companion";
+}
+
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
   chosen = name;
-  if (name == "auto" && communicator().size() > 1) {
-    chosen = "none";  // the assembled tangent needs the whole body on one rank
-  } else if (name == "auto") {
-    chosen = factorisation_pays(problem) ? "factorisation" : "companion";
-  }
+  // The assembled tangent needs the whole body on one rank.
+  if (name == "auto") chosen = communicator().size() == 1 && factorisation_pays(problem) ? "factorisation" : "companion";
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
   if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);

@@ -63,9 +63,12 @@ void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 /// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere, and the factorisation does not pay.
 bool mixed_pays(Problem& problem);
 
+/// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.
+bool needs_one_rank(const std::string& preconditioner) noexcept;
+
 /// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"
 /// (a multigrid cycle on springs between nearest neighbours, never the tangent), "auto": the factorisation in 1D, and in 2D for at
-/// most 4000 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else the companion.
+/// most 4000 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else, and on several ranks, the companion.
 /// `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 

@@ -39,8 +39,17 @@ DAMAGE = {
     "max_stress": '[damage]\ntype = "max_stress"\nstrength = 0.05\n',
     "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
 }
+STATICS = {
+    "jfnk": 'type = "jfnk"\nsteps = 2\ntolerance = 1e-9',
+    "jfnk, no preconditioner": 'type = "jfnk"\nsteps = 1\ntolerance = 1e-6\npreconditioner = "none"',
+    "kinsol": 'type = "kinsol"\nsteps = 2\ntolerance = 1e-9',
+}
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
+
+
+def without_velocities(text):
+    return text.replace('"velocity", ', "").replace('quantity = "velocity"', 'quantity = "displacement"')
 
 
 def with_inclusion(text):
@@ -117,6 +126,13 @@ def cases(everything):
         # Steps of a given length where families are too poor for the estimate to mean anything.
         step = "\ntime_step = 0.02" if "order 2" in name and dimension == 3 else ""
         yield "%s, %dD %s" % (name, dimension, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], dimension, cloud, 'type = "verlet"\n' + short + step), ranks, threads
+    # Rows of four chunks, of which a rank has runs that begin elsewhere.
+    for name in KINEMATICS if everything else ("projection", "silling"):
+        if "selective" not in name and "order" not in name:
+            yield "%s, large" % name, scene(KINEMATICS[name], 3, False, 'type = "verlet"\nend_time = 0.1\ntime_step = 0.02', cells=[22, 22, 27]), (2, 3) if everything else (2,), (1,)
+    for name in STATICS if everything else ("jfnk",):
+        for cloud in (False, True) if everything else (False,):
+            yield "%s, %s" % (name, "cloud" if cloud else "lattice"), without_velocities(scene(KINEMATICS["baqp"], 2, cloud, STATICS[name])), ranks, threads
     for name in ("conventional", "projection", "ordinary", "bond_associated") if everything else ("projection",):
         for cloud in (False, True) if everything else (False,):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))

@@ -56,7 +56,7 @@ Result run_on(int ranks, const std::string& text) {
     const auto simulation = contract::build(text);
     const contract::Watch watch = contract::run(*simulation);
     const std::lock_guard lock(one);
-    const std::size_t numbers = 3 * simulation->problem().whole().points();
+    const std::size_t numbers = 3 * simulation->problem().body().points_of_all_ranks();
     result.displacement.resize(numbers, std::nan(""));
     result.force.resize(numbers, std::nan(""));
     collect(*simulation, result);
@@ -169,8 +169,10 @@ TEST_CASE("partition: laws with history on several ranks are those on one, bit f
 }
 
 TEST_CASE("partition: statics without a matrix on several ranks is that on one") {
-  for (const std::string integrator : {"type = \"jfnk\"\npreconditioner = \"none\"\nsteps = 1\ntolerance = 1e-9",
-                                       "type = \"dynamic_relaxation\"\nsteps = 1\ntolerance = 1e-6"})
+  for (const std::string integrator :
+       {"type = \"jfnk\"\npreconditioner = \"none\"\nsteps = 1\ntolerance = 1e-9", "type = \"jfnk\"\npreconditioner = \"companion\"\nsteps = 2\ntolerance = 1e-9",
+        "type = \"kinsol\"\npreconditioner = \"companion\"\nsteps = 1\ntolerance = 1e-9", "type = \"kinsol\"\nstrategy = \"fixed_point\"\nsteps = 1\ntolerance = 1e-4\nmax_iterations = 4000",
+        "type = \"dynamic_relaxation\"\nsteps = 1\ntolerance = 1e-6"})
     for (const bool cloud : {false, true}) {
       INFO(integrator, ", ", std::string(cloud ? "cloud" : "lattice"));
       contract::BodyOptions body = body_of(2, cloud);
@@ -180,11 +182,39 @@ TEST_CASE("partition: statics without a matrix on several ranks is that on one")
     }
 }
 
+TEST_CASE("partition: the companion of a body in space, of one held at a face, and of one that is cracked, is that of one rank") {
+  for (const bool cloud : {false, true})
+    for (const std::string what : {"space", "face", "crack"}) {
+      INFO(what, ", ", std::string(cloud ? "cloud" : "lattice"));
+      contract::BodyOptions body = body_of(what == "space" ? 3 : 2, cloud);
+      body.material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
+      body.integrator = "type = \"jfnk\"\npreconditioner = \"companion\"\nsteps = 1\ntolerance = 1e-9";
+      body.crack = what == "crack";
+      if (what == "face") {
+        const std::string held = "set = \"low\"\n";
+        body.conditions.replace(body.conditions.find(held), held.size(), "face = \"-x\"\n");
+      }
+      compare(contract::scene_text(body, "type = \"baqp\""), what == "space" ? std::vector{2} : std::vector{2, 3});
+    }
+}
+
+TEST_CASE("partition: a body that nothing holds is refused on several ranks, too") {
+  contract::BodyOptions body = body_of(2, false);
+  body.conditions = body.conditions.substr(body.conditions.find("[[load]]"));
+  body.integrator = "type = \"jfnk\"\nsteps = 1";
+  for (const int ranks : {1, 2, 3})
+    CHECK_THROWS_WITH(run_on(ranks, contract::scene_text(body, "type = \"baqp\"")), doctest::Contains("found nothing that holds the body"));
+}
+
 TEST_CASE("partition: what needs the whole body on one rank says so") {
   contract::BodyOptions body = body_of(2, false);
   body.integrator = "type = \"newton\"\nsteps = 1";
   CHECK_THROWS_WITH(run_on(2, contract::scene_text(body, "type = \"conventional\"")),
                     doctest::Contains("found \"newton\" on 2 ranks; allowed: integrators that need no matrix"));
+  for (const std::string matrix : {"type = \"jfnk\"\npreconditioner = \"factorisation\"", "type = \"kinsol\"\npreconditioner = \"jacobi\"", "type = \"kinsol\"\nlinear_solver = \"klu\""}) {
+    body.integrator = matrix + "\nsteps = 1";
+    CHECK_THROWS_WITH(run_on(2, contract::scene_text(body, "type = \"conventional\"")), doctest::Contains("on 2 ranks; allowed: integrators that need no matrix"));
+  }
   body.conditions += "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n";
   body.integrator = "type = \"jfnk\"\nsteps = 1";
   CHECK_THROWS_WITH(run_on(2, contract::scene_text(body, "type = \"conventional\"")),

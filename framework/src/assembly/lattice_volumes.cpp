@@ -67,7 +67,8 @@ class LatticeVolumes final : public VolumetricState<D> {
           for (int l = 0; l < chunk_points; l += pack_width)
             (-Pack::load(q.data + chunk.first + l) * Pack::load(inverse_transpose_.component(k) + chunk.first + l))
                 .store(stress + k * chunk_points + l);
-        operator_.stress_to_flux(chunk, stress, chunk_points, flux_, chunk.first, f);
+        operator_.stress_to_flux(chunk, stress, chunk_points, flux_, chunk.first);
+        operator_.own_flux(chunk, flux_, chunk.first, f);
       }
     });
     tiles_.colouring.for_each([&](std::size_t b) {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/rank_values.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "terms/energy_shares.hpp"
 
 namespace perikit {

@@ -16,8 +16,9 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
   const std::string threads = "one rank with many threads (--threads)";
   if (!integrator.several_ranks)
     refuse(scene.integrator->values.position("type"), "integrator.type", fmt::format("\"{}\"", scene.integrator->type),
-           fmt::format("integrators that need no matrix (explicit ones; Krylov solvers with preconditioner = \"none\"), or {}",
+           fmt::format("integrators that need no matrix (explicit ones; Krylov solvers with preconditioner = \"companion\" or \"none\"), or {}",
                        threads));
+  if (scene.weak_springs > 0) refuse(scene.weak_springs_position, "run.weak_springs", "springs on loose pieces", threads);
   if (scene.damage && integrator.quasi_static)
     refuse(scene.damage->values.position(""), "damage", fmt::format("bonds that may fail with \"{}\"", scene.integrator->type),
            fmt::format("explicit integrators, or {}", threads));

@@ -21,7 +21,7 @@ namespace {
 void refuse_ranks(const ProblemParts& parts) {
   if (parts.partition)
     throw RunError(
-        "an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers without a preconditioner");
+        "an assembled tangent needs the whole body on one rank; allowed: matrix-free solvers, without a preconditioner or with the companion");
 }
 
 }  // namespace
@@ -178,7 +178,6 @@ AssembledSize BodyProblem::assembled_size() {
 }
 
 void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) {
-  refuse_ranks(parts_);
   if (!companion_) companion_ = std::make_unique<Companion>(*parts_.families, laws());
   companion_->limit_bulk(most_bulk);
   over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) { companion_->assemble(seen(u, seen_), of_terms); });
@@ -245,12 +244,10 @@ void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> en
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
+  if (parts_.partition) return parts_.loose;
   weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
   weak_springs_->find(seen(state().displacement(), seen_), true);
-  const std::vector<LoosePiece>& pieces = weak_springs_->pieces();
-  if (pieces.empty()) return {};
-  const std::string first = pieces.front().name(body());
-  return pieces.size() == 1 ? first : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+  return names(weak_springs_->pieces(), body());
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {

@@ -86,7 +86,9 @@ void Companion::find_pattern() {
   const std::size_t n = point_.size();
   // A little more than the diagonal of a face; clouds have about as many neighbours there, but where points are far apart some
   // have few: they keep their family.
-  const double reach = (dimension_ == 1 ? 1.01 : 1.43) * body_.spacing();
+  double reach = (dimension_ == 1 ? 1.01 : 1.43) * body_.spacing();
+  // Farther than a horizon from its own points a rank knows no moduli.
+  if (!body_.places().place.empty()) reach = std::min(reach, body_.horizon());
   lists_ = find_families(rows_, n, dimension_, reach);
   std::vector<bool> poor(n);
   for (std::size_t i = 0; i < n; ++i) poor[i] = lists_.first[i + 1] - lists_.first[i] < dimension_;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/rank_values.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {

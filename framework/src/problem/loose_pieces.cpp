@@ -147,6 +147,12 @@ std::string LoosePiece::name(const Body& body) const {
                      centre[0], centre[1], centre[2]);
 }
 
+std::string names(const std::vector<LoosePiece>& pieces, const Body& body) {
+  if (pieces.empty()) return {};
+  const std::string first = pieces.front().name(body);
+  return pieces.size() == 1 ? first : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+}
+
 std::vector<LoosePiece> find_loose_pieces(const Families& families, const Constraints& constraints, const ImageMap* images,
                                           ConstFieldView u) {
   const Body& body = families.body();

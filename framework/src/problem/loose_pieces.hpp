@@ -30,6 +30,9 @@ struct LoosePiece {
   std::string name(const Body& body) const;
 };
 
+/// All of them, in words; empty: none.
+std::string names(const std::vector<LoosePiece>& pieces, const Body& body);
+
 /// At the displacement u as the terms see it. images: null without. Of bodies on one rank.
 std::vector<LoosePiece> find_loose_pieces(const Families& families, const Constraints& constraints, const ImageMap* images,
                                           ConstFieldView u);

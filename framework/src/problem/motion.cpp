@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/exact_sum.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -48,13 +49,16 @@ Field reactions(Problem& problem, bool dynamic, double t) {
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
   const int d = body.dimension();
   Point middle{};
-  for (const std::int32_t p : body.internal())
-    for (std::size_t c = 0; c < 3; ++c)
-      middle[c] += body.position(static_cast<std::size_t>(p))[c] / static_cast<double>(body.points());
+  for (std::size_t c = 0; c < 3; ++c) {
+    ExactSum sum;
+    for (const std::int32_t p : body.owned()) sum.add(body.position(static_cast<std::size_t>(p))[c]);
+    middle[c] = total_over_ranks(sum) / static_cast<double>(body.points_of_all_ranks());
+  }
   double size = body.spacing();
-  for (const std::int32_t p : body.internal())
+  for (const std::int32_t p : body.owned())
     for (std::size_t c = 0; c < 3; ++c)
       size = std::max(size, std::abs(body.position(static_cast<std::size_t>(p))[c] - middle[c]));
+  size = communicator().largest(size);
   std::vector<Field> motions;
   for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(body.make_field(d));
   for (const std::int32_t index : body.internal()) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "core/rank_values.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "perikit/core/errors.hpp"
 #include "problem/snapshot.hpp"
 

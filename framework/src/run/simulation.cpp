@@ -40,7 +40,6 @@ void Simulation::watch_pieces() {
     throw InputError(scene_.weak_springs_position, "run.weak_springs",
                      fmt::format("found with integrator \"{}\", which looks for no equilibrium; allowed: in quasi-static runs", scene_.integrator->type));
   }
-  if (communicator().size() > 1) return;   // no rank knows the bonds of the others
   loose_ = problem_->watch_pieces(scene_.weak_springs);
   if (loose_.empty() || scene_.weak_springs > 0) return;
   throw InputError({scene_.file.string()}, "boundary",

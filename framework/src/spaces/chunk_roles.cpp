@@ -66,6 +66,7 @@ ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws) {
     if (!ghosts) return;
     role.gradient = role.stress = false;
     for (int l = 0; l < chunk_points; ++l) {
+      if (!(families.live_bits(chunks[c].first) >> l & 1)) continue;
       const auto p = static_cast<std::size_t>(chunks[c].first + l);
       role.gradient = role.gradient || !laws.far(p);
       role.stress = role.stress || felt[p];

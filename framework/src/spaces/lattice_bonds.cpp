@@ -80,7 +80,6 @@ void LatticeBonds<D>::gradients(std::size_t b, Pass& pass) {
     }
     int n = stencils_ ? 1 : run_length(tiles_.chunks, c, block.chunk_end, 4);
     while (n > 1 && !roles_.wants(c + static_cast<std::size_t>(n) - 1, &ChunkRole::gradient)) --n;
-    // Whole runs: kernels for other numbers of chunks may round in another way.
     bool wanted = false;
     for (int k = 0; k < n; ++k) wanted |= pass.gradient_wanted(chunk.first + k * chunk_points);
     if (!wanted) {
@@ -254,7 +253,9 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
       add_owner_stress(laws_.space(), owner_gradients(chunk, pass.work.tangent()), pressure_.component(0) + chunk.first, pressure_.component(1) + chunk.first,
                        stress, flux_.stride());
     }
-    if (!stencils_) operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, chunk.first, pass.out);
+    if (stencils_) continue;
+    operator_.stress_to_flux(chunk, stress, flux_.stride(), flux_, chunk.first);
+    operator_.own_flux(chunk, flux_, chunk.first, pass.out);
   }
 }
 

@@ -8,6 +8,8 @@
 /// Beside them, at little cost, the plain sums over neighbours: sum_s omega_s u_{k+s} with the gradient, f_k += sum_s omega_s v_{k+s} of
 /// a source v with the divergence.
 ///
+/// A point has the same bits in runs of any number of chunks: which chunks follow each other differs from rank to rank.
+///
 /// Sums run along the internal axes of the lattice (d, K, Q, m); H and S have the components of the input axes.
 /// (s runs over intact bonds; dead cells hold u = 0 and Q = 0, so that free surfaces need no masks but the first moment m.)
 
@@ -31,8 +33,8 @@ class LatticeOperator {
     runs<true>(chunks, count, u, H, stride, sums);
   }
 
-  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at at + lane. Also f += Q m, unless f is null.
-  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at, FieldView f) const noexcept {
+  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at at + lane.
+  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at) const noexcept {
     const LatticePattern& pattern = f_.pattern(chunk);
     const Pack scale(1.0 / f_.spacing);
     for (int l = 0; l < chunk_points; l += pack_width) {
@@ -41,16 +43,25 @@ class LatticeOperator {
       for (int c = 0; c < D; ++c) {
         Pack s[D];
         for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + f_.grid.axis[e]) * s_stride + l);
-        Pack own(0.0);
         for (int e = 0; e < D; ++e) {
           Pack q(0.0);
           for (int k = 0; k < D; ++k) q += s[k] * inverse[symmetric_index(D, k, e)];
           q.store(Q.component(c * D + e) + at + l);
-          own += q * Pack::load(pattern.moment[e] + l);
         }
-        if (f.data && chunk.pattern >= 0) (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
       }
     }
+  }
+
+  /// f += Q m of one chunk, whose Q is at `at`: what its points feel of their own flux.
+  void own_flux(const LatticeChunk& chunk, ConstFieldView Q, std::int64_t at, FieldView f) const noexcept {
+    if (chunk.pattern < 0) return;   // moments of whole families vanish
+    const LatticePattern& pattern = f_.pattern(chunk);
+    for (int c = 0; c < D; ++c)
+      for (int l = 0; l < chunk_points; l += pack_width) {
+        Pack own(0.0);
+        for (int e = 0; e < D; ++e) own += Pack::load(Q.component(c * D + e) + at + l) * Pack::load(pattern.moment[e] + l);
+        (Pack::load(f.component(c) + chunk.first + l) + own).store(f.component(c) + chunk.first + l);
+      }
   }
 
   /// f += div Q for the target rows that the sources in `row` reach. Q of the cell row.first is at `from`; sources are read along the row,
@@ -118,8 +129,8 @@ class LatticeOperator {
           const Pack plain(profile.omega[static_cast<std::size_t>(k)]);
           for (int v = 0; v < V; ++v) {
             const Pack ahead = Pack::load(base + v * pack_width + k), behind = Pack::load(base + v * pack_width - k);
-            s[0][v] += w * (ahead - behind);
-            if constexpr (with_sums) near[v] += plain * (ahead + behind);
+            s[0][v] = multiply_add(w, ahead - behind, s[0][v]);
+            if constexpr (with_sums) near[v] = multiply_add(plain, ahead + behind, near[v]);
           }
         }
       }
@@ -136,8 +147,8 @@ class LatticeOperator {
             default: row_sums<V, -1, with_sums>(base, row.shift, profile.reach, w, wk, s[0], total, near);
           }
           for (int v = 0; v < V; ++v) {
-            s[1][v] += Pack(row.d1) * total[v];
-            if constexpr (D > 2) s[2][v] += Pack(row.d2) * total[v];
+            s[1][v] = multiply_add(Pack(row.d1), total[v], s[1][v]);
+            if constexpr (D > 2) s[2][v] = multiply_add(Pack(row.d2), total[v], s[2][v]);
           }
         }
       }
@@ -147,13 +158,13 @@ class LatticeOperator {
         const LatticePattern& pattern = f_.pattern(chunk);
         if (chunk.pattern >= 0) {
           const Pack own = Pack::load(base + v * pack_width);
-          for (int e = 0; e < D; ++e) s[e][v] -= own * Pack::load(pattern.moment[e] + lane);
+          for (int e = 0; e < D; ++e) s[e][v] = multiply_add(-own, Pack::load(pattern.moment[e] + lane), s[e][v]);
           if (pattern.irregular) replace_irregular<V, with_sums>(chunk, pattern, lane, u.component(c), s, near, v);
         }
         if constexpr (with_sums) near[v].store(sums + static_cast<std::size_t>(c) * stride + v * pack_width);
         for (int e = 0; e < D; ++e) {
           Pack h(0.0);
-          for (int k = 0; k < D; ++k) h += s[k][v] * Pack::load(pattern.inverse[symmetric_index(D, k, e)] + lane);
+          for (int k = 0; k < D; ++k) h = multiply_add(s[k][v], Pack::load(pattern.inverse[symmetric_index(D, k, e)] + lane), h);
           (h * scale).store(H + static_cast<std::size_t>(c * D + f_.grid.axis[e]) * stride + v * pack_width);
         }
       }
@@ -168,7 +179,7 @@ class LatticeOperator {
     for (int v = 0; v < V; ++v) {
       const Pack above = Pack::load(plus + v * pack_width), below = Pack::load(minus + v * pack_width);
       total[v] = Pack(w[0]) * (above - below);
-      if constexpr (with_sums) near[v] += Pack(w[0]) * (above + below);
+      if constexpr (with_sums) near[v] = multiply_add(Pack(w[0]), above + below, near[v]);
     }
     const int last = fixed_reach >= 0 ? fixed_reach : reach;
     for (int k = 1; k <= last; ++k) {
@@ -177,9 +188,9 @@ class LatticeOperator {
         const Pack a = Pack::load(plus + v * pack_width + k), b = Pack::load(minus + v * pack_width - k);
         const Pack c = Pack::load(plus + v * pack_width - k), d = Pack::load(minus + v * pack_width + k);
         const Pack ahead = a - b, behind = c - d;
-        along[v] += omega_k * (ahead - behind);
-        total[v] += omega * (ahead + behind);
-        if constexpr (with_sums) near[v] += omega * ((a + b) + (c + d));
+        along[v] = multiply_add(omega_k, ahead - behind, along[v]);
+        total[v] = multiply_add(omega, ahead + behind, total[v]);
+        if constexpr (with_sums) near[v] = multiply_add(omega, (a + b) + (c + d), near[v]);
       }
     }
   }
@@ -189,17 +200,22 @@ class LatticeOperator {
   void replace_irregular(const LatticeChunk& chunk, const LatticePattern& pattern, int lane, const double* u, Pack (&s)[3][V], Pack (&near)[V], int v) const noexcept {
     for (int l = lane; l < lane + pack_width; ++l) {
       if (!(pattern.irregular >> l & 1)) continue;
-      const std::int64_t p = chunk.first + l;
-      double direct[3] = {}, plain = 0;
-      for (std::size_t k = 0; k < f_.slots.offsets.size(); ++k) {
-        if (!pattern.intact(k, l)) continue;
-        const double omega = pattern.b(k, l) * f_.slots.omega[k], w = omega * (u[p + f_.slots.shifts[k]] - u[p]);
-        for (int e = 0; e < D; ++e) direct[e] += w * f_.slots.offsets[k][static_cast<std::size_t>(e)];
-        if constexpr (with_sums) plain += omega * u[p + f_.slots.shifts[k]];
-      }
-      if constexpr (with_sums) near[v].v[l - lane] = plain;
-      for (int e = 0; e < D; ++e) s[e][v].v[l - lane] = direct[e];
+      const std::array<double, 4> sums = intact_sums(pattern, chunk.first + l, l, u);
+      if constexpr (with_sums) near[v].v[l - lane] = sums[3];
+      for (int e = 0; e < D; ++e) s[e][v].v[l - lane] = sums[static_cast<std::size_t>(e)];
     }
+  }
+
+  /// sum_s omega_s (u_{p+s} - u_p) d_s and, last, sum_s omega_s u_{p+s} over intact bonds of p, in lane l: one code for all runs.
+  [[gnu::noinline]] std::array<double, 4> intact_sums(const LatticePattern& pattern, std::int64_t p, int l, const double* u) const noexcept {
+    std::array<double, 4> sums{};
+    for (std::size_t k = 0; k < f_.slots.offsets.size(); ++k) {
+      if (!pattern.intact(k, l)) continue;
+      const double omega = pattern.b(k, l) * f_.slots.omega[k], w = omega * (u[p + f_.slots.shifts[k]] - u[p]);
+      for (std::size_t e = 0; e < D; ++e) sums[e] += w * f_.slots.offsets[k][e];
+      sums[3] += omega * u[p + f_.slots.shifts[k]];
+    }
+    return sums;
   }
 
   /// From the sources at p, whose Q is at `from`, and their neighbours along the row.

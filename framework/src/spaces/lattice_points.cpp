@@ -137,7 +137,6 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   for (std::size_t first = block.row_begin; first < block.row_end;) {
     const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
     place(rows, next, block.chunk_end, r);
-    // Whole rows: kernels for other numbers of chunks may round in another way.
     first += rows.size();
     if (std::none_of(r.index.begin(), r.index.end(), [&](std::int32_t c) { return pass.wanted(chunk(c).first); })) continue;
     for (std::size_t i = 0; i < r.index.size();) {
@@ -148,14 +147,18 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
       s.keep_history = own;
       if (!evaluate(&r.index[i], n, s, pass, own ? &energy : &of_others)) return;
       for (int k = 0; k < n; ++k, ++i)
-        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i], own ? pass.out : FieldView{});
+        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i]);
     }
+    // Row by row, so that the order of sums does not depend on how many rows are taken together: a rank may have a part of the block.
     std::int64_t start = gap_;
+    std::size_t end = 0;
     for (const LatticeRow& row : rows) {
+      const std::size_t begin = end;
+      for (; end < r.own && row.holds(chunk(r.index[end]).first); ++end) operator_.own_flux(chunk(r.index[end]), r.flux, r.at[end], pass.out);
       operator_.divergence(row, r.flux, start, pass.out);
+      for (std::size_t i = begin; i < end && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
       start += width(row);
     }
-    for (std::size_t i = 0; i < r.own && families_.any_broken(); ++i) operator_.remove_broken(chunk(r.index[i]), r.flux, r.at[i], {}, pass.out);
   }
   s.keep_history = true;
   if (pass.energies) pass.energies[b] = energy;

@@ -137,7 +137,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   }
 
   /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b,
-  /// or those among them that are taken together with a marked one: kernels for other numbers of chunks may round in another way.
+  /// or those among them that are taken together with a marked one.
   template <class Use>
   void for_gradients(std::size_t b, ConstFieldView u, const std::uint8_t* only, Use&& use) const {
     alignas(64) double H[D * D * batch_points], sums[D * batch_points];

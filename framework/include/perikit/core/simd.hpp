@@ -105,6 +105,22 @@ struct Pack {
   Pack& operator*=(Pack b) noexcept { return *this = *this * b; }
   Pack& operator/=(Pack b) noexcept { return *this = *this / b; }
 
+  /// a b + c, fused where the target can. Of operators the compiler fuses what it likes, in one copy of a loop a product, in the next one another
+  /// or none: this is for loops of which several must give the same bits.
+  friend Pack multiply_add(Pack a, Pack b, Pack c) noexcept {
+    detail::count(2 * pack_width);
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+    return {reinterpret_cast<detail::Lanes>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
+#elif defined(__AVX__) && defined(__FMA__)
+    return {reinterpret_cast<detail::Lanes>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
+#elif defined(__FP_FAST_FMA)
+    for (int i = 0; i < pack_width; ++i) c.v[i] = __builtin_fma(a.v[i], b.v[i], c.v[i]);
+    return c;
+#else
+    return {a.v * b.v + c.v};
+#endif
+  }
+
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   friend PackMask operator<(Pack a, Pack b) noexcept { return compare<_CMP_LT_OQ>(a, b); }
   friend PackMask operator<=(Pack a, Pack b) noexcept { return compare<_CMP_LE_OQ>(a, b); }

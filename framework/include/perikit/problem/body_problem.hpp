@@ -33,6 +33,7 @@ struct ProblemParts {
   std::string kinematics;                       ///< names, for messages
   std::vector<std::string> materials;           ///< by material of the body
   std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
+  std::string loose;                            ///< of quasi-static runs on several ranks: what nothing holds of the whole body, in words
 };
 
 class BodyProblem final : public Problem {
