@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-from scenes import ENVIRONMENT, command, differences, need, run, scene
+from scenes import ENVIRONMENT, command, differences, need, run, scene, without_velocity
 
 PROGRAM, LIBRARY, WORK, FAILING = sys.argv[1:]
 LIMIT = 10.0   # seconds
@@ -26,10 +26,6 @@ def check(condition, what):
 
 def perikit_lines(text, message):
     return sum(message in line for line in text.splitlines())
-
-
-def without_velocity(text):
-    return text.replace("quantity = \"velocity\"", "quantity = \"displacement\"").replace("\"velocity\", ", "")
 
 
 def throws():
@@ -56,7 +52,8 @@ def refusals():
             ("a scene with a mistake", scene('type = "conventonal"'), "did you mean"),
             ("newton", without_velocity(scene(conventional, integrator='type = "newton"')), 'found "newton" on 3 ranks'),
             ("damage in statics", without_velocity(scene(conventional, integrator='type = "dynamic_relaxation"', extra='[damage]\ntype = "critical_stretch"\nstretch = 0.1\n')), 'found bonds that may fail with "dynamic_relaxation" on 3 ranks'),
-            ("jfnk with a preconditioner", without_velocity(scene(conventional, integrator='type = "jfnk"\npreconditioner = "companion"')), 'found "jfnk" on 3 ranks'),
+            ("jfnk with a preconditioner", without_velocity(scene(conventional, integrator='type = "jfnk"\npreconditioner = "factorisation"')), 'found "jfnk" on 3 ranks'),
+            ("springs on loose pieces", without_velocity(scene(conventional, integrator='type = "jfnk"', extra="[run]\nweak_springs = 1e-6\n")), "run.weak_springs: found springs on loose pieces on 3 ranks"),
             ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
             ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0\nallow_unstable = true'), "the run failed: step 1")):
         began = time.time()

@@ -81,6 +81,11 @@ history = [ {{ name = "end", set = "high", quantity = "displacement", component 
            force=vector([0.05] + ['"0.01*t"'] * (dimension - 1)), integrator=integrator, fields=str(fields).replace("'", '"'), extra=extra)
 
 
+def without_velocity(text):
+    """The scene for statics."""
+    return text.replace('quantity = "velocity"', 'quantity = "displacement"').replace('"velocity", ', "")
+
+
 def run(program, text, folder, ranks=1, threads=1, options=(), limit=300):
     """Runs the scene in an empty folder; the finished process. ranks 0: without mpirun."""
     if "--resume" not in options:

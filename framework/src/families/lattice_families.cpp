@@ -14,6 +14,21 @@ LatticeFamilies::LatticeFamilies(const Body& b, std::shared_ptr<const InfluenceF
       slots(grid, b.horizon(), needs.influence ? influence_.get() : nullptr), tiles(b, slots) {
   make_patterns();
   shared_ = patterns.size();
+  find_reached_lanes();
+}
+
+/// By reach along the row, lanes of a group and groups from there on: the lanes that lie within the reach.
+void LatticeFamilies::find_reached_lanes() {
+  const int groups = reached_groups();
+  for (int reach = 0; reach <= slots.row_reach; ++reach)
+    for (int lanes = 0; lanes < 256; ++lanes)
+      for (int group = -groups; group <= groups; ++group) {
+        unsigned reached = 0;
+        for (int from = 0; from < chunk_points; ++from)
+          for (int to = 0; to < chunk_points && (lanes >> from & 1); ++to)
+            if (std::abs(group * chunk_points + to - from) <= reach) reached |= 1u << to;
+        reached_lanes_.push_back(static_cast<std::uint8_t>(reached));
+      }
 }
 
 void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, bool set_up, unsigned lanes) const {
@@ -272,11 +287,30 @@ double LatticeFamilies::integrity(BondId bond) const noexcept {
 }
 
 void LatticeFamilies::mark(std::span<const std::int32_t> points, GroupMarks& marks) const {
+  // Group by group and row by row: what all its points reach in a row at once.
+  std::vector<std::uint8_t> lanes(marks.size(), 0);
+  std::vector<std::int64_t> groups;
   for (const std::int32_t p : points) {
-    marks[static_cast<std::size_t>(p) / chunk_points] = 1;
-    for (const std::int64_t shift : slots.shifts) {
-      const auto far = static_cast<std::size_t>(p + shift);
-      if (body_.alive(far)) marks[far / chunk_points] = 1;
+    std::uint8_t& of_group = lanes[static_cast<std::size_t>(p) / chunk_points];
+    if (of_group == 0) groups.push_back(p / chunk_points);
+    of_group |= static_cast<std::uint8_t>(1 << p % chunk_points);
+  }
+  const auto alive = body_.alive_bits();
+  const int beyond = reached_groups();
+  for (const std::int64_t group : groups) {
+    marks[static_cast<std::size_t>(group)] = 1;
+    const auto mark_row = [&](std::int64_t shift, int reach) {
+      const std::size_t first = (static_cast<std::size_t>(reach) * 256 + lanes[static_cast<std::size_t>(group)]) * static_cast<std::size_t>(2 * beyond + 1);
+      for (int k = -beyond; k <= beyond; ++k) {
+        const std::int64_t far = group + shift / chunk_points + k;
+        const std::uint8_t reached = reached_lanes_[first + static_cast<std::size_t>(k + beyond)];
+        if (reached != 0 && far >= 0 && far < std::ssize(marks) && (reached & alive[static_cast<std::size_t>(far)])) marks[static_cast<std::size_t>(far)] = 1;
+      }
+    };
+    if (slots.own_row >= 0) mark_row(0, slots.profiles[static_cast<std::size_t>(slots.own_row)].reach);
+    for (const RowPair& row : slots.row_pairs) {
+      mark_row(row.shift, row.reach);
+      mark_row(-row.shift, row.reach);
     }
   }
 }

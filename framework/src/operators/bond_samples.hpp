@@ -26,6 +26,8 @@ class BondSamples {
   /// Before a parallel loop: empties all. Of directed bonds only those with an end in a group of `kept` are kept, by group of
   /// eight points; empty: all.
   void clear(std::span<const std::uint8_t> kept);
+  /// Whether bonds of the points of this group are kept whatever their other ends.
+  bool keeps_group(std::size_t group) const noexcept { return kept_.empty() || kept_[group]; }
   /// The n lanes of a batch with their owners and far ends (-1: of the owner as a whole), after an evaluation with Work::sample.
   void add(int n, const BatchScratch& s);
   void add(const Entry& entry);
@@ -39,8 +41,7 @@ class BondSamples {
 
  private:
   bool keeps(std::int32_t owner, std::int32_t far) const noexcept {
-    return far < 0 || kept_.empty() || kept_[static_cast<std::size_t>(owner) / padding] ||
-           kept_[static_cast<std::size_t>(far) / padding];
+    return far < 0 || keeps_group(static_cast<std::size_t>(owner) / padding) || keeps_group(static_cast<std::size_t>(far) / padding);
   }
 
   Space space_;

@@ -195,27 +195,25 @@ class LatticeOperator {
     }
   }
 
-  /// Lanes with broken or weakened bonds: the sum over what is left of them, one by one.
+  /// Lanes with broken or weakened bonds: the sum over what is left of them.
   template <int V, bool with_sums>
   void replace_irregular(const LatticeChunk& chunk, const LatticePattern& pattern, int lane, const double* u, Pack (&s)[3][V], Pack (&near)[V], int v) const noexcept {
-    for (int l = lane; l < lane + pack_width; ++l) {
-      if (!(pattern.irregular >> l & 1)) continue;
-      const std::array<double, 4> sums = intact_sums(pattern, chunk.first + l, l, u);
-      if constexpr (with_sums) near[v].v[l - lane] = sums[3];
-      for (int e = 0; e < D; ++e) s[e][v].v[l - lane] = sums[static_cast<std::size_t>(e)];
-    }
+    if ((pattern.irregular >> lane & ((1 << pack_width) - 1)) == 0) return;
+    Pack sums[D + 1];
+    intact_sums(pattern, chunk.first + lane, lane, u, sums);
+    const PackMask irregular = Pack::load(lane_factors[pattern.irregular] + lane) > 0.5;
+    if constexpr (with_sums) near[v] = select(irregular, sums[D], near[v]);
+    for (int e = 0; e < D; ++e) s[e][v] = select(irregular, sums[e], s[e][v]);
   }
 
-  /// sum_s omega_s (u_{p+s} - u_p) d_s and, last, sum_s omega_s u_{p+s} over intact bonds of p, in lane l: one code for all runs.
-  [[gnu::noinline]] std::array<double, 4> intact_sums(const LatticePattern& pattern, std::int64_t p, int l, const double* u) const noexcept {
-    std::array<double, 4> sums{};
+  /// sum_s omega_s (u_{p+s} - u_p) d_s and, last, sum_s omega_s u_{p+s} over intact bonds of the points p ..., from lane l on.
+  [[gnu::noinline]] void intact_sums(const LatticePattern& pattern, std::int64_t p, int l, const double* u, Pack (&sums)[D + 1]) const noexcept {
+    const Pack own = Pack::load(u + p);
     for (std::size_t k = 0; k < f_.slots.offsets.size(); ++k) {
-      if (!pattern.intact(k, l)) continue;
-      const double omega = pattern.b(k, l) * f_.slots.omega[k], w = omega * (u[p + f_.slots.shifts[k]] - u[p]);
-      for (std::size_t e = 0; e < D; ++e) sums[e] += w * f_.slots.offsets[k][e];
-      sums[3] += omega * u[p + f_.slots.shifts[k]];
+      const Pack omega = Pack::load(pattern.b_of(k) + l) * Pack(f_.slots.omega[k]), far = Pack::load(u + p + f_.slots.shifts[k]), w = omega * (far - own);
+      for (std::size_t e = 0; e < D; ++e) sums[e] = multiply_add(w, Pack(f_.slots.offsets[k][e]), sums[e]);
+      sums[D] = multiply_add(omega, far, sums[D]);
     }
-    return sums;
   }
 
   /// From the sources at p, whose Q is at `from`, and their neighbours along the row.

@@ -249,8 +249,10 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
   double* const phi = density_.component(1);
   if (formulation_.dilatation) dilatation(u, {}, nullptr, phi, marks.data());
   const std::size_t groups = body_.stride() / padding;
+  // What a bond has of itself is the same at both of its ends; where bonds of one end are wanted, the other need not be looked at.
+  const bool at_one_end = !formulation_.dilatation && fields_.sides.size() == 0;
   parallel_for(groups, [&](std::size_t g) {
-    if (!marks[g]) return;
+    if (!marks[g] || (at_one_end && !samples.keeps_group(g))) return;
     Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
       if (!body_.alive(p)) continue;
@@ -261,7 +263,9 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
       const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
         const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * bonds.extension[k];
-        samples.add({own, family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w, {}});
+        const double energy = body_.volume(p) * family.volume[k] * family.b(k) * w;
+        samples.add({own, family.far[k], 0.0, energy, {}});
+        if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy, {}});
       }
     }
   });
