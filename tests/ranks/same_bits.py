@@ -40,9 +40,9 @@ DAMAGE = {
     "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
 }
 STATICS = {
-    "jfnk": 'type = "jfnk"\nsteps = 2\ntolerance = 1e-9',
+    "jfnk": 'type = "jfnk"\npreconditioner = "companion"\nsteps = 2\ntolerance = 1e-9',
     "jfnk, no preconditioner": 'type = "jfnk"\nsteps = 1\ntolerance = 1e-6\npreconditioner = "none"',
-    "kinsol": 'type = "kinsol"\nsteps = 2\ntolerance = 1e-9',
+    "kinsol": 'type = "kinsol"\npreconditioner = "companion"\nsteps = 2\ntolerance = 1e-9',
 }
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
@@ -126,6 +126,10 @@ def cases(everything):
     for name in KINEMATICS if everything else ("projection", "silling"):
         if "selective" not in name and "order" not in name:
             yield "%s, large" % name, scene(KINEMATICS[name], 3, False, 'type = "verlet"\nend_time = 0.1\ntime_step = 0.02', cells=[22, 22, 27]), (2, 3) if everything else (2,), (1,)
+    for name in ("conventional", "silling", "wan", "baqp", "bond_based") if everything else ("conventional",):
+        text = scene(KINEMATICS[name], 3, False, 'type = "verlet"\nend_time = 1.5\ntime_step = 0.05', cells=[22, 22, 27])
+        text = text.replace("[[boundary]]", 'velocity = ["0.04*(x - 11)", "0.02*sin(x/3)*(y - 11)", "0.03*(z - 14)"]\n[[boundary]]', 1) + DAMAGE["critical_stretch"]
+        yield "%s, large, torn" % name, text, (2, 3) if everything else (2,), (1,)
     for name in STATICS if everything else ("jfnk",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, %s" % (name, "cloud" if cloud else "lattice"), without_velocity(scene(KINEMATICS["baqp"], 2, cloud, STATICS[name])), ranks, threads

@@ -1,6 +1,7 @@
 #include "families/lattice_families.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <unordered_map>
 #include <utility>
@@ -14,21 +15,6 @@ LatticeFamilies::LatticeFamilies(const Body& b, std::shared_ptr<const InfluenceF
       slots(grid, b.horizon(), needs.influence ? influence_.get() : nullptr), tiles(b, slots) {
   make_patterns();
   shared_ = patterns.size();
-  find_reached_lanes();
-}
-
-/// By reach along the row, lanes of a group and groups from there on: the lanes that lie within the reach.
-void LatticeFamilies::find_reached_lanes() {
-  const int groups = reached_groups();
-  for (int reach = 0; reach <= slots.row_reach; ++reach)
-    for (int lanes = 0; lanes < 256; ++lanes)
-      for (int group = -groups; group <= groups; ++group) {
-        unsigned reached = 0;
-        for (int from = 0; from < chunk_points; ++from)
-          for (int to = 0; to < chunk_points && (lanes >> from & 1); ++to)
-            if (std::abs(group * chunk_points + to - from) <= reach) reached |= 1u << to;
-        reached_lanes_.push_back(static_cast<std::uint8_t>(reached));
-      }
 }
 
 void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::uint8_t>& live_mask, bool set_up, unsigned lanes) const {
@@ -296,16 +282,24 @@ void LatticeFamilies::mark(std::span<const std::int32_t> points, GroupMarks& mar
     of_group |= static_cast<std::uint8_t>(1 << p % chunk_points);
   }
   const auto alive = body_.alive_bits();
-  const int beyond = reached_groups();
   for (const std::int64_t group : groups) {
+    const unsigned own = lanes[static_cast<std::size_t>(group)];
+    const int lowest = std::countr_zero(own), highest = static_cast<int>(std::bit_width(own)) - 1;
     marks[static_cast<std::size_t>(group)] = 1;
+    const auto mark_if = [&](std::int64_t far, unsigned reached) {
+      if (far >= 0 && far < std::ssize(marks) && (reached & alive[static_cast<std::size_t>(far)])) marks[static_cast<std::size_t>(far)] = 1;
+    };
+    // Of the points of a group its highest one reaches farthest in the groups after it, and its lowest one in those before it.
     const auto mark_row = [&](std::int64_t shift, int reach) {
-      const std::size_t first = (static_cast<std::size_t>(reach) * 256 + lanes[static_cast<std::size_t>(group)]) * static_cast<std::size_t>(2 * beyond + 1);
-      for (int k = -beyond; k <= beyond; ++k) {
-        const std::int64_t far = group + shift / chunk_points + k;
-        const std::uint8_t reached = reached_lanes_[first + static_cast<std::size_t>(k + beyond)];
-        if (reached != 0 && far >= 0 && far < std::ssize(marks) && (reached & alive[static_cast<std::size_t>(far)])) marks[static_cast<std::size_t>(far)] = 1;
+      const std::int64_t here = group + shift / chunk_points;
+      unsigned within = own;
+      for (int step = 0; step < std::min(reach, chunk_points - 1); ++step) within |= within << 1 | within >> 1;
+      mark_if(here, within);
+      for (int last = highest + reach - chunk_points, k = 1; last >= 0; last -= chunk_points, ++k) {
+        const unsigned up_to = (2u << std::min(last, chunk_points - 1)) - 1;
+        mark_if(here + k, up_to);
       }
+      for (int first = lowest - reach + chunk_points, k = 1; first < chunk_points; first += chunk_points, ++k) mark_if(here - k, 0xffu << std::max(first, 0));
     };
     if (slots.own_row >= 0) mark_row(0, slots.profiles[static_cast<std::size_t>(slots.own_row)].reach);
     for (const RowPair& row : slots.row_pairs) {

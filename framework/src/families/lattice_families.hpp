@@ -83,9 +83,6 @@ class LatticeFamilies final : public Families {
 
  private:
   void make_patterns();
-  void find_reached_lanes();
-  /// Groups of a row on either side of one that its points reach.
-  int reached_groups() const noexcept { return (slots.row_reach + chunk_points - 1) / chunk_points; }
   /// Takes the bonds that pre-cracks cut out of the masks of a chunk. Returns its lanes with such bonds.
   std::uint8_t cut_bonds(const LatticeChunk& chunk, std::uint8_t live, std::vector<std::uint8_t>& mask);
   /// All that follows from the masks, for some of the lanes. set_up: nothing has failed yet.
@@ -103,7 +100,6 @@ class LatticeFamilies final : public Families {
   };
   std::size_t shared_ = 0;                     ///< patterns of the set-up; the others belong to one chunk each
   std::vector<Owned> owned_;                   ///< of pattern shared_ + k
-  std::vector<std::uint8_t> reached_lanes_;    ///< see find_reached_lanes
 };
 
 /// 1 in the lanes of a mask, 0 elsewhere: [mask][lane].
