@@ -60,7 +60,7 @@ class Preconditioner {
 void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 
 /// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has the
-/// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere, and the factorisation does not pay.
+/// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere (50 on lattices in 3D), and the factorisation does not pay.
 bool mixed_pays(Problem& problem);
 
 /// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.

@@ -71,6 +71,15 @@ TEST_CASE("Krylov iterations hardly grow with the bulk modulus") {
   CHECK(hard.iterations() <= soft.iterations() + 1);
 }
 
+TEST_CASE("auto takes mixed systems where they are faster: from a ratio of 50 on lattices in 3D, elsewhere from 200") {
+  for (const char* jitter : {"0", "0.2"})
+    for (const double ratio : {40.0, 60.0, 190.0, 210.0}) {
+      const bool expected = ratio >= (jitter[1] == 0 ? 50 : 200);
+      INFO("jitter ", std::string(jitter), ", kappa/mu = ", ratio);
+      CHECK((run(*make(scene(3, 5, ratio, jfnk("auto"), jitter))).text.find("preconditioner mixed") != std::string::npos) == expected);
+    }
+}
+
 TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D, with differences too") {
   struct Variant {
     int dimension, cells;
