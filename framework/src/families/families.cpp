@@ -31,8 +31,9 @@ void Families::let_fail() {
 
 GroupMarks Families::around(const GroupMarks& marks) const {
   std::vector<std::int32_t> points;
-  for (std::size_t p = 0; p < body_.stride(); ++p)
-    if (marks[p / padding] && body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+  for (std::size_t group = 0; group < marks.size(); ++group)
+    for (std::size_t p = group * padding; marks[group] && p < (group + 1) * padding; ++p)
+      if (body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
   GroupMarks reached(marks.size(), 0);
   mark(points, reached);
   return reached;

@@ -101,18 +101,22 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   return update;
 }
 
-/// Groups that depend on the bonds of these points; on all ranks the same. More of them around families that have lost much: bonds of
-/// fragments may follow.
-GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, bool wide) const {
+/// Groups that depend on the bonds of these points; on all ranks the same.
+GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends) const {
   GroupMarks marks(families_.body().stride() / padding, 0);
   families_.mark(ends, marks);
   shared_.mark(marks);
+  return marks;
+}
+
+/// Those and more of them where families of these points have lost much: bonds of fragments may follow.
+GroupMarks Fracture::widened(GroupMarks marks, std::span<const std::int32_t> ends) const {
   constexpr double much = 0.5;
   const auto poor = [&](std::int32_t p) {
     const auto point = static_cast<std::size_t>(p);
     return families_.body().owns(point) && families_.damage(point) > much;
   };
-  if (!wide || !on_any_rank(std::ranges::any_of(ends, poor))) return marks;
+  if (!on_any_rank(std::ranges::any_of(ends, poor))) return marks;
   for (int ring = 0; ring < 2; ++ring) {
     marks = families_.around(marks);
     shared_.mark(marks);
@@ -147,11 +151,11 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double o
     }
     std::sort(ends.begin(), ends.end());
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    const GroupMarks of_these = dependent_on(ends, false);
+    GroupMarks of_these = dependent_on(ends);
     const auto marked = [](std::uint8_t wanted, std::uint8_t have) { return !wanted || have; };
     if (on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
       settle();
-      marks = dependent_on(ends, true);
+      marks = widened(std::move(of_these), ends);
       if (impulse.data) fill(0.0, part);
       before = body.forces(at, marks, owed, part);
     }

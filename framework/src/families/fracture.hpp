@@ -46,7 +46,8 @@ class Fracture {
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
   /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
-  GroupMarks dependent_on(std::span<const std::int32_t> ends, bool wide) const;
+  GroupMarks dependent_on(std::span<const std::int32_t> ends) const;
+  GroupMarks widened(GroupMarks marks, std::span<const std::int32_t> ends) const;
   void fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body, BondUpdate& update);
 
   Families& families_;

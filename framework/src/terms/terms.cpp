@@ -237,11 +237,16 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
   const Families& families = *parts_.families;
+  GroupMarks last, only, near;  // before and after bonds fail the same groups are asked for
   const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
     const FieldView own = failing_->cleared(at, families.body());
     ExactSum energy;
-    // A bond may be evaluated once for both ends, at either.
-    const GroupMarks only = families.around(marks), near = families.around(only);
+    if (marks != last) {
+      // A bond may be evaluated once for both ends, at either.
+      last = marks;
+      only = families.around(marks);
+      near = families.around(only);
+    }
     std::int64_t bad = -1;
     for (const auto& term : terms_) bad = std::max(bad, term->add_forces_of(at, only, near, own, &energy));
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
