@@ -6,11 +6,11 @@
 #include <optional>
 
 #include "assembled_tangent.hpp"
-#include "first_rank.hpp"
 #include "multigrid.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/problem/first_rank.hpp"
 #include "perikit/problem/motion.hpp"
 
 namespace perikit {
@@ -104,7 +104,7 @@ class BlockJacobi final : public Preconditioner {
 class CompanionCycle final : public Preconditioner {
  public:
   explicit CompanionCycle(Problem& problem) : Preconditioner(problem) {
-    if (communicator().size() > 1) first_rank_.emplace(problem.body());
+    if (communicator().size() > 1) first_rank_.emplace(problem.body(), problem.body().owned());
   }
 
   void apply(ConstFieldView r, FieldView z) override {

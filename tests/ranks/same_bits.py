@@ -4,6 +4,7 @@ usage: same_bits.py PROGRAM LIBRARY WORK small|all
 """
 
 import itertools
+import re
 import sys
 
 from scenes import differences, need, run, scene, without_velocity
@@ -44,6 +45,13 @@ STATICS = {
     "jfnk, no preconditioner": 'type = "jfnk"\nsteps = 1\ntolerance = 1e-6\npreconditioner = "none"',
     "kinsol": 'type = "kinsol"\npreconditioner = "companion"\nsteps = 2\ntolerance = 1e-9',
 }
+TEARING = {
+    "jfnk": 'type = "jfnk"\npreconditioner = "companion"\nsteps = 6\ntolerance = 1e-7',
+    "kinsol": 'type = "kinsol"\npreconditioner = "companion"\nsteps = 6\ntolerance = 1e-7',
+    "dynamic_relaxation": 'type = "dynamic_relaxation"\nsteps = 6\ntolerance = 1e-6',
+}
+# A corner that no bond leads to.
+LOOSE = "[[crack]]\nsegment = [[12.0, 27.0], [33.0, 12.0]]\n"
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
@@ -112,6 +120,15 @@ def torn(kinematics, damage, cloud):
     return text.replace('"reaction"]', '"reaction", "damage"]') + CRACK + damage
 
 
+def torn_slowly(kinematics, integrator, damage, cloud):
+    """Pulled in equilibrium until it is in two, around a corner that hangs on weak springs."""
+    text = without_velocity(scene(kinematics, 2, cloud, integrator))
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    text = text[:begin] + '[[boundary]]\nset = "end"\ndisplacement = [1.5, 0]\n' + text[end:]
+    text = text.replace("[sets]\n", '[sets]\nend = "x > 29 && y < 13"\n').replace("[integrator]", "[run]\nweak_springs = 1e-5\n[integrator]")
+    return text.replace('"reaction"]', '"reaction", "damage"]') + LOOSE + damage
+
+
 def cases(everything):
     """Name, scene, numbers of ranks, numbers of threads."""
     small = [("conventional", 3, False), ("baqp", 2, True), ("bond_based", 3, True), ("sub_horizon", 2, False)]
@@ -133,6 +150,11 @@ def cases(everything):
     for name in STATICS if everything else ("jfnk",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, %s" % (name, "cloud" if cloud else "lattice"), without_velocity(scene(KINEMATICS["baqp"], 2, cloud, STATICS[name])), ranks, threads
+    for integrator in TEARING if everything else ("jfnk",):
+        for name, criterion in (("baqp", "critical_energy"), ("bond_based", "critical_stretch")) if everything else (("baqp", "critical_stretch"),):
+            for cloud in (False, True) if everything else (True,):
+                text = torn_slowly(KINEMATICS[name], TEARING[integrator], DAMAGE[criterion], cloud)
+                yield "%s, %s, %s, %s" % (integrator, name, criterion, "cloud" if cloud else "lattice"), text, ranks, threads
     for name in ("conventional", "projection", "ordinary", "bond_associated") if everything else ("projection",):
         for cloud in (False, True) if everything else (False,):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
@@ -175,9 +197,23 @@ def carried(program, work, everything):
             second = run(program, later, folder + "/%d" % ranks, ranks)
             found += [done.stderr.strip() for done in (first, second) if done.returncode != 0]
         found = found or differences(folder + "/0", folder + "/3")
-        with open(folder + "/3/run.log") as log:
-            found += [] if any(line.startswith("carried ") for line in log) else ["nothing was carried"]
+        found += [] if log_lines(folder + "/3", "carried") else ["nothing was carried"]
         yield "initial.from, " + name, found
+
+
+def log_lines(folder, name):
+    with open(folder + "/run.log") as log:
+        return [line for line in log if line.startswith(name + " ")]
+
+
+def not_as_meant(text, folder):
+    """What the scene is for and did not happen in its run, in words."""
+    found = []
+    if "[damage]" in text and not re.search(r"failed bonds +[1-9]|weakened [1-9]", "".join(log_lines(folder, "failed bonds"))):
+        found.append("no bond failed")
+    if "[run]\nweak_springs" in text and not any("weak springs" in line for line in log_lines(folder, "warning")):
+        found.append("nothing is loose")
+    return found
 
 
 def main():
@@ -191,6 +227,9 @@ def main():
             failed.append(name)
             print("FAILED  %s on one rank: %s" % (name, done.stderr.strip()))
             continue
+        for what in not_as_meant(text, one):
+            failed.append(name)
+            print("FAILED  %s: %s" % (name, what), flush=True)
         for r, t in itertools.product(ranks, threads):
             several = "%s/%d_several" % (work, number)
             done = run(program, text, several, r, t)

@@ -17,8 +17,7 @@
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
-#include "perikit/core/rank_values.hpp"
-#include "problem/loose_pieces.hpp"
+#include "problem/whole_body.hpp"
 #include "spaces/consistency.hpp"
 
 namespace perikit {
@@ -192,18 +191,13 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
   }
 }
 
-/// On all ranks what nothing holds, in words. The first one looks at the body of all.
-std::string loose_of_all(const Scene& scene, const Families& of_rank, const Body& whole, const Images& images, const std::vector<FaceMotion>& motions) {
-  std::vector<char> text;
-  if (communicator().rank() == 0) {
-    const std::unique_ptr<Families> families = Families::make(whole, of_rank.influence(), of_rank.needs());
-    std::optional<const ImageMap> map;
-    if (images.size() > 0) map.emplace(whole, images);
-    const std::string found = names(find_loose_pieces(*families, build_constraints(scene, whole, images, motions, true), map ? &*map : nullptr, whole.make_field(whole.dimension())), whole);
-    text.assign(found.begin(), found.end());
-  }
-  text = told_to_all(text);
-  return {text.begin(), text.end()};
+std::unique_ptr<WholeBody> build_whole(const Scene& scene, const ProblemParts& parts, const Beyond& beyond) {
+  const Body& whole = parts.partition->whole();
+  std::unique_ptr<Families> families = Families::make(whole, parts.families->influence(), parts.families->needs());
+  if (scene.damage) families->let_fail();
+  std::unique_ptr<const ImageMap> images;
+  if (beyond.images.size() > 0) images = std::make_unique<const ImageMap>(whole, beyond.images);
+  return std::make_unique<WholeBody>(WholeBody{std::move(families), std::move(images), build_constraints(scene, whole, beyond.images, beyond.motions, true)});
 }
 
 }  // namespace
@@ -244,7 +238,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.materials.resize(parts.laws->records().size(), scene.material->type);
 
   steps.begin("boundaries and loads");
-  if (partition && quasi_static) parts.loose = loose_of_all(scene, *parts.families, partition->whole(), beyond.images, beyond.motions);
+  if (partition && quasi_static && communicator().rank() == 0) parts.whole = build_whole(scene, parts, beyond);
   Constraints constraints = build_constraints(scene, body, images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);

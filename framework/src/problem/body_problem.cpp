@@ -109,6 +109,8 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   if (history) history->set_time_step(0);
   describe(status);
   energy_wanted_ = energy != nullptr;
+  // What is looked for on all ranks, all ranks look for.
+  if (ghosts_ && weak_springs_ && weak_springs_->any()) agree(status);
   if (weak_springs_ && status.ok()) {
     if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
     else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok()) return refused;
@@ -207,8 +209,20 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
       parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
   if (update.changed == 0) return false;
   if (explicit_step) react(reaction, update.ends, velocity);
-  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), true);
+  find_pieces(true);
   return true;
+}
+
+void BodyProblem::find_pieces(bool fresh) {
+  if (!weak_springs_) return;
+  if (ghosts_ && parts_.fracture.damage()) {
+    const std::vector<BondChange> of_all = terms().changed_bonds();  // rank 0 has them
+    if (parts_.whole) {
+      parts_.whole->families->mend();
+      parts_.whole->families->lower(of_all);
+    }
+  }
+  weak_springs_->find(seen(state().displacement(), seen_), fresh);
 }
 
 /// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
@@ -244,10 +258,9 @@ void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> en
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
-  if (parts_.partition) return parts_.loose;
-  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
-  weak_springs_->find(seen(state().displacement(), seen_), true);
-  return names(weak_springs_->pieces(), body());
+  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs, parts_.whole.get());
+  find_pieces(true);
+  return weak_springs_->names();
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {
@@ -261,7 +274,7 @@ std::vector<std::byte> BodyProblem::bonds() const {
 void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   ByteReader in(bonds);
   parts_.fracture.read(terms(), in);
-  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
+  find_pieces(false);
 }
 
 namespace {
@@ -318,7 +331,7 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   terms().history_restored();
   state().read(whole(), in);
   if (!in.done()) throw InputError("the saved state is damaged");
-  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), false);
+  find_pieces(false);
 }
 
 namespace {

@@ -17,6 +17,7 @@ class Companion;
 class Families;
 class WeakSprings;
 struct PointSamples;
+struct WholeBody;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
 struct ProblemParts {
@@ -33,7 +34,7 @@ struct ProblemParts {
   std::string kinematics;                       ///< names, for messages
   std::vector<std::string> materials;           ///< by material of the body
   std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
-  std::string loose;                            ///< of quasi-static runs on several ranks: what nothing holds of the whole body, in words
+  std::unique_ptr<WholeBody> whole;             ///< of quasi-static runs, on the first one of several ranks
 };
 
 class BodyProblem final : public Problem {
@@ -67,9 +68,9 @@ class BodyProblem final : public Problem {
   /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
   void carry(std::span<const std::byte> snapshot);
 
-  /// Quasi-static runs, on one rank: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
+  /// Quasi-static runs: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
   /// the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness. Returns what is
-  /// loose now, in words; empty: nothing.
+  /// loose now, in words; empty: nothing. All ranks must call it.
   std::string watch_pieces(double weak_springs);
 
   /// Everything that a run continues from, as bytes, on rank 0; restore is bitwise, on any number of ranks. All ranks must call
@@ -106,6 +107,8 @@ class BodyProblem final : public Problem {
 
   /// What evaluations of forces say of inadmissible deformation.
   void describe(EvaluationStatus& status) const;
+  /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
+  void find_pieces(bool fresh);
   /// What bonds that failed inside of the last step mean for forces, velocity and work.
   void react(BondReaction& reaction, std::span<const std::int32_t> ends, FieldView velocity);
 

@@ -1,8 +1,7 @@
-#include "first_rank.hpp"
+#include "perikit/problem/first_rank.hpp"
 
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 
 #include "perikit/core/rank_values.hpp"
 
@@ -25,9 +24,9 @@ void unpack(std::span<const double> values, std::span<const std::int32_t> points
 
 }  // namespace
 
-FirstRank::FirstRank(const Body& part) : part_(&part) {
+FirstRank::FirstRank(const Body& part, std::span<const std::int32_t> points) : part_(&part), points_(points.begin(), points.end()) {
   std::vector<std::int32_t> mine;
-  for (const std::int32_t p : part.owned()) mine.push_back(part.places().place[static_cast<std::size_t>(p)]);
+  for (const std::int32_t p : points_) mine.push_back(part.places().place[static_cast<std::size_t>(p)]);
   for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
     std::vector<std::int32_t>& places = places_.emplace_back(of_rank.size() / sizeof(std::int32_t));
     if (!of_rank.empty()) std::memcpy(places.data(), of_rank.data(), of_rank.size());
@@ -36,7 +35,7 @@ FirstRank::FirstRank(const Body& part) : part_(&part) {
 
 Field FirstRank::gather(ConstFieldView mine) const {
   std::vector<std::vector<double>> values(std::max<std::size_t>(1, places_.size()));
-  pack(mine, part_->owned(), values.front());
+  pack(mine, points_, values.front());
   if (places_.empty()) {
     const Message to_first{0, values.front(), {}};
     communicator().exchange({&to_first, 1});
@@ -57,7 +56,7 @@ void FirstRank::scatter(ConstFieldView whole, FieldView mine) const {
   std::fill_n(mine.data, mine.size(), 0.0);
   std::vector<std::vector<double>> values(std::max<std::size_t>(1, places_.size()));
   if (places_.empty()) {
-    values.front().resize(part_->owned().size() * static_cast<std::size_t>(mine.components));
+    values.front().resize(points_.size() * static_cast<std::size_t>(mine.components));
     const Message from_first{0, {}, values.front()};
     communicator().exchange({&from_first, 1});
   } else {
@@ -68,7 +67,7 @@ void FirstRank::scatter(ConstFieldView whole, FieldView mine) const {
     }
     communicator().exchange(messages);
   }
-  unpack(values.front(), part_->owned(), mine);
+  unpack(values.front(), points_, mine);
 }
 
 BlockMatrix FirstRank::gather(const BlockMatrix& mine) const {
