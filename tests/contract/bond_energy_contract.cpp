@@ -122,6 +122,12 @@ TEST_CASE("kinematics: bonds fail by the largest principal stress, that of the m
         stretch(plain->problem());
         PointSamples samples;
         plain->problem().sample(samples);
+        // Energies alone are those that come with the tensors, bit for bit.
+        PointSamples energies{.asked = Sampling::energy};
+        plain->problem().sample(energies);
+        CHECK(energies.cauchy.size() == 0);
+        for (const std::int32_t q : plain->problem().body().internal())
+          CHECK(energies.strain_energy_density.data()[q] == samples.strain_energy_density.data()[q]);
         const std::int32_t p = plain->problem().body().internal().front();
         const double most = samples.cauchy.component(0)[p];
         for (const double share : {1 + 1e-9, 1 - 1e-9}) {

@@ -179,7 +179,7 @@ TEST_CASE("kinematics: the stress of pair laws is the derivative of their energy
               for (std::size_t b = 0; b < static_cast<std::size_t>(d); ++b) u[a] += (H[a][b] + by * direction[a][b]) * x[b];
             return u;
           });
-          PointSamples samples{.virial = true};
+          PointSamples samples{.asked = Sampling::virial};
           REQUIRE(problem.sample(samples).ok());
           return samples;
         };

@@ -5,6 +5,7 @@ usage: same_bits.py PROGRAM LIBRARY WORK small|all
 
 import itertools
 import re
+import shutil
 import sys
 
 from scenes import differences, need, run, scene, without_velocity
@@ -178,14 +179,14 @@ def cases(everything):
 
 
 def carried(program, work, everything):
-    """Runs from the end of another one, with its broken bonds and with the history of its laws; the latter on as many ranks. What differs."""
+    """Runs from the end of another one on one rank, with its broken bonds and with the history of its laws. What differs."""
     begun = "frames = 3\ncheckpoint_every = 50"
-    scenes = {"broken bonds": (torn(KINEMATICS["bond_based"], DAMAGE["critical_energy"], False), False),
-              "history": (scene(KINEMATICS["conventional"], 2, material=HYPOELASTIC), True)}
+    scenes = {"broken bonds": torn(KINEMATICS["bond_based"], DAMAGE["critical_energy"], False),
+              "history": scene(KINEMATICS["conventional"], 2, material=HYPOELASTIC)}
     if everything:
-        scenes["gradual"] = torn(KINEMATICS["projection"], DAMAGE["gradual"], False), False
-        scenes["weakened bonds"] = torn(KINEMATICS["bond_based"], DAMAGE["smooth_degradation"], True), False
-    for name, (text, has_history) in scenes.items():
+        scenes["gradual"] = torn(KINEMATICS["projection"], DAMAGE["gradual"], False)
+        scenes["weakened bonds"] = torn(KINEMATICS["bond_based"], DAMAGE["smooth_degradation"], True)
+    for name, text in scenes.items():
         text = text.replace("frames = 3", begun)
         folder = work + "/carried"
         begin, end = text.index("[initial]"), text.index("[[boundary]]")
@@ -193,12 +194,36 @@ def carried(program, work, everything):
         found = []
         for ranks in (0, 3):
             # Of the same name, for results hold their scenes.
-            first = run(program, text, folder + "/first", ranks if has_history else 0)
+            first = run(program, text, folder + "/first", 0)
             second = run(program, later, folder + "/%d" % ranks, ranks)
             found += [done.stderr.strip() for done in (first, second) if done.returncode != 0]
         found = found or differences(folder + "/0", folder + "/3")
         found += [] if log_lines(folder + "/3", "carried") else ["nothing was carried"]
         yield "initial.from, " + name, found
+
+
+def resumed(program, work, everything):
+    """Runs with laws that remember, begun on three ranks and ended on two and on one. What differs from a run on one."""
+    end = 'type = "verlet"\nend_time = %s\ntime_step = 0.05'
+    names = [name for name in KINEMATICS if name not in PAIRS and "order" not in name] if everything else ("baqp", "projection")
+    for name, cloud, broken in itertools.product(names, (False, True) if everything else (False,), (False, True) if everything else (True,)):
+        texts = []
+        for time in ("3.0", "6.0"):
+            text = scene(KINEMATICS[name], 2, cloud, end % time, HYPOELASTIC)
+            texts.append(with_inclusion(text.replace("frames = 3", "every = 30\ncheckpoint_every = 30")) + CRACK + (DAMAGE["critical_stretch"] if broken else ""))
+        folder = work + "/resumed"
+        done = [run(program, texts[1], folder + "/whole", 0), run(program, texts[0], folder + "/part", 0)]
+        with open(folder + "/part/checkpoint.h5", "rb") as file:
+            of_one = file.read()
+        done.append(run(program, texts[0], folder + "/part", 3))
+        with open(folder + "/part/checkpoint.h5", "rb") as file:
+            found = [] if file.read() == of_one else ["checkpoint.h5"]
+        shutil.copytree(folder + "/part", folder + "/again", dirs_exist_ok=True)
+        for ranks, part in ((2, "part"), (0, "again")):
+            done.append(run(program, texts[1], folder + "/" + part, ranks, 1, ("--resume",)))
+            found += differences(folder + "/whole", folder + "/" + part)
+        found = [one.stderr.strip() for one in done if one.returncode != 0] + found
+        yield "resumed, %s, hypoelastic, %s%s" % (name, "cloud" if cloud else "lattice", ", bonds fail" if broken else ""), found
 
 
 def log_lines(folder, name):
@@ -240,7 +265,7 @@ def main():
                 print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
         if name not in failed:
             print("same    " + name, flush=True)
-    for name, found in carried(program, work, which == "all"):
+    for name, found in itertools.chain(carried(program, work, which == "all"), resumed(program, work, which == "all")):
         count += 1
         if found:
             failed.append(name)

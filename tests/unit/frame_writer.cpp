@@ -136,6 +136,33 @@ TEST_CASE("a run's files have the documented layout, also after the folder was m
   CHECK(count_files(folder.path / "moved" / "frames") == 12);
 }
 
+TEST_CASE("a frame from pieces is the same file, byte for byte, and a field that lacks rows or has too many is refused") {
+  const TemporaryFolder folder;
+  FrameWriter writer(folder.path, reference(), run);
+  std::vector<OutputField> all = fields(0);
+  double number = 0;
+  for (OutputField& field : all)
+    for (double& value : field.data) value = ++number;
+  writer.write(1.5, 7, all);
+  writer.begin(1.5, 7);
+  for (const OutputField& field : all) {
+    const std::span<const double> values(field.data);
+    const auto rows = [&](std::size_t first, std::size_t count) { return values.subspan(first * static_cast<std::size_t>(field.width), count * static_cast<std::size_t>(field.width)); };
+    writer.add(field.name, field.width, rows(0, 1));
+    writer.add(field.name, field.width, rows(1, points - 1));
+  }
+  writer.end();
+  CHECK(read_text(folder.path / "frames/00000001.h5") == read_text(folder.path / "frames/00000000.h5"));
+  CHECK(dataset(folder.path / "results.h5", "/frames/00000001/cauchy").data == all[1].data);
+
+  writer.begin(2, 8);
+  writer.add("damage", 1, std::vector<double>(points - 1, 0.0));
+  CHECK_THROWS_WITH_AS(writer.end(), doctest::Contains("field 'damage' has 3 values; 4 points of width 1 need 4"), RunError);
+  writer.begin(2, 8);
+  CHECK_THROWS_WITH_AS(writer.add("damage", 1, std::vector<double>(points + 1, 0.0)), doctest::Contains("field 'damage' has 5 values"), RunError);
+  CHECK(writer.frames() == 2);
+}
+
 TEST_CASE("the last frame comes back in input order; a wrong body or file is refused by name") {
   const TemporaryFolder folder;
   FrameWriter writer(folder.path, reference(), run);

@@ -10,26 +10,26 @@ namespace perikit {
 const std::vector<PointField>& point_fields() {
   using From = PointFields&;
   static const std::vector<PointField> all{
-      {"displacement", 3, false, "displacement", "m", [](From f) { return f.vector(f.problem_.state().displacement()); }},
-      {"velocity", 3, false, "velocity", "m/s",
+      {"displacement", 3, false, Sampling::nothing, "displacement", "m", [](From f) { return f.vector(f.problem_.state().displacement()); }},
+      {"velocity", 3, false, Sampling::nothing, "velocity", "m/s",
        [](From f) { return f.vector(f.moves_ ? ConstFieldView(f.problem_.state().velocity()) : ConstFieldView()); }},
-      {"acceleration", 3, false, "acceleration", "m/s²", [](From f) { return f.acceleration(); }},
-      {"internal_force", 3, false, "internal force density", "N/m³",
+      {"acceleration", 3, false, Sampling::nothing, "acceleration", "m/s²", [](From f) { return f.acceleration(); }},
+      {"internal_force", 3, false, Sampling::nothing, "internal force density", "N/m³",
        [](From f) { return f.vector(f.problem_.state().internal_force(), true); }},
-      {"external_force", 3, false, "external force density", "N/m³", [](From f) { return f.external_force(); }},
-      {"reaction", 3, false, "reaction", "N",
+      {"external_force", 3, false, Sampling::nothing, "external force density", "N/m³", [](From f) { return f.external_force(); }},
+      {"reaction", 3, false, Sampling::nothing, "reaction", "N",
        [](From f) { return f.vector(reactions(f.problem_, f.dynamic_, f.problem_.state().time)); }},
-      {"strain_energy_density", 1, false, "strain energy density", "J/m³",
-       [](From f) { return f.scalar(f.samples().strain_energy_density); }},
-      {"deformation_gradient", 9, true, "deformation gradient", "", [](From f) { return f.tensor(f.samples().H, true); }},
-      {"first_piola", 9, false, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples(true).P); }},
-      {"cauchy", 9, true, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples().cauchy); }},
-      {"von_mises", 1, true, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples().von_mises); }},
-      {"jacobian", 1, true, "jacobian", "", [](From f) { return f.jacobian(); }},
-      {"damage", 1, false, "damage", "", [](From f) { return f.scalar(f.problem_.terms().damage()); }},
-      {"shape_tensor_condition", 1, true, "shape tensor condition", "",
+      {"strain_energy_density", 1, false, Sampling::energy, "strain energy density", "J/m³",
+       [](From f) { return f.scalar(f.samples_->strain_energy_density); }},
+      {"deformation_gradient", 9, true, Sampling::tensors, "deformation gradient", "", [](From f) { return f.tensor(f.samples_->H, true); }},
+      {"first_piola", 9, false, Sampling::virial, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples_->P); }},
+      {"cauchy", 9, true, Sampling::tensors, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples_->cauchy); }},
+      {"von_mises", 1, true, Sampling::tensors, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples_->von_mises); }},
+      {"jacobian", 1, true, Sampling::tensors, "jacobian", "", [](From f) { return f.jacobian(); }},
+      {"damage", 1, false, Sampling::nothing, "damage", "", [](From f) { return f.scalar(f.problem_.terms().damage()); }},
+      {"shape_tensor_condition", 1, true, Sampling::nothing, "shape tensor condition", "",
        [](From f) { return f.scalar(f.problem_.terms().shape_tensor_condition()); }},
-      {"material_id", 1, false, "material id", "", [](From f) { return f.material_id(); }}};
+      {"material_id", 1, false, Sampling::nothing, "material id", "", [](From f) { return f.material_id(); }}};
   return all;
 }
 
@@ -103,15 +103,18 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
   return out;
 }
 
-const PointSamples& PointFields::samples(bool virial) {
-  if (!samples_ || (virial && !samples_->virial)) problem_.sample(samples_.emplace(PointSamples{.virial = virial}));
-  return *samples_;
+void PointFields::expect(std::span<const std::string> names) {
+  Sampling most = Sampling::nothing;
+  for (const std::string& name : names) most = std::max(most, find_point_field(name)->samples);
+  if (most == Sampling::nothing || (samples_ && samples_->asked >= most)) return;
+  problem_.sample(samples_.emplace(PointSamples{.asked = most}));
 }
 
 const OutputField& PointFields::get(const std::string& name) {
   if (const auto known = cache_.find(name); known != cache_.end()) return known->second;
   const PointField* field = find_point_field(name);
   if (!field) throw std::out_of_range("point field " + name);
+  expect({&name, 1});
   return cache_[name] = {name, field->width, field->compute(*this)};
 }
 

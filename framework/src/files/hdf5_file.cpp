@@ -43,13 +43,26 @@ Handle timeless(hid_t kind, const std::string& what) {
   return properties;
 }
 
+Handle make_space(const std::string& path, const std::vector<hsize_t>& shape) {
+  return checked(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, path);
+}
+
+Handle make_dataset(hid_t file, const std::string& path, hid_t file_type, const std::vector<hsize_t>& shape) {
+  const Handle space = make_space(path, shape);
+  const Handle properties = timeless(H5P_DATASET_CREATE, path);
+  return checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose, path);
+}
+
 void write_dataset(hid_t file, const std::string& path, hid_t file_type, hid_t memory_type, const void* data,
                    const std::vector<hsize_t>& shape) {
-  const Handle space = checked(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, path);
-  const Handle properties = timeless(H5P_DATASET_CREATE, path);
-  const Handle dataset =
-      checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose, path);
+  const Handle dataset = make_dataset(file, path, file_type, shape);
   check(H5Dwrite(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), path);
+}
+
+std::vector<hsize_t> shape_of(std::size_t rows, int width) {
+  std::vector<hsize_t> shape{rows};
+  if (width > 1) shape.push_back(static_cast<hsize_t>(width));
+  return shape;
 }
 
 void write_attribute(hid_t file, const std::string& name, hid_t file_type, hid_t memory_type, const void* data) {
@@ -88,9 +101,22 @@ Image::Image() {
 }
 
 void Image::dataset(const std::string& path, std::span<const double> values, int width) {
-  std::vector<hsize_t> shape{values.size() / static_cast<std::size_t>(width)};
-  if (width > 1) shape.push_back(static_cast<hsize_t>(width));
-  write_dataset(file_.get(), path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), shape);
+  rows(path, values.size() / static_cast<std::size_t>(width), width).append(values);
+}
+
+Image::Rows Image::rows(const std::string& path, std::size_t rows, int width) {
+  return {make_dataset(file_.get(), path, H5T_IEEE_F64LE, shape_of(rows, width)), path, width};
+}
+
+void Image::Rows::append(std::span<const double> values) {
+  const std::size_t count = values.size() / static_cast<std::size_t>(width_);
+  if (count == 0) return;
+  const std::vector<hsize_t> begin{rows_, 0}, shape = shape_of(count, width_);
+  const Handle memory = make_space(path_, shape);
+  const Handle file = checked(H5Dget_space(dataset_.get()), H5Sclose, path_);
+  check(H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, begin.data(), nullptr, shape.data(), nullptr), path_);
+  check(H5Dwrite(dataset_.get(), H5T_NATIVE_DOUBLE, memory.get(), file.get(), H5P_DEFAULT, values.data()), path_);
+  rows_ += count;
 }
 
 void Image::dataset(const std::string& path, std::span<const std::int64_t> values) {

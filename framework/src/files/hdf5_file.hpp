@@ -39,6 +39,20 @@ class Image {
   void dataset(const std::string& path, std::span<const double> values, int width = 1);
   void dataset(const std::string& path, std::span<const std::int64_t> values);
   void dataset(const std::string& path, std::span<const std::byte> values);
+  /// A dataset of shape (rows) for width 1, else (rows, width), whose rows come later, in order.
+  class Rows {
+   public:
+    void append(std::span<const double> values);
+
+   private:
+    friend class Image;
+    Rows(Handle dataset, std::string path, int width) : dataset_(std::move(dataset)), path_(std::move(path)), width_(width) {}
+    Handle dataset_;
+    std::string path_;
+    int width_;
+    std::size_t rows_ = 0;
+  };
+  Rows rows(const std::string& path, std::size_t rows, int width);
   void group(const std::string& path);
   /// Attributes of the root group; text is stored as UTF-8 of variable length, which has no 64 kB limit.
   void attribute(const std::string& name, double value);

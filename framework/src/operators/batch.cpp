@@ -329,6 +329,8 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
     const double w = s.weight[l];
     const auto p = static_cast<std::size_t>(s.owner[l]);
     if (w == 0) continue;
+    sums.psi[p] += w * s.psi[l];
+    if (!sums.weight) continue;
     double F[3][3], P[3][3], sigma[3][3];
     const double J = full_tensors(space, s, l, F, P);
     cauchy_of(F, P, J, sigma);
@@ -342,7 +344,6 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
       sums.H[static_cast<std::size_t>(c) * sums.stride + p] += w * h;
       sums.P[static_cast<std::size_t>(c) * sums.stride + p] += w * s.P[c * batch_points + l];
     }
-    sums.psi[p] += w * s.psi[l];
     sums.weight[p] += w;
   }
 }

@@ -56,7 +56,7 @@ void LaminateFinder::add(int n, const BatchScratch& s) {
     // Lanes without a weight are there to fill a batch.
     if (number < 0 || s.weight[l] == 0 || (once_ && s.owner[l] >= s.far[l])) continue;
     if (s.far_number > 0 && number >= s.far_number) number -= s.far_number;
-    Found entry{number, s.owner[l], {}};
+    Found entry{number, s.owner[l], s.far[l], s.far_number > 0 ? number + s.far_number : -1, {}};
     bool kept = true;
     for (int c = 0; c < dimension_; ++c) {
       for (int e = 0; e < dimension_; ++e) entry.gradient[c][e] = s.H[(c * dimension_ + e) * batch_points + l];

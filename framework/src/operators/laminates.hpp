@@ -51,8 +51,9 @@ class LaminateFinder {
  public:
   struct Found {
     std::int64_t number;
-    std::int32_t owner;
-    double gradient[3][3];  ///< by component of the displacement
+    std::int32_t owner, far;    ///< far: of bonds; else -1
+    std::int64_t other_number;  ///< of the state that the other end has for itself; -1: none
+    double gradient[3][3];      ///< by component of the displacement
   };
 
   /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <system_error>
 
 #include "files/atomic_file.hpp"
@@ -60,6 +61,25 @@ struct FrameWriter::Implementation {
   std::int64_t frames = 0;         ///< complete and listed
   hdf5::Image results;             ///< grows by one link per frame
   std::vector<std::string> grids;  ///< of the sidecar, one per frame
+
+  /// The one that is being put together.
+  struct Frame {
+    double time;
+    hdf5::Image image;
+    std::vector<XdmfField> fields;
+    std::optional<hdf5::Image::Rows> rows;  ///< of the last field
+    std::size_t values = 0;                 ///< of it so far
+  };
+  std::optional<Frame> frame;
+
+  std::filesystem::path next_file() const { return folder / frame_path(frames); }
+  void end_field() const {
+    if (!frame->rows) return;
+    const XdmfField& field = frame->fields.back();
+    if (const std::size_t wanted = points * static_cast<std::size_t>(field.width); frame->values != wanted)
+      throw RunError(fmt::format("{}: field '{}' has {} values; {} points of width {} need {}", next_file().string(), field.name,
+                                 frame->values, points, field.width, wanted));
+  }
 
   std::string frame_path(std::int64_t index) const { return fmt::format("frames/{}.h5", frame_name(index)); }
 
@@ -122,32 +142,46 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
 
 FrameWriter::~FrameWriter() = default;
 
-void FrameWriter::write(double time, std::int64_t step, std::span<const OutputField> fields) {
+void FrameWriter::begin(double time, std::int64_t step) {
+  Implementation::Frame& frame = implementation_->frame.emplace();
+  frame.time = time;
+  frame.image.attribute("time", time);
+  frame.image.attribute("step", step);
+}
+
+void FrameWriter::add(const std::string& name, int width, std::span<const double> values) {
   Implementation& self = *implementation_;
-  const std::int64_t index = frames();
-  const fs::path file = self.folder / self.frame_path(index);
-  std::vector<XdmfField> listed;
-  {
-    hdf5::Image image;
-    image.attribute("time", time);
-    image.attribute("step", step);
-    for (const OutputField& field : fields) {
-      if (field.data.size() != self.points * static_cast<std::size_t>(field.width)) {
-        throw RunError(fmt::format("{}: field '{}' has {} values; {} points of width {} need {}", file.string(), field.name,
-                                   field.data.size(), self.points, field.width,
-                                   self.points * static_cast<std::size_t>(field.width)));
-      }
-      image.dataset(field.name, field.data, field.width);
-      listed.push_back({field.name, field.width});
-    }
-    store_atomically(file, image.bytes());
+  Implementation::Frame& frame = *self.frame;
+  if (frame.fields.empty() || frame.fields.back().name != name) {
+    self.end_field();
+    frame.fields.push_back({name, width});
+    frame.rows.emplace(frame.image.rows(name, self.points, width));
+    frame.values = 0;
   }
+  frame.values += values.size();
+  if (frame.values > self.points * static_cast<std::size_t>(width)) self.end_field();
+  frame.rows->append(values);
+}
+
+void FrameWriter::end() {
+  Implementation& self = *implementation_;
+  Implementation::Frame& frame = *self.frame;
+  self.end_field();
+  frame.rows.reset();
+  store_atomically(self.next_file(), frame.image.bytes());
   // In the order in which a resumed run finds them.
-  std::ranges::sort(listed, {}, &XdmfField::name);
-  self.list(index, time, listed);
+  std::ranges::sort(frame.fields, {}, &XdmfField::name);
+  self.list(frames(), frame.time, frame.fields);
+  self.frame.reset();
   self.store_results();
   self.store_sidecar();
   ++self.frames;
+}
+
+void FrameWriter::write(double time, std::int64_t step, std::span<const OutputField> fields) {
+  begin(time, step);
+  for (const OutputField& field : fields) add(field.name, field.width, field.data);
+  end();
 }
 
 std::int64_t FrameWriter::frames() const noexcept {

@@ -10,6 +10,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
+#include "problem/history_record.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
 #include "problem/weak_springs.hpp"
@@ -277,46 +278,12 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   find_pieces(false);
 }
 
-namespace {
-
-/// What laws remember, rank by rank: evaluation points have numbers of their own on each. Nothing is what one rank has of it.
-void write_history(std::span<const double> mine, ByteWriter& out) {
-  auto of_ranks = communicator().gather(std::as_bytes(mine));
-  if (std::ranges::all_of(of_ranks, [](const auto& of_rank) { return of_rank.empty(); })) of_ranks.resize(1);
-  out.value(static_cast<std::uint64_t>(of_ranks.size()));
-  for (const std::vector<std::byte>& of_rank : of_ranks) {
-    out.value(static_cast<std::uint64_t>(of_rank.size() / sizeof(double)));
-    out.bytes(of_rank.data(), of_rank.size());
-  }
-}
-
-/// Without history the number of ranks may be another.
-void read_history(ByteReader& in, std::span<double> mine) {
-  const auto ranks = in.value<std::uint64_t>();
-  const auto own = static_cast<std::uint64_t>(communicator().rank());
-  std::uint64_t all = 0, found = 0;
-  for (std::uint64_t rank = 0; rank < ranks; ++rank) {
-    const auto count = in.value<std::uint64_t>();
-    all += count;
-    if (rank == own) found = count;
-    if (rank == own && count == mine.size())
-      in.bytes(mine.data(), mine.size_bytes());
-    else
-      in.skip(count, sizeof(double));
-  }
-  if (all > 0 && ranks != static_cast<std::uint64_t>(communicator().size()))
-    throw InputError(fmt::format("found the history of materials on {} ranks; allowed: the same number of ranks", ranks));
-  if (found != mine.size()) throw InputError("the saved state belongs to other materials");
-}
-
-}  // namespace
-
 std::vector<std::byte> BodyProblem::snapshot() const {
   ByteWriter out;
   out.value(static_cast<std::uint64_t>(whole().stride()));
   values_.constraints.write(out);
   parts_.fracture.write(terms(), out);
-  write_history(terms().history() ? terms().history()->values() : std::span<double>(), out);
+  HistoryRecord::of(terms()).write(out);
   values_.state.write(whole(), out);
   return out.take();
 }
@@ -326,9 +293,7 @@ void BodyProblem::restore(std::span<const std::byte> bytes) {
   if (in.value<std::uint64_t>() != whole().stride()) throw InputError("the saved state belongs to another body");
   constraints().read(in);
   parts_.fracture.read(terms(), in);
-  const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
-  read_history(in, history);
-  terms().history_restored();
+  HistoryRecord::read(in).restore(terms());
   state().read(whole(), in);
   if (!in.done()) throw InputError("the saved state is damaged");
   find_pieces(false);
@@ -340,23 +305,14 @@ namespace {
 struct BeforeState {
   std::uint64_t stride = 0;
   std::vector<BondChange> bonds;
-  std::vector<std::vector<double>> history;   ///< by rank; see write_history
+  HistoryRecord history;
 
   explicit BeforeState(std::span<const std::byte> snapshot) {
     ByteReader in(snapshot);
     stride = in.value<std::uint64_t>();
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
-    for (auto ranks = in.value<std::uint64_t>(); ranks > 0; --ranks) {
-      std::vector<double>& of_rank = history.emplace_back();
-      of_rank.resize(std::min<std::uint64_t>(in.value<std::uint64_t>(), snapshot.size() / sizeof(double)));
-      in.bytes(of_rank.data(), of_rank.size() * sizeof(double));
-    }
-  }
-  std::size_t numbers() const {
-    std::size_t sum = 0;
-    for (const std::vector<double>& of_rank : history) sum += of_rank.size();
-    return sum;
+    history = HistoryRecord::read(in);
   }
 };
 
@@ -364,18 +320,12 @@ struct BeforeState {
 
 BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot) {
   const BeforeState before(snapshot);
-  return {before.bonds.size(), before.numbers()};
+  return {before.bonds.size(), before.history.values.size()};
 }
 
 void BodyProblem::carry(std::span<const std::byte> snapshot) {
   const BeforeState before(snapshot);
-  const std::span<double> history = terms().history() ? terms().history()->values() : std::span<double>();
   if (before.stride != whole().stride()) throw InputError("the earlier run had another body");
-  if (before.numbers() > 0 && before.history.size() != static_cast<std::size_t>(communicator().size()))
-    throw InputError(fmt::format("the laws of the earlier run have their history on {} ranks", before.history.size()));
-  const auto rank = static_cast<std::size_t>(communicator().rank());
-  const std::vector<double> own = before.numbers() > 0 ? before.history[rank] : std::vector<double>();
-  if (own.size() != history.size()) throw InputError("the earlier run had other laws");
   const SharedBonds shared(body());
   std::vector<BondChange> lost;   // of the bonds that cracks of this scene leave
   std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) {
@@ -384,9 +334,7 @@ void BodyProblem::carry(std::span<const std::byte> snapshot) {
   });
   // On several ranks all of them restore, whoever has such bonds.
   if (!lost.empty() || (ghosts_ && !before.bonds.empty())) terms().restore_bonds(lost);
-  if (history.empty()) return;
-  std::ranges::copy(own, history.begin());
-  terms().history_restored();
+  before.history.restore(terms());
 }
 
 std::size_t BodyProblem::bytes() const noexcept {

@@ -28,9 +28,8 @@ void ByteReader::bytes(void* to, std::size_t size) {
   bytes_ = bytes_.subspan(size);
 }
 
-void ByteReader::skip(std::uint64_t count, std::size_t size) {
+void ByteReader::expect(std::uint64_t count, std::size_t size) const {
   if (count > bytes_.size() / size) throw InputError("the saved state is too short");
-  bytes_ = bytes_.subspan(count * size);
 }
 
 std::string ByteReader::text() {

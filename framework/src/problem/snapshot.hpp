@@ -38,7 +38,8 @@ class ByteReader {
     bytes(&v, sizeof v);
     return v;
   }
-  void skip(std::uint64_t count, std::size_t size);
+  /// Throws where fewer than count entries of this size are left.
+  void expect(std::uint64_t count, std::size_t size) const;
   /// At most 256 characters.
   std::string text();
   bool done() const noexcept { return bytes_.empty(); }

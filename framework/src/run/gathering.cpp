@@ -1,5 +1,6 @@
 #include "run/gathering.hpp"
 
+#include <algorithm>
 #include <cstring>
 
 #include "perikit/core/communicator.hpp"
@@ -7,6 +8,9 @@
 namespace perikit {
 
 namespace {
+
+/// Points whose values are sent at a time.
+constexpr std::size_t piece = std::size_t{1} << 17;
 
 /// Takes the next row of the rank that owns each point: ranks have them in the same order.
 template <class Owner>
@@ -27,10 +31,18 @@ std::vector<double> merge(std::span<const double> mine, std::size_t width, std::
 
 }  // namespace
 
-std::vector<double> gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width) {
-  if (!problem.partition()) return {mine.begin(), mine.end()};
-  const auto owners = problem.partition()->owners();
-  return merge(mine, width, problem.whole().owned().size(), [&](std::size_t n) { return owners[n]; });
+void gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
+                   const std::function<void(std::size_t first, std::span<const double> rows)>& use) {
+  if (!problem.partition()) return use(0, mine);
+  const auto owners = problem.partition()->owners().first(problem.whole().owned().size());
+  std::size_t sent = 0;
+  for (std::size_t first = 0; first < owners.size(); first += piece) {
+    const auto of_piece = owners.subspan(first, std::min(piece, owners.size() - first));
+    const auto own = static_cast<std::size_t>(std::ranges::count(of_piece, communicator().rank()));
+    const std::vector<double> rows = merge(mine.subspan(sent * width, own * width), width, of_piece.size(), [&](std::size_t n) { return of_piece[n]; });
+    sent += own;
+    if (!rows.empty()) use(first, rows);
+  }
 }
 
 std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine) {

@@ -48,6 +48,9 @@ std::int64_t with_row(std::int64_t before, std::span<const double> row) {
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.whole();
   ReferenceData data;
+  data.position.reserve(3 * body.owned().size());
+  for (auto* list : {&data.id, &data.material_id}) list->reserve(body.owned().size());
+  data.volume.reserve(body.owned().size());
   for (std::size_t p = 0; p < body.owned().size(); ++p) {
     const auto i = static_cast<std::size_t>(body.owned()[p]);
     const Point x = body.position(i);
@@ -116,7 +119,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
   columns_ = perikit::history_columns(scene, simulation.problem().laws().dissipates());
-  const ReferenceData reference = reference_of(simulation.problem());
+  const ReferenceData reference = first_ ? reference_of(simulation.problem()) : ReferenceData();
   body_ = body_fingerprint(reference);
   if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = communicator().largest(first_ && start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_)) ? 1 : 0) > 0;
@@ -306,18 +309,24 @@ void RunRecorder::keep_checkpoint(const StepReport& report) {
 }
 
 void RunRecorder::write_frame(const StepReport& report) {
-  std::vector<OutputField> fields;
+  if (first_) writer_->begin(report.time, report.step);
+  fields_.expect(frame_fields_);
   for (const std::string& name : frame_fields_) {
     const OutputField& mine = fields_.get(name);
-    fields.push_back({name, mine.width, gather_points(simulation_.problem(), mine.data, static_cast<std::size_t>(mine.width))});
-    const std::vector<double>& values = fields.back().data;
-    const auto strange = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
-    if (!first_ || strange == values.end() || !strange_fields_.insert(name).second) continue;
-    log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, (strange - values.begin()) / fields.back().width,
-                    name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
+    const auto width = static_cast<std::size_t>(mine.width);
+    gather_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
+      writer_->add(name, mine.width, rows);
+      const auto strange = std::ranges::find_if(rows, [](double value) { return !std::isfinite(value); });
+      if (strange == rows.end() || !strange_fields_.insert(name).second) return;
+      log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name,
+                      first + static_cast<std::size_t>(strange - rows.begin()) / width,
+                      name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
+    });
+    fields_.forget(name);
   }
+  fields_.renew();
   ++frames_written_;
-  if (first_) writer_->write(report.time, report.step, fields);
+  if (first_) writer_->end();
 }
 
 void RunRecorder::write_history(const StepReport& report, bool counts) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
@@ -50,6 +51,30 @@ std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, 
   Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
   space_->run(pass);
   return finder.take();
+}
+
+std::vector<HistoryPlace> Mechanics::history_points() {
+  constexpr std::size_t at_once = 1024;  // groups, so that what is found of them takes little memory
+  const Body& body = parts_.families.body();
+  const Field values = body.make_field(body.dimension());
+  const auto place = [&](std::int32_t p) { return body.places().place.empty() || p < 0 ? p : body.places().place[static_cast<std::size_t>(p)]; };
+  std::vector<HistoryPlace> points;
+  std::map<std::int32_t, std::int32_t> parts;  // so far, of those whose evaluation points are parts of their families
+  const std::size_t groups = body.stride() / padding;
+  for (std::size_t first = 0; first < groups; first += at_once) {
+    GroupMarks marks(groups, 0);
+    std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), std::uint8_t{1});
+    const GroupMarks near = parts_.families.around(marks);
+    parts.clear();
+    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) {
+      const bool own = body.owns(static_cast<std::size_t>(found.owner));
+      const HistoryPoint point{place(found.owner), place(found.far), found.far < 0 ? parts[found.owner]++ : 0};
+      points.push_back({point, found.number, own});
+      if (found.other_number >= 0) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
+    }
+  }
+  std::ranges::sort(points, {}, &HistoryPlace::point);
+  return points;
 }
 
 void Mechanics::find_laminates(GroupMarks marks, bool again) {
@@ -153,20 +178,24 @@ void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const Group
 
 std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
   const Body& body = parts_.families.body();
-  const int components = parts_.laws.components();
-  Field weight = body.make_field(1), energy = body.make_field(1);
-  s.H = body.make_field(components);
-  s.P = body.make_field(components);
-  s.cauchy = body.make_field(9);
-  s.von_mises = body.make_field(1);
+  const bool tensors = s.asked >= Sampling::tensors;
+  Field weight, energy = body.make_field(1);
+  if (tensors) {
+    weight = body.make_field(1);
+    s.H = body.make_field(parts_.laws.components());
+    s.P = body.make_field(parts_.laws.components());
+    s.cauchy = body.make_field(9);
+    s.von_mises = body.make_field(1);
+  }
   const SampleSums sums{weight.data(), energy.data(), s.H.data(), s.P.data(), s.cauchy.data(), s.von_mises.data(), body.stride()};
   const BatchWork work = this->work(Work::sample, false);
   Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
   space_->run(pass);
   for (const std::int32_t index : body.internal()) {
     const auto p = static_cast<std::size_t>(index);
-    const double inverse = weight.data()[p] > 0 ? 1.0 / weight.data()[p] : 0.0;
     s.strain_energy_density.data()[p] += energy.data()[p] / body.volume(p);
+    if (!tensors) continue;
+    const double inverse = weight.data()[p] > 0 ? 1.0 / weight.data()[p] : 0.0;
     for (Field* field : {&s.H, &s.P, &s.cauchy, &s.von_mises})
       for (int c = 0; c < field->components(); ++c) field->component(c)[p] *= inverse;
   }

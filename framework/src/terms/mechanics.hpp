@@ -34,6 +34,8 @@ class Mechanics final : public Term {
   /// A constant stress is in equilibrium from now on, where the body is whole.
   void balance(std::shared_ptr<CloudConsistency> consistency);
   void history_restored() { space_->history_restored(); }
+  /// The evaluation points here that keep a history, ascending.
+  std::vector<HistoryPlace> history_points();
   /// Null where volumes are not those of point gradients.
   std::unique_ptr<VolumetricRows> make_volumetric_rows() const;
 

@@ -164,7 +164,7 @@ EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw
 }
 
 EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
-  samples = {.virial = samples.virial};
+  samples = {.asked = samples.asked};
   samples.strain_energy_density = parts_.families->body().make_field(1);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
@@ -226,6 +226,10 @@ LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->hi
 
 void Terms::history_restored() {
   if (mechanics_) mechanics_->history_restored();
+}
+
+std::vector<HistoryPlace> Terms::history_points() const {
+  return history() ? mechanics_->history_points() : std::vector<HistoryPlace>();
 }
 
 double Terms::take_dissipated() { return mechanics_ ? total_over_ranks(mechanics_->take_dissipated()) : 0; }

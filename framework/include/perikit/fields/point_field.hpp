@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "perikit/operators/samples.hpp"
+
 namespace perikit {
 
 class PointFields;
@@ -21,6 +23,7 @@ struct PointField {
   std::string name;
   int width;                                          ///< numbers per point: 1, 3 (vector) or 9 (tensor)
   bool of_gradients;                                  ///< made of deformation gradients, which pair laws do not have
+  Sampling samples;                                   ///< what is sampled for it
   std::string label, unit;                            ///< as pictures show them
   std::vector<double> (*compute)(PointFields& from);  ///< width * points
 

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,12 +23,14 @@ class PointFields {
   /// Forget what was computed: the state has changed.
   void renew() { cache_.clear(), samples_.reset(); }
   const OutputField& get(const std::string& name);
+  /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
+  void expect(std::span<const std::string> names);
+  /// Frees its memory until it is asked for again.
+  void forget(const std::string& name) { cache_.erase(name); }
 
  private:
   friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
 
-  /// virial: with P of pair laws.
-  const PointSamples& samples(bool virial = false);
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;

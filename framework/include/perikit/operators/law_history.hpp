@@ -1,12 +1,28 @@
 #pragma once
 /// LawHistory of laws at the evaluation points of one space.
 
+#include <compare>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "perikit/core/field.hpp"
 
 namespace perikit {
+
+/// What an evaluation point is in the whole body, whatever part of it a rank has.
+struct HistoryPoint {
+  std::int32_t owner;   ///< place in the whole body
+  std::int32_t far;     ///< of a bond the place of its other end; else -1
+  std::int32_t which;   ///< of several between the same points
+  auto operator<=>(const HistoryPoint&) const = default;
+};
+/// Where its history is.
+struct HistoryPlace {
+  HistoryPoint point;
+  std::int64_t number;
+  bool own;   ///< no other rank owns it
+};
 
 /// Evaluation points have stable numbers q: component c of the history at q is [c * stride + q]. Fresh history is zero.
 class LawHistory {

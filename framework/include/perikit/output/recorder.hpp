@@ -35,6 +35,11 @@ class FrameWriter {
   ~FrameWriter();
   /// Writes frames/<next index>.h5, then results.h5, then results.xdmf.
   void write(double time, std::int64_t step, std::span<const OutputField> fields);
+  // The same file from pieces, so that nobody needs all of a frame at once.
+  void begin(double time, std::int64_t step);
+  /// The next rows of a field; those of one field follow each other.
+  void add(const std::string& name, int width, std::span<const double> values);
+  void end();
   std::int64_t frames() const noexcept;
 
  private:

@@ -77,6 +77,8 @@ class Terms {
   /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
   LawHistory* history() const noexcept;
   void history_restored();
+  /// Its evaluation points, ascending. Failed bonds have none.
+  std::vector<HistoryPlace> history_points() const;
   /// What laws dissipate in the step that the last evaluation of forces ended, over all ranks [J]; once, then 0 until the next.
   double take_dissipated();
 
