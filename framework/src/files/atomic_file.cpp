@@ -68,24 +68,35 @@ int write_all(int descriptor, std::span<const std::byte> bytes) noexcept {
   return 0;
 }
 
-void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more) {
-  const std::filesystem::path temporary = temporary_name(file);
-  const auto give_up = [&](int code) {
-    ::unlink(temporary.c_str());
-    throw_system_error(file, "cannot write", code);
-  };
+AtomicFile::AtomicFile(std::filesystem::path file) : file_(std::move(file)), temporary_(temporary_name(file_)) {
   // Never through a link, nor into a file that is there: one of this name is left from a process of the same number.
-  const auto open_new = [&] { return ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666); };
-  Descriptor descriptor(open_new());
-  if (!descriptor && errno == EEXIST && ::unlink(temporary.c_str()) == 0) descriptor = Descriptor(open_new());
-  if (!descriptor) throw_system_error(file, "cannot write", errno);
-  for (const auto part : {bytes, more})
-    if (const int code = write_all(descriptor.get(), part)) give_up(code);
-  if (::fsync(descriptor.get()) != 0) give_up(errno);
+  const auto open_new = [&] { return ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666); };
+  descriptor_ = Descriptor(open_new());
+  if (!descriptor_ && errno == EEXIST && ::unlink(temporary_.c_str()) == 0) descriptor_ = Descriptor(open_new());
+  if (!descriptor_) throw_system_error(file_, "cannot write", errno);
+}
+
+AtomicFile::~AtomicFile() {
+  if (!kept_) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::check(int code) const {
+  if (code != 0) throw_system_error(file_, "cannot write", code);
+}
+
+void AtomicFile::keep() {
+  check(::fsync(descriptor_.get()) != 0 ? errno : 0);
   // Network file systems report a full disk only here.
-  if (::close(descriptor.release()) != 0) give_up(errno);
-  if (::rename(temporary.c_str(), file.c_str()) != 0) give_up(errno);
-  sync_folder(file);
+  check(::close(descriptor_.release()) != 0 ? errno : 0);
+  check(::rename(temporary_.c_str(), file_.c_str()) != 0 ? errno : 0);
+  kept_ = true;
+  sync_folder(file_);
+}
+
+void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more) {
+  AtomicFile out(file);
+  for (const auto part : {bytes, more}) out.check(write_all(out.descriptor(), part));
+  out.keep();
 }
 
 void make_folder(const std::filesystem::path& folder) {

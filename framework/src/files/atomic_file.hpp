@@ -8,6 +8,40 @@
 
 namespace perikit {
 
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int value = -1) noexcept : value_(value) {}
+  Descriptor(Descriptor&& other) noexcept : value_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  ~Descriptor();
+  int get() const noexcept { return value_; }
+  explicit operator bool() const noexcept { return value_ >= 0; }
+  int release() noexcept;
+
+ private:
+  int value_;
+};
+
+/// A file that is being written under its temporary name; unless it is kept, nothing of it stays. Methods throw RunError with the
+/// file's name and the system's reason; an earlier file of the name is then untouched.
+class AtomicFile {
+ public:
+  explicit AtomicFile(std::filesystem::path file);
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+  ~AtomicFile();
+  int descriptor() const noexcept { return descriptor_.get(); }
+  /// Nothing where the system's code is 0.
+  void check(int code) const;
+  void keep();
+
+ private:
+  std::filesystem::path file_, temporary_;
+  Descriptor descriptor_;
+  bool kept_ = false;
+};
+
 /// Replaces `file` by `bytes`, then `more`. Throws RunError with the file's name and the system's reason; an earlier `file` is
 /// then untouched.
 void store_atomically(const std::filesystem::path& file, std::span<const std::byte> bytes, std::span<const std::byte> more = {});
@@ -26,21 +60,6 @@ std::string file_of_temporary(const std::string& name);
 
 /// RunError "FILE: ACTION: reason of the system's error code".
 [[noreturn]] void throw_system_error(const std::filesystem::path& file, const std::string& action, int code);
-
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int value = -1) noexcept : value_(value) {}
-  Descriptor(Descriptor&& other) noexcept : value_(other.release()) {}
-  Descriptor& operator=(Descriptor&& other) noexcept;
-  ~Descriptor();
-  int get() const noexcept { return value_; }
-  explicit operator bool() const noexcept { return value_ >= 0; }
-  int release() noexcept;
-
- private:
-  int value_;
-};
 
 /// write(2) until all bytes are out; 0 or the system's error code.
 int write_all(int descriptor, std::span<const std::byte> bytes) noexcept;

@@ -15,6 +15,8 @@ namespace perikit::hdf5 {
 
 namespace {
 
+constexpr const char* new_file = "a file";
+
 /// HDF5 prints its error stack by itself unless told not to; ours are thrown.
 void silence() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
@@ -86,29 +88,30 @@ Handle::~Handle() {
   if (id_ >= 0) close_(id_);
 }
 
-Image::Image() {
+NewFile::NewFile() {
   silence();
-  constexpr std::size_t growth = 1 << 16;
-  access_ = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a file in memory");
-  check(H5Pset_fapl_core(access_.get(), growth, false), "a file in memory");
+  access_ = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, new_file);
   // Format 1.8: large groups and large attributes are stored well, and every reader of today opens it.
-  check(H5Pset_libver_bounds(access_.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "a file in memory");
-  // HDF5 takes two open files in memory of equal name for the same one.
-  static std::atomic<unsigned long> count = 0;
-  const std::string name = fmt::format("perikit image {}", count++);
-  const Handle properties = timeless(H5P_FILE_CREATE, "a file in memory");
-  file_ = checked(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, properties.get(), access_.get()), H5Fclose, "a file in memory");
+  check(H5Pset_libver_bounds(access_.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), new_file);
 }
 
-void Image::dataset(const std::string& path, std::span<const double> values, int width) {
+void NewFile::create() {
+  // HDF5 takes two open files of equal name for the same one.
+  static std::atomic<unsigned long> count = 0;
+  const std::string name = fmt::format("perikit file {}", count++);
+  const Handle properties = timeless(H5P_FILE_CREATE, new_file);
+  file_ = checked(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, properties.get(), access_.get()), H5Fclose, new_file);
+}
+
+void NewFile::dataset(const std::string& path, std::span<const double> values, int width) {
   rows(path, values.size() / static_cast<std::size_t>(width), width).append(values);
 }
 
-Image::Rows Image::rows(const std::string& path, std::size_t rows, int width) {
+NewFile::Rows NewFile::rows(const std::string& path, std::size_t rows, int width) {
   return {make_dataset(file_.get(), path, H5T_IEEE_F64LE, shape_of(rows, width)), path, width};
 }
 
-void Image::Rows::append(std::span<const double> values) {
+void NewFile::Rows::append(std::span<const double> values) {
   const std::size_t count = values.size() / static_cast<std::size_t>(width_);
   if (count == 0) return;
   const std::vector<hsize_t> begin{rows_, 0}, shape = shape_of(count, width_);
@@ -119,48 +122,66 @@ void Image::Rows::append(std::span<const double> values) {
   rows_ += count;
 }
 
-void Image::dataset(const std::string& path, std::span<const std::int64_t> values) {
+void NewFile::dataset(const std::string& path, std::span<const std::int64_t> values) {
   write_dataset(file_.get(), path, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()});
 }
 
-void Image::dataset(const std::string& path, std::span<const std::byte> values) {
+void NewFile::dataset(const std::string& path, std::span<const std::byte> values) {
   write_dataset(file_.get(), path, H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), {values.size()});
 }
 
-void Image::group(const std::string& path) {
+void NewFile::group(const std::string& path) {
   const Handle properties = timeless(H5P_GROUP_CREATE, path);
   checked(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose, path);
 }
 
-void Image::attribute(const std::string& name, double value) {
+void NewFile::attribute(const std::string& name, double value) {
   write_attribute(file_.get(), name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &value);
 }
 
-void Image::attribute(const std::string& name, std::int64_t value) {
+void NewFile::attribute(const std::string& name, std::int64_t value) {
   write_attribute(file_.get(), name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value);
 }
 
-void Image::attribute(const std::string& name, const std::string& text) {
+void NewFile::attribute(const std::string& name, const std::string& text) {
   const Handle type = utf8_type(name);
   const char* characters = text.c_str();
   write_attribute(file_.get(), name, type.get(), type.get(), &characters);
 }
 
-void Image::external_link(const std::string& path, const std::string& file) {
+void NewFile::external_link(const std::string& path, const std::string& file) {
   check(H5Lcreate_external(file.c_str(), "/", file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT), path);
 }
 
-bool Image::contains(const std::string& path) const {
+bool NewFile::contains(const std::string& path) const {
   return H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0;
 }
 
+Image::Image() {
+  constexpr std::size_t growth = 1 << 16;
+  check(H5Pset_fapl_core(access_.get(), growth, false), new_file);
+  create();
+}
+
 std::span<const std::byte> Image::bytes() {
-  check(H5Fflush(file_.get(), H5F_SCOPE_LOCAL), "a file in memory");
+  check(H5Fflush(file_.get(), H5F_SCOPE_LOCAL), new_file);
   void* handle = nullptr;
-  check(H5Fget_vfd_handle(file_.get(), access_.get(), &handle), "a file in memory");
+  check(H5Fget_vfd_handle(file_.get(), access_.get(), &handle), new_file);
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
   if (size < 0) throw RunError("HDF5 cannot tell the size of a file in memory");
   return {*static_cast<const std::byte* const*>(handle), static_cast<std::size_t>(size)};
+}
+
+StoredFile::StoredFile(const std::filesystem::path& file) : stored_(file), target_{stored_.descriptor()} {
+  if (!write_to(target_, access_.get())) throw RunError("HDF5 cannot create " + std::string(new_file));
+  create();
+}
+
+void StoredFile::keep() {
+  file_ = Handle();
+  check();
+  stored_.check(::ftruncate(stored_.descriptor(), static_cast<off_t>(target_.size)) != 0 ? errno : 0);
+  stored_.keep();
 }
 
 Source::Source(const std::filesystem::path& file) : path_(file) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The little of HDF5 that perikit needs: files built in memory, files read from disk.
+/// The little of HDF5 that perikit needs: files that are made, files that are read.
 
 #include <hdf5.h>
 
@@ -9,6 +9,9 @@
 #include <span>
 #include <string>
 #include <vector>
+
+#include "files/atomic_file.hpp"
+#include "files/hdf5_driver.hpp"
 
 namespace perikit::hdf5 {
 
@@ -29,12 +32,9 @@ class Handle {
   Close close_ = nullptr;
 };
 
-/// A new file that lives in memory until `bytes` is stored by the caller: so every file takes the same way to the disk, errors of
-/// the disk come with the system's reason, and HDF5 is never left with a file that it cannot flush. Methods throw RunError (out
-/// of memory, or a name that is already there).
-class Image {
+/// A file that is being made. Methods throw RunError (out of memory, or a name that is already there).
+class NewFile {
  public:
-  Image();
   /// `values` as a dataset of shape (n) for width 1, else (n, width).
   void dataset(const std::string& path, std::span<const double> values, int width = 1);
   void dataset(const std::string& path, std::span<const std::int64_t> values);
@@ -45,7 +45,7 @@ class Image {
     void append(std::span<const double> values);
 
    private:
-    friend class Image;
+    friend class NewFile;
     Rows(Handle dataset, std::string path, int width) : dataset_(std::move(dataset)), path_(std::move(path)), width_(width) {}
     Handle dataset_;
     std::string path_;
@@ -61,11 +61,37 @@ class Image {
   /// `path` in this file shows the root group of `file` (relative to the folder that this file lies in).
   void external_link(const std::string& path, const std::string& file);
   bool contains(const std::string& path) const;
+
+ protected:
+  /// Not yet a file: `access_` is to say where it is written.
+  NewFile();
+  ~NewFile() = default;
+  void create();
+
+  Handle access_, file_;
+};
+
+/// A small one, in memory until `bytes` is stored by the caller.
+class Image : public NewFile {
+ public:
+  Image();
   /// The whole file; valid until the next change.
   std::span<const std::byte> bytes();
+};
+
+/// A large one, which is written as it is made and is there at once when it is done. Errors of the disk are RunError with the system's
+/// reason, from `check` and `keep`.
+class StoredFile : public NewFile {
+ public:
+  explicit StoredFile(const std::filesystem::path& file);
+  ~StoredFile() { file_ = Handle(); }  // before what it is written to
+  void check() const { stored_.check(target_.error); }
+  /// All Rows must be gone, and nothing comes after it.
+  void keep();
 
  private:
-  Handle access_, file_;
+  AtomicFile stored_;
+  Target target_;
 };
 
 /// A file on disk, read only. Errors are InputError and name the file.

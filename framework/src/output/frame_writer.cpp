@@ -32,24 +32,24 @@ void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
   for (const fs::path& file : stale) remove_file(file);
 }
 
-void write_run_attributes(hdf5::Image& image, const RunAttributes& run) {
-  image.attribute("perikit_version", run.perikit_version);
-  image.attribute("title", run.title);
-  image.attribute("scene", run.scene);
+void write_run_attributes(hdf5::NewFile& file, const RunAttributes& run) {
+  file.attribute("perikit_version", run.perikit_version);
+  file.attribute("title", run.title);
+  file.attribute("scene", run.scene);
 }
 
-hdf5::Image reference_image(const ReferenceData& reference, const RunAttributes& run) {
-  hdf5::Image image;
-  write_run_attributes(image, run);
-  image.dataset("position", reference.position, 3);
-  image.dataset("volume", reference.volume);
-  image.dataset("id", reference.id);
-  image.dataset("material_id", reference.material_id);
-  for (const auto& [name, indices] : reference.sets) image.dataset("set_" + name, indices);
+void store_reference(const fs::path& path, const ReferenceData& reference, const RunAttributes& run) {
+  hdf5::StoredFile file(path);
+  write_run_attributes(file, run);
+  file.dataset("position", reference.position, 3);
+  file.dataset("volume", reference.volume);
+  file.dataset("id", reference.id);
+  file.dataset("material_id", reference.material_id);
+  for (const auto& [name, indices] : reference.sets) file.dataset("set_" + name, indices);
   std::vector<std::int64_t> connectivity(reference.volume.size());
   std::iota(connectivity.begin(), connectivity.end(), std::int64_t{0});
-  image.dataset("connectivity", connectivity);
-  return image;
+  file.dataset("connectivity", connectivity);
+  file.keep();
 }
 
 }  // namespace
@@ -64,11 +64,12 @@ struct FrameWriter::Implementation {
 
   /// The one that is being put together.
   struct Frame {
-    double time;
-    hdf5::Image image;
+    explicit Frame(const fs::path& path) : file(path) {}
+    double time = 0;
+    hdf5::StoredFile file;
     std::vector<XdmfField> fields;
-    std::optional<hdf5::Image::Rows> rows;  ///< of the last field
-    std::size_t values = 0;                 ///< of it so far
+    std::optional<hdf5::NewFile::Rows> rows;  ///< of the last field
+    std::size_t values = 0;                   ///< of it so far
   };
   std::optional<Frame> frame;
 
@@ -135,7 +136,7 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
   }
   // The lists lose the later frames before the files go, so that nothing ever names a missing file.
   self.store_sidecar();
-  store_atomically(self.folder / "reference.h5", reference_image(reference, self.run).bytes());
+  store_reference(self.folder / "reference.h5", reference, self.run);
   self.store_results();
   remove_later_frames(self.folder / "frames", first_frame);
 }
@@ -143,10 +144,12 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
 FrameWriter::~FrameWriter() = default;
 
 void FrameWriter::begin(double time, std::int64_t step) {
-  Implementation::Frame& frame = implementation_->frame.emplace();
+  Implementation& self = *implementation_;
+  self.frame.reset();
+  Implementation::Frame& frame = self.frame.emplace(self.next_file());
   frame.time = time;
-  frame.image.attribute("time", time);
-  frame.image.attribute("step", step);
+  frame.file.attribute("time", time);
+  frame.file.attribute("step", step);
 }
 
 void FrameWriter::add(const std::string& name, int width, std::span<const double> values) {
@@ -155,12 +158,13 @@ void FrameWriter::add(const std::string& name, int width, std::span<const double
   if (frame.fields.empty() || frame.fields.back().name != name) {
     self.end_field();
     frame.fields.push_back({name, width});
-    frame.rows.emplace(frame.image.rows(name, self.points, width));
+    frame.rows.emplace(frame.file.rows(name, self.points, width));
     frame.values = 0;
   }
   frame.values += values.size();
   if (frame.values > self.points * static_cast<std::size_t>(width)) self.end_field();
   frame.rows->append(values);
+  frame.file.check();
 }
 
 void FrameWriter::end() {
@@ -168,7 +172,7 @@ void FrameWriter::end() {
   Implementation::Frame& frame = *self.frame;
   self.end_field();
   frame.rows.reset();
-  store_atomically(self.next_file(), frame.image.bytes());
+  frame.file.keep();
   // In the order in which a resumed run finds them.
   std::ranges::sort(frame.fields, {}, &XdmfField::name);
   self.list(frames(), frame.time, frame.fields);

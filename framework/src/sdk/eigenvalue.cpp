@@ -12,7 +12,8 @@ namespace perikit {
 double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
-  Field q = problem.make_field(), before = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
+  Field last = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
+  FieldView q = vector, before = last;
   if (!warm) {
     fill_with_noise(scale, 1, problem.body().places(), vector);
   } else {
@@ -24,17 +25,17 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
   }
   const double size = norm(vector);
   if (!(size > 0)) return 0.0;  // nothing is free
-  for (std::size_t k = 0; k < n; ++k) q.data()[k] = vector.data[k] / size;
+  for (std::size_t k = 0; k < n; ++k) q.data[k] /= size;
   std::vector<double> alpha, beta;
   const int most = 80;
   double bound = 0;
   for (int k = 0; k < most; ++k) {
-    for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data()[i];
+    for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
     if (!problem.tangent_action(u, w, Kw).ok()) return 0.0;
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
     alpha.push_back(dot(Kw, q));
     const double b = beta.empty() ? 0.0 : beta.back();
-    for (std::size_t i = 0; i < n; ++i) Kw.data()[i] -= alpha.back() * q.data()[i] + b * before.data()[i];
+    for (std::size_t i = 0; i < n; ++i) Kw.data()[i] -= alpha.back() * q.data[i] + b * before.data[i];
     const double next = norm(Kw);
     // Largest Ritz value and its residual bound.
     const auto order = static_cast<Eigen::Index>(alpha.size());
@@ -49,10 +50,10 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
     if (converged || k + 1 == most || next <= 1e-14 * std::abs(value)) break;
     beta.push_back(next);
     std::swap(before, q);
-    for (std::size_t i = 0; i < n; ++i) q.data()[i] = Kw.data()[i] / next;
+    for (std::size_t i = 0; i < n; ++i) q.data[i] = Kw.data()[i] / next;
   }
   // The last Lanczos vector is rich in the top of the spectrum: a good start for the next call.
-  copy(q, vector);
+  if (q.data != vector.data) copy(q, vector);
   return bound;
 }
 
