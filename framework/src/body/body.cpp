@@ -14,13 +14,11 @@ namespace perikit {
 Body::Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells)
     : frame_(std::move(frame)), internal_(std::move(cells)) {
   number_lattice(lattice, std::pow(frame_.spacing, dimension()) * frame_.section);
-  sets_["all"] = internal_;
   points_of_all_ranks_ = points();
 }
 
 Body::Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes) : frame_(std::move(frame)) {
   place_cloud(positions, volumes);
-  sets_["all"] = internal_;
   points_of_all_ranks_ = points();
 }
 
@@ -68,7 +66,9 @@ Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
     if (role(numbers_[n]) >= Role::near) place[static_cast<std::size_t>(places_[p])] = internal_[n];
   }
   copy_sets(whole, place, far_material);
-  for (auto& [name, members] : sets_) std::erase_if(members, [&](std::int32_t p) { return !own_[static_cast<std::size_t>(p)]; });
+  const auto foreign = [&](std::int32_t p) { return !own_[static_cast<std::size_t>(p)]; };
+  std::erase_if(owned_, foreign);
+  for (auto& [name, members] : sets_) std::erase_if(members, foreign);
 }
 
 Body::Body(const Body& whole, const Images& images, std::uint16_t image_material)
@@ -95,11 +95,14 @@ Body::Body(const Body& whole, const Images& images, std::uint16_t image_material
 void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others) {
   material_ids_.assign(stride_, 0);
   for (const std::int32_t p : internal_) material_ids_[static_cast<std::size_t>(p)] = others;
-  for (const auto& [name, members] : whole.sets_) {
-    std::vector<std::int32_t>& own = sets_[name];
-    for (const std::int32_t p : members)
-      if (place[static_cast<std::size_t>(p)] >= 0) own.push_back(place[static_cast<std::size_t>(p)]);
-  }
+  const auto placed = [&](const std::vector<std::int32_t>& points) {
+    std::vector<std::int32_t> here;
+    for (const std::int32_t p : points)
+      if (place[static_cast<std::size_t>(p)] >= 0) here.push_back(place[static_cast<std::size_t>(p)]);
+    return here;
+  };
+  owned_ = placed(whole.owned());
+  for (const auto& [name, members] : whole.sets_) sets_[name] = placed(members);
   for (const std::int32_t p : whole.internal_) {
     const std::int32_t own = place[static_cast<std::size_t>(p)];
     if (own >= 0) material_ids_[static_cast<std::size_t>(own)] = whole.material_ids_.empty() ? std::uint16_t{0} : whole.material_ids_[static_cast<std::size_t>(p)];

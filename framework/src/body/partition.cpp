@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -76,6 +77,7 @@ class Bisection {
 Partition::Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources)
     : whole_(std::move(whole)), sources_(std::move(sources)), owner_(whole_.points(), 0) {
   const int size = communicator().size();
+  if (size > std::numeric_limits<std::uint16_t>::max()) throw std::domain_error(fmt::format("found {} ranks; allowed: {} of them", size, std::numeric_limits<std::uint16_t>::max()));
   whole_.lattice() ? share_lattice(size) : share_cloud(size);
   points_.assign(static_cast<std::size_t>(size), 0);
   const std::size_t real = whole_.points_of_all_ranks();
@@ -93,6 +95,11 @@ Partition::Partition(Body whole, const Reach& reach, std::vector<std::int32_t> s
   exchange_borders();
 }
 
+Body Partition::make_part(std::uint16_t far_material) {
+  const BodyPart part = std::move(part_);
+  return Body(whole_, part, far_material);
+}
+
 void Partition::share_lattice(int size) {
   const Lattice& lattice = *whole_.lattice();
   const LatticeTiling tiling(lattice);
@@ -101,7 +108,7 @@ void Partition::share_lattice(int size) {
   for (const std::int32_t p : whole_.owned()) ++points[tile(p)];
   Bisection bisection(tiling, points);
   bisection.share({}, tiling.count, 0, size);
-  for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = bisection.rank(tile(whole_.internal()[n]));
+  for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = static_cast<std::uint16_t>(bisection.rank(tile(whole_.internal()[n])));
 }
 
 /// Pieces of the curve that orders the points.
@@ -109,7 +116,7 @@ void Partition::share_cloud(int size) {
   const std::size_t block = cloud_blocks[0], blocks = (whole_.points() + block - 1) / block;
   for (std::size_t n = 0; n < owner_.size(); ++n) {
     const std::size_t b = static_cast<std::size_t>(whole_.internal()[n]) / block;
-    owner_[n] = static_cast<std::int32_t>(b * static_cast<std::size_t>(size) / blocks);
+    owner_[n] = static_cast<std::uint16_t>(b * static_cast<std::size_t>(size) / blocks);
   }
 }
 

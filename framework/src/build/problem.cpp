@@ -70,13 +70,15 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
     if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     return beyond;
   }
+  std::unique_ptr<Partition> partition;
   try {
-    parts.partition = std::make_unique<const Partition>(std::move(whole), reach_of(scene, formulation), beyond.images.source);
+    partition = std::make_unique<Partition>(std::move(whole), reach_of(scene, formulation), beyond.images.source);
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
   }
   const bool images = beyond.images.size() > 0;
-  parts.body = std::make_unique<const Body>(parts.partition->part(static_cast<std::uint16_t>(image_material(scene) + (images ? 1 : 0))));
+  parts.body = std::make_unique<const Body>(partition->make_part(static_cast<std::uint16_t>(image_material(scene) + (images ? 1 : 0))));
+  parts.partition = std::move(partition);
   if (images) {
     beyond.here = images_of_part(beyond.images, *parts.body);
     parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);

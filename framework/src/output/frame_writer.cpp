@@ -74,6 +74,16 @@ struct FrameWriter::Implementation {
   std::optional<Frame> frame;
 
   std::filesystem::path next_file() const { return folder / frame_path(frames); }
+  /// Where this fails nothing of the frame stays.
+  template <class Step>
+  void with_frame(Step&& step) {
+    try {
+      step(*frame);
+    } catch (...) {
+      frame.reset();
+      throw;
+    }
+  }
   void end_field() const {
     if (!frame->rows) return;
     const XdmfField& field = frame->fields.back();
@@ -146,36 +156,40 @@ FrameWriter::~FrameWriter() = default;
 void FrameWriter::begin(double time, std::int64_t step) {
   Implementation& self = *implementation_;
   self.frame.reset();
-  Implementation::Frame& frame = self.frame.emplace(self.next_file());
-  frame.time = time;
-  frame.file.attribute("time", time);
-  frame.file.attribute("step", step);
+  self.frame.emplace(self.next_file());
+  self.with_frame([&](Implementation::Frame& frame) {
+    frame.time = time;
+    frame.file.attribute("time", time);
+    frame.file.attribute("step", step);
+  });
 }
 
 void FrameWriter::add(const std::string& name, int width, std::span<const double> values) {
   Implementation& self = *implementation_;
-  Implementation::Frame& frame = *self.frame;
-  if (frame.fields.empty() || frame.fields.back().name != name) {
-    self.end_field();
-    frame.fields.push_back({name, width});
-    frame.rows.emplace(frame.file.rows(name, self.points, width));
-    frame.values = 0;
-  }
-  frame.values += values.size();
-  if (frame.values > self.points * static_cast<std::size_t>(width)) self.end_field();
-  frame.rows->append(values);
-  frame.file.check();
+  self.with_frame([&](Implementation::Frame& frame) {
+    if (frame.fields.empty() || frame.fields.back().name != name) {
+      self.end_field();
+      frame.fields.push_back({name, width});
+      frame.rows.emplace(frame.file.rows(name, self.points, width));
+      frame.values = 0;
+    }
+    frame.values += values.size();
+    if (frame.values > self.points * static_cast<std::size_t>(width)) self.end_field();
+    frame.rows->append(values);
+    frame.file.check();
+  });
 }
 
 void FrameWriter::end() {
   Implementation& self = *implementation_;
-  Implementation::Frame& frame = *self.frame;
-  self.end_field();
-  frame.rows.reset();
-  frame.file.keep();
-  // In the order in which a resumed run finds them.
-  std::ranges::sort(frame.fields, {}, &XdmfField::name);
-  self.list(frames(), frame.time, frame.fields);
+  self.with_frame([&](Implementation::Frame& frame) {
+    self.end_field();
+    frame.rows.reset();
+    frame.file.keep();
+    // In the order in which a resumed run finds them.
+    std::ranges::sort(frame.fields, {}, &XdmfField::name);
+    self.list(frames(), frame.time, frame.fields);
+  });
   self.frame.reset();
   self.store_results();
   self.store_sidecar();

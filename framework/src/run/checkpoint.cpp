@@ -36,12 +36,6 @@ std::string body_fingerprint(const ReferenceData& body) {
 
 namespace {
 
-std::string fingerprint_of(std::span<const std::byte> bytes) {
-  Fingerprint fingerprint;
-  fingerprint.add(bytes);
-  return fingerprint.text();
-}
-
 /// File names of libraries that only one of the two lists holds as they are.
 std::set<std::string> other_libraries(const std::string& before, const std::string& now) {
   const auto lines = [](const std::string& text) {
@@ -63,8 +57,7 @@ std::set<std::string> other_libraries(const std::string& before, const std::stri
 std::string library_fingerprints(const Registry& registry) {
   std::set<std::string> lines;
   for (const fs::path& library : registry.opened()) {
-    const std::string bytes = read_text(library);
-    lines.insert(fmt::format("{} {}", library.filename().string(), fingerprint_of(std::as_bytes(std::span(bytes)))));
+    lines.insert(fmt::format("{} {}", library.filename().string(), fingerprint_of(library).text()));
   }
   return fmt::format("{}", fmt::join(lines, "\n"));
 }

@@ -32,12 +32,7 @@ constexpr std::int64_t default_history_rows = 1000;
 
 bool reached(double time, double wanted) { return time >= wanted - 1e-9 * std::abs(wanted); }
 
-std::int64_t file_fingerprint(const std::filesystem::path& file) {
-  const std::string bytes = read_text(file);
-  Fingerprint fingerprint;
-  fingerprint.add(std::as_bytes(std::span(bytes)));
-  return static_cast<std::int64_t>(fingerprint.value());
-}
+std::int64_t file_fingerprint(const std::filesystem::path& file) { return static_cast<std::int64_t>(fingerprint_of(file).value()); }
 
 std::int64_t with_row(std::int64_t before, std::span<const double> row) {
   Fingerprint fingerprint = before == 0 ? Fingerprint() : Fingerprint(static_cast<std::uint64_t>(before));
@@ -60,7 +55,6 @@ ReferenceData reference_of(const BodyProblem& problem) {
     data.material_id.push_back(body.material_ids().empty() ? 0 : body.material_ids()[i]);
   }
   for (const auto& [name, members] : body.sets()) {
-    if (name == "all") continue;
     std::vector<std::int64_t>& set = data.sets[name];
     for (const std::int32_t i : members) set.push_back(body.input_of(static_cast<std::size_t>(i)));
     std::sort(set.begin(), set.end());

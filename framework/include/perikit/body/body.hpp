@@ -73,7 +73,7 @@ class Body {
   /// where two points of a lattice would be one.
   Body(const Body& whole, const Images& images, std::uint16_t image_material);
 
-  /// members: internal indices, each once, in the order that the set shall have. "all" exists from the beginning.
+  /// members: internal indices, each once, in the order that the set shall have. name: not "all".
   void add_set(const std::string& name, std::vector<std::int32_t> members) { sets_[name] = std::move(members); }
   /// By internal index; see material_ids().
   void set_materials(std::vector<std::uint16_t> ids) { material_ids_ = std::move(ids); }
@@ -123,9 +123,10 @@ class Body {
   }
 
   /// Points that belong to this body alone: all of them, but for ghosts and images.
-  const std::vector<std::int32_t>& owned() const noexcept { return sets_.at("all"); }
-  /// Internal indices in input order. "all" exists.
-  const std::vector<std::int32_t>& set(const std::string& name) const { return sets_.at(name); }
+  const std::vector<std::int32_t>& owned() const noexcept { return owned_.empty() ? internal_ : owned_; }
+  /// Internal indices in input order. "all": those that the body owns.
+  const std::vector<std::int32_t>& set(const std::string& name) const { return name == "all" ? owned() : sets_.at(name); }
+  /// But for "all".
   const std::map<std::string, std::vector<std::int32_t>>& sets() const noexcept { return sets_; }
   /// Which of the materials of the body each point has; empty when all are 0.
   std::span<const std::uint16_t> material_ids() const noexcept { return material_ids_; }
@@ -148,6 +149,7 @@ class Body {
   double uniform_volume_ = 0;
   std::vector<std::int32_t> input_;     ///< inverse of internal_
   std::vector<std::uint8_t> alive_;
+  std::vector<std::int32_t> owned_;     ///< empty: all
   std::map<std::string, std::vector<std::int32_t>> sets_;
   std::vector<std::uint16_t> material_ids_;
   std::size_t points_of_all_ranks_ = 0;

@@ -25,15 +25,14 @@ class Partition {
   Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
 
   const Body& whole() const noexcept { return whole_; }
-  /// The points of this rank and its ghosts; far ones have the material number `far_material`.
-  Body part(std::uint16_t far_material) const { return Body(whole_, part_, far_material); }
+  /// The points of this rank and its ghosts; far ones have the material number `far_material`. Once: it lets go of what it takes.
+  Body make_part(std::uint16_t far_material);
 
   /// Input numbers of the whole body, by rank: points that rank k has as ghosts and this one owns, and the other way round.
   const std::vector<std::vector<std::int32_t>>& lent() const noexcept { return lent_; }
   const std::vector<std::vector<std::int32_t>>& borrowed() const noexcept { return borrowed_; }
   /// By input number: the rank that owns the point or image.
-  std::span<const std::int32_t> owners() const noexcept { return owner_; }
-  bool owns(std::int32_t input) const noexcept { return part_.roles[static_cast<std::size_t>(input)] == Role::own; }
+  std::span<const std::uint16_t> owners() const noexcept { return owner_; }
   /// Points of each rank, without images.
   const std::vector<std::int64_t>& points() const noexcept { return points_; }
 
@@ -52,7 +51,7 @@ class Partition {
   Body whole_;
   std::vector<std::int32_t> sources_;
   BodyPart part_;
-  std::vector<std::int32_t> owner_;
+  std::vector<std::uint16_t> owner_;
   std::vector<std::int64_t> points_;
   std::vector<std::vector<std::int32_t>> lent_, borrowed_;
 };
