@@ -44,7 +44,7 @@ void for_slices(bool all, std::size_t slices, Body&& body) {
 
 /// Makes the compiler believe that the value is needed.
 void keep(double value) {
-  asm volatile("" : : "x"(value) : "memory");
+  asm volatile("" : : "m"(value) : "memory");
 }
 
 using Array = std::unique_ptr<double[]>;  // not a vector: pages belong to the thread that touches them first
@@ -76,15 +76,21 @@ void measure_triad(MachineLimits& limits, double seconds) {
 }
 
 void measure_multiply_add(MachineLimits& limits, double seconds) {
+#if defined(__aarch64__)
+  constexpr int chains = 16;            // latency (4) times issue width (up to 4)
+  constexpr bool adds_in_place = true;  // the sum overwrites the term: any other one would have to be copied first
+#else
   constexpr int chains = 12;  // more than latency (4) times issue width (2)
+  constexpr bool adds_in_place = false;
+#endif
   constexpr int rounds = 100000;
   auto chain = [](std::size_t) {
     Pack x[chains];
     for (int k = 0; k < chains; ++k) x[k] = Pack(1.0 + k);
-    Pack factor(0.999), term(0.001);
-    asm volatile("" : "+x"(factor.v), "+x"(term.v));
+    Pack factor(adds_in_place ? -0.001 : 0.999), term(0.001);
+    asm volatile("" : "+m"(factor.v), "+m"(term.v));
     for (int round = 0; round < rounds; ++round)
-      for (int k = 0; k < chains; ++k) x[k] = x[k] * factor + term;
+      for (int k = 0; k < chains; ++k) x[k] = x[k] * factor + (adds_in_place ? x[k] : term);
     Pack total;
     for (int k = 0; k < chains; ++k) total += x[k];
     keep(sum(total));

@@ -1,6 +1,6 @@
 #pragma once
 /// A pack of doubles that fills one SIMD register of the target, and the few operations that kernels and laws need.
-/// GCC/Clang vector extensions underneath; width 8 (AVX-512), 4 (AVX) or 2.
+/// GCC/Clang vector extensions underneath; width 8 (AVX-512), 4 (AVX) or 2 (SSE2, NEON).
 
 #include <cmath>
 #include <cstddef>
@@ -9,6 +9,8 @@
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 namespace perikit {
@@ -113,6 +115,8 @@ struct Pack {
     return {reinterpret_cast<detail::Lanes>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
 #elif defined(__AVX__) && defined(__FMA__)
     return {reinterpret_cast<detail::Lanes>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
+#elif defined(__aarch64__)
+    return {reinterpret_cast<detail::Lanes>(vfmaq_f64(reinterpret_cast<float64x2_t>(c.v), reinterpret_cast<float64x2_t>(a.v), reinterpret_cast<float64x2_t>(b.v)))};
 #elif defined(__FP_FAST_FMA)
     for (int i = 0; i < pack_width; ++i) c.v[i] = __builtin_fma(a.v[i], b.v[i], c.v[i]);
     return c;
@@ -152,6 +156,8 @@ inline bool any(PackMask m) noexcept {
   return m.v != 0;
 #elif defined(__AVX__)
   return _mm256_movemask_pd(reinterpret_cast<__m256d>(m.v)) != 0;
+#elif defined(__aarch64__)
+  return vpaddd_s64(reinterpret_cast<int64x2_t>(m.v)) != 0;   // minus the number of lanes where it holds
 #else
   std::int64_t r = 0;
   for (int i = 0; i < pack_width; ++i) r |= m.v[i];
@@ -162,6 +168,8 @@ inline bool any(bool m) noexcept { return m; }
 inline bool all(PackMask m) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   return m.v == PackMask::everywhere;
+#elif defined(__aarch64__)
+  return vpaddd_s64(reinterpret_cast<int64x2_t>(m.v)) == -pack_width;
 #else
   return !any(!m);
 #endif
@@ -210,6 +218,9 @@ inline Pack reciprocal(Pack a) noexcept {
 inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   return {reinterpret_cast<detail::Lanes>(_mm512_maskz_mov_pd(bits, reinterpret_cast<__m512d>(a.v)))};
+#elif defined(__aarch64__)
+  constexpr uint64x2_t bit_of_lane = {1, 2};
+  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<uint64x2_t>(a.v) & vtstq_u64(vdupq_n_u64(bits), bit_of_lane))};
 #else
   for (int i = 0; i < pack_width; ++i)
     if (!(bits >> i & 1)) a.v[i] = 0;
