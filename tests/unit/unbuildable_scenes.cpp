@@ -61,7 +61,7 @@ const Fault faults[]{
      "one that holds at one point or more"},
     {"sets", "odd", "{ points = [0, 24] }", "", 0, "sets.odd", "found the point 24", "0 to 23"},
     {"sets", "odd", "{ points = [3, 3] }", "", 0, "sets.odd", "found the point 3 twice", "each point once"},
-    {"sets", "bad", "\"sqrt(2 - x)\"", "", 0, "sets.bad", "found the expression \"sqrt(2 - x)\", which is -nan at x = (2.5",
+    {"sets", "bad", "\"sqrt(2 - x)\"", "", 0, "sets.bad", "found the expression \"sqrt(2 - x)\", which is nan at x = (2.5",
      "finite values"},
     {"body.lattice", "inside", "\"x < 0\"", "", 0, "body.lattice.inside", "keeps no point", "true at one point or more"},
     {"body.lattice", "inside", "\"log(-x)\"", "", 0, "body.lattice.inside", "nan at x = (0.5, 0.5, 0)", "finite values"},
@@ -73,7 +73,7 @@ const Fault faults[]{
     // materials
     {"material", "density", "\"1 - x\"", "", 0, "material.density", "found -0.5 at (1.5", "a density > 0"},
     {"material", "shear_modulus", "\"x - 3\"", "", 0, "material.shear_modulus", "found shear_modulus = -2.5", "a value > 0"},
-    {"material", "shear_modulus", "\"sqrt(2 - x)\"", "", 0, "material.shear_modulus", "is -nan at x = (2.5", "finite values"},
+    {"material", "shear_modulus", "\"sqrt(2 - x)\"", "", 0, "material.shear_modulus", "is nan at x = (2.5", "finite values"},
     {"material", "bulk_modulus", "\"0 * x\"", "", 0, "material.bulk_modulus", "found bulk_modulus = 0", "a value > 0"},
     {"material", "type", "\"mooney_rivlin\"\nC1 = 1.0\nC2 = -2.0\nbulk_modulus = 1.0\ndensity = 1.0\n[constants]", "", 16,
      "material", "found C1 + C2 = -1", "a finite value > 0"},

@@ -197,6 +197,7 @@ double Expression::operator()(const std::array<double, 3>& x, double t) const {
                                  reason(error)));
   }
   if (!std::isfinite(value)) {
+    if (std::isnan(value)) value = std::abs(value);   // its sign is the processor's choice
     throw InputError(parser_->position, parser_->key,
                      fmt::format("found the expression \"{}\", which is {} at x = ({}, {}, {}), t = {}; allowed: finite values",
                                  text_of(parser_->parser), value, x[0], x[1], x[2], t));
