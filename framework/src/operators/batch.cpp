@@ -1,10 +1,15 @@
 #include "operators/batch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <optional>
+#include <span>
+#include <type_traits>
 
 #include "operators/bond_samples.hpp"
+#include "operators/lane_stresses.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -259,43 +264,6 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnerg
   return bad;
 }
 
-namespace {
-
-/// F and P of a lane as tensors of three dimensions; its determinant.
-double full_tensors(Space space, const BatchScratch& s, int l, double (&F)[3][3], double (&P)[3][3]) noexcept {
-  const int d = dimension(space), components = tensor_components(space);
-  const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) {
-      const bool held = a < d && b < d;
-      F[a][b] = (a == b ? 1.0 : 0.0) + (held ? s.H[(a * d + b) * batch_points + l] : 0.0);
-      P[a][b] = held ? s.P[(a * d + b) * batch_points + l] : 0.0;
-    }
-  for (int c = d * d; c < components; ++c) {
-    const int axis = d + c - d * d;
-    F[axis][axis] += stress_space ? s.lateral[l] : s.H[c * batch_points + l];
-    P[axis][axis] = s.P[c * batch_points + l];
-  }
-  return F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) - F[0][1] * (F[1][0] * F[2][2] - F[1][2] * F[2][0]) +
-         F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
-}
-
-void cauchy_of(const double (&F)[3][3], const double (&P)[3][3], double J, double (&sigma)[3][3]) noexcept {
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) {
-      sigma[a][b] = 0;
-      for (int k = 0; k < 3; ++k) sigma[a][b] += P[a][k] * F[b][k] / J;
-    }
-}
-
-}  // namespace
-
-void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)[3][3]) noexcept {
-  double F[3][3], P[3][3];
-  const double J = full_tensors(space, s, lane, F, P);
-  cauchy_of(F, P, J, sigma);
-}
-
 void Pass::add_samples(int n, const BatchScratch& s) {
   if (work.finds()) return;
   if (bonds)
@@ -322,29 +290,91 @@ void BatchWork::screen(const std::int32_t* points, int count, int lanes, const B
   }
 }
 
+namespace {
+
+/// What is summed: a value of each lane, and where its weighted sums go, by owner.
+struct Sampled {
+  const double* value;
+  double* sum;
+};
+
+/// As packs do it.
+double multiply_add(double a, double b, double c) noexcept {
+#if defined(__FP_FAST_FMA)
+  return __builtin_fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+
+/// Lanes first ... first + 7 belong to the points from p on.
+void add_eight(std::span<const Sampled> all, int first, std::size_t p, const double* weight) noexcept {
+  for (int l = 0; l < 8; l += pack_width) {
+    const Pack w = Pack::load(weight + first + l);
+    const PackMask none = w == Pack(0.0);   // such lanes may hold anything
+    for (const Sampled& q : all) {
+      double* const to = q.sum + p + static_cast<std::size_t>(l);
+      multiply_add(w, select(none, Pack(0.0), Pack::load(q.value + first + l)), Pack::load(to)).store(to);
+    }
+  }
+}
+
+/// Lanes first ... end - 1 belong to p, and are added in this order.
+void add_run(std::span<const Sampled> all, int first, int end, std::size_t p, const double* weight) noexcept {
+  const auto add = [&](auto count, const Sampled* q) {
+    double total[count.value];
+    for (int k = 0; k < count.value; ++k) total[k] = q[k].sum[p];
+    for (int l = first; l < end; ++l) {
+      if (weight[l] == 0) continue;
+      for (int k = 0; k < count.value; ++k) total[k] = multiply_add(weight[l], q[k].value[l], total[k]);
+    }
+    for (int k = 0; k < count.value; ++k) q[k].sum[p] = total[k];
+  };
+  // Four sums at a time: each waits for itself.
+  std::size_t q = 0;
+  for (; q + 4 <= all.size(); q += 4) add(std::integral_constant<int, 4>(), &all[q]);
+  for (; q < all.size(); ++q) add(std::integral_constant<int, 1>(), &all[q]);
+}
+
+}  // namespace
+
 void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept {
+  static constexpr auto ones = [] {
+    std::array<double, batch_points> all{};
+    all.fill(1.0);
+    return all;
+  }();
   const Space space = laws_.space();
   const int d = dimension(space), components = tensor_components(space);
-  for (int l = 0; l < n; ++l) {
-    const double w = s.weight[l];
-    const auto p = static_cast<std::size_t>(s.owner[l]);
-    if (w == 0) continue;
-    sums.psi[p] += w * s.psi[l];
-    if (!sums.weight) continue;
-    double F[3][3], P[3][3], sigma[3][3];
-    const double J = full_tensors(space, s, l, F, P);
-    cauchy_of(F, P, J, sigma);
-    for (int c = 0; c < 9; ++c) sums.cauchy[static_cast<std::size_t>(c) * sums.stride + p] += w * sigma[c / 3][c % 3];
-    const double xy = sigma[0][1] * sigma[0][1] + sigma[1][2] * sigma[1][2] + sigma[0][2] * sigma[0][2];
-    const double dx = sigma[0][0] - sigma[1][1], dy = sigma[1][1] - sigma[2][2], dz = sigma[2][2] - sigma[0][0];
-    sums.von_mises[p] += w * std::sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + 3 * xy);
+  const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
+  Sampled all[2 + 9 + 1 + 2 * 9];
+  std::size_t count = 0;
+  const auto to = [&](const double* value, double* sum, int c) { all[count++] = {value, sum + static_cast<std::size_t>(c) * sums.stride}; };
+  to(s.psi, sums.psi, 0);
+  std::optional<LaneStresses> stresses;
+  if (sums.weight) {
+    stresses.emplace(n, space, s);
+    to(ones.data(), sums.weight, 0);
+    to(stresses->von_mises, sums.von_mises, 0);
+    for (int c = 0; c < 9; ++c) to(stresses->sigma[c], sums.cauchy, c);
     for (int c = 0; c < components; ++c) {
-      const int axis = c < d * d ? -1 : d + c - d * d;
-      const double h = axis >= 0 ? F[axis][axis] - 1 : s.H[c * batch_points + l];
-      sums.H[static_cast<std::size_t>(c) * sums.stride + p] += w * h;
-      sums.P[static_cast<std::size_t>(c) * sums.stride + p] += w * s.P[c * batch_points + l];
+      to(stress_space && c >= d * d ? s.lateral : s.H + c * batch_points, sums.H, c);
+      to(s.P + c * batch_points, sums.P, c);
     }
-    sums.weight[p] += w;
+  }
+  for (int l = 0; l < n;) {
+    const std::int32_t p = s.owner[l];
+    int next = 1;
+    while (next < 8 && l + next < n && s.owner[l + next] == p + next) ++next;
+    if (next == 8) {
+      add_eight({all, count}, l, static_cast<std::size_t>(p), s.weight);
+      l += 8;
+      continue;
+    }
+    int end = l + 1;
+    while (end < n && s.owner[end] == p) ++end;
+    add_run({all, count}, l, end, static_cast<std::size_t>(p), s.weight);
+    l = end;
   }
 }
 

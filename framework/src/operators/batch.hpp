@@ -103,9 +103,6 @@ class ScratchPool {
   std::vector<std::unique_ptr<BatchScratch>> scratch_;
 };
 
-/// Cauchy stress of a lane after an evaluation with Work::sample.
-void cauchy_stress(Space space, const BatchScratch& s, int lane, double (&sigma)[3][3]) noexcept;
-
 class BondSamples;
 
 class BatchWork {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
+#include "operators/lane_stresses.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
@@ -20,15 +22,16 @@ void BondSamples::add(const Entry& entry) {
 
 void BondSamples::add(int n, const BatchScratch& s) {
   std::vector<Entry>& entries = of_thread_[static_cast<std::size_t>(thread_index())];
+  std::optional<LaneStresses> stresses;
+  if (stress_) stresses.emplace(n, space_, s);
   for (int l = 0; l < n; ++l) {
     const double w = s.weight[l];
     if (w == 0 || s.owner[l] == s.far[l] || !keeps(s.owner[l], s.far[l])) continue;
     Entry& entry = entries.emplace_back(Entry{s.owner[l], s.far[l], w, w * s.psi[l], {}});
     if (!stress_) continue;
-    double sigma[3][3];
-    cauchy_stress(space_, s, l, sigma);
     constexpr int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-    for (int c = 0; c < 6; ++c) entry.stress[c] = 0.5 * w * (sigma[pair[c][0]][pair[c][1]] + sigma[pair[c][1]][pair[c][0]]);
+    const auto sigma = [&](int a, int b) { return stresses->sigma[3 * a + b][l]; };
+    for (int c = 0; c < 6; ++c) entry.stress[c] = 0.5 * w * (sigma(pair[c][0], pair[c][1]) + sigma(pair[c][1], pair[c][0]));
   }
 }
 
