@@ -20,9 +20,14 @@ HistoryRecord HistoryRecord::of(const Terms& terms) {
     points.push_back(place.point);
     for (std::size_t c = 0; c < width; ++c) values.push_back(history->begin()[c * history->stride() + static_cast<std::size_t>(place.number)]);
   }
+  record.components = width;
+  if (communicator().size() == 1) {
+    record.points = std::move(points);
+    record.values = std::move(values);
+    return record;
+  }
   points = gathered<HistoryPoint>(points);
   values = gathered<double>(values);
-  record.components = width;
   std::vector<std::size_t> order(points.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, {}, [&](std::size_t k) { return points[k]; });
