@@ -58,6 +58,8 @@ std::vector<HistoryPlace> Mechanics::history_points() {
   const Body& body = parts_.families.body();
   const Field values = body.make_field(body.dimension());
   const auto place = [&](std::int32_t p) { return body.places().place.empty() || p < 0 ? p : body.places().place[static_cast<std::size_t>(p)]; };
+  // Those of points and of parts of families have no far end.
+  const bool of_bonds = parts_.formulation.bond || (parts_.formulation.weighted && parts_.formulation.parts(body.dimension()) == 0);
   std::vector<HistoryPlace> points;
   std::map<std::int32_t, std::int32_t> parts;  // so far, of those whose evaluation points are parts of their families
   const std::size_t groups = body.stride() / padding;
@@ -68,7 +70,7 @@ std::vector<HistoryPlace> Mechanics::history_points() {
     parts.clear();
     for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) {
       const bool own = body.owns(static_cast<std::size_t>(found.owner));
-      const HistoryPoint point{place(found.owner), place(found.far), found.far < 0 ? parts[found.owner]++ : 0};
+      const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1, of_bonds ? 0 : parts[found.owner]++};
       points.push_back({point, found.number, own});
       if (found.other_number >= 0) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
     }
