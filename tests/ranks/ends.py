@@ -95,6 +95,11 @@ def wait_for(folder, frames):
 LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 12.0\ntime_step = 0.02', cells=[22, 18]).replace("frames = 3", "frames = 8\ncheckpoint_every = 100")
 
 
+# Of a law that remembers, beside one that does not.
+LONG_MEMORY = LONG.replace('type = "saint_venant_kirchhoff"', 'type = "hypoelastic"').replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n')
+LONG_MEMORY += '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = 1.0, bulk_modulus = 3.0 }\n'
+
+
 def output_fails():
     """Rank 0 cannot write a frame; the others wait for it in the next step."""
     folder = WORK + "/output"
@@ -112,31 +117,39 @@ def output_fails():
         print(err)
 
 
+def children(process):
+    return [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()]
+
+
 def stops():
     """A signal to one rank, to mpirun, and a rank that is killed: the run goes on from its checkpoint on another number of ranks."""
-    done = run(PROGRAM, LONG, WORK + "/whole", 0)
-    check(done.returncode == 0, "a run without a stop")
-    children = lambda process: [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()]
-    for name, target, number in (("SIGTERM to one rank", lambda p: children(p)[1], signal.SIGTERM), ("SIGTERM to mpirun", lambda p: p.pid, signal.SIGTERM),
-                                 ("kill -9 of one rank", lambda p: children(p)[2], signal.SIGKILL)):
+    for name, text, target, number, ranks in (
+            ("SIGTERM to one rank", LONG, lambda p: children(p)[1], signal.SIGTERM, 2),
+            ("SIGTERM to one rank, with a law that remembers", LONG_MEMORY, lambda p: children(p)[1], signal.SIGTERM, 2),
+            ("SIGTERM to mpirun", LONG, lambda p: p.pid, signal.SIGTERM, 1),
+            ("kill -9 of one rank", LONG, lambda p: children(p)[2], signal.SIGKILL, 1)):
+        whole = WORK + ("/whole" if text is LONG else "/whole_memory")
+        if not os.path.exists(whole + "/history.csv"):
+            done = run(PROGRAM, text, whole, 0)
+            check(done.returncode == 0, "a run without a stop")
         folder = WORK + "/stopped"
-        process = start(LONG, folder, 3)
+        process = start(text, folder, 3)
         wait_for(folder, 3)
         began = time.time()
         os.kill(target(process), number)
         _, err = process.communicate(timeout=60)
         spent = time.time() - began
         check(process.returncode != 0 and spent < LIMIT and os.path.exists(folder + "/checkpoint.h5"), "%s: all end after %.1f s with status %d" % (name, spent, process.returncode))
-        if number == signal.SIGTERM and name == "SIGTERM to one rank":
+        if name.startswith("SIGTERM to one rank"):
             check(perikit_lines(err, "stopped by a signal") == 1 and process.returncode == 1, name + ": one message")
-        for ranks in ((2,) if name == "SIGTERM to one rank" else (1,)):
-            done = run(PROGRAM, LONG, folder, ranks, 1, ("--resume",))
-            found = differences(WORK + "/whole", folder) if done.returncode == 0 else [done.stderr]
-            check(not found, "%s, then --resume on %d ranks: %s" % (name, ranks, "; ".join(found) or "the run without a stop"))
+        done = run(PROGRAM, text, folder, ranks, 1, ("--resume",))
+        found = differences(whole, folder) if done.returncode == 0 else [done.stderr]
+        check(not found, "%s, then --resume on %d ranks: %s" % (name, ranks, "; ".join(found) or "the run without a stop"))
 
 
 need(LIBRARY)
-os.makedirs(WORK, exist_ok=True)
+shutil.rmtree(WORK, ignore_errors=True)
+os.makedirs(WORK)
 refusals()
 throws()
 other_commands()

@@ -5,7 +5,6 @@ usage: same_bits.py PROGRAM LIBRARY WORK small|all
 
 import itertools
 import re
-import shutil
 import sys
 
 from scenes import differences, need, run, scene, without_velocity
@@ -202,28 +201,22 @@ def carried(program, work, everything):
         yield "initial.from, " + name, found
 
 
-def resumed(program, work, everything):
-    """Runs with laws that remember, begun on three ranks and ended on two and on one. What differs from a run on one."""
-    end = 'type = "verlet"\nend_time = %s\ntime_step = 0.05'
+def checkpoints(program, work, everything):
+    """Whether runs leave the same checkpoints, byte for byte, where laws remember and bonds fail. What differs."""
     names = [name for name in KINEMATICS if name not in PAIRS and "order" not in name] if everything else ("baqp", "projection")
-    for name, cloud, broken in itertools.product(names, (False, True) if everything else (False,), (False, True) if everything else (True,)):
-        texts = []
-        for time in ("3.0", "6.0"):
-            text = scene(KINEMATICS[name], 2, cloud, end % time, HYPOELASTIC)
-            texts.append(with_inclusion(text.replace("frames = 3", "every = 30\ncheckpoint_every = 30")) + CRACK + (DAMAGE["critical_stretch"] if broken else ""))
-        folder = work + "/resumed"
-        done = [run(program, texts[1], folder + "/whole", 0), run(program, texts[0], folder + "/part", 0)]
-        with open(folder + "/part/checkpoint.h5", "rb") as file:
-            of_one = file.read()
-        done.append(run(program, texts[0], folder + "/part", 3))
-        with open(folder + "/part/checkpoint.h5", "rb") as file:
-            found = [] if file.read() == of_one else ["checkpoint.h5"]
-        shutil.copytree(folder + "/part", folder + "/again", dirs_exist_ok=True)
-        for ranks, part in ((2, "part"), (0, "again")):
-            done.append(run(program, texts[1], folder + "/" + part, ranks, 1, ("--resume",)))
-            found += differences(folder + "/whole", folder + "/" + part)
-        found = [one.stderr.strip() for one in done if one.returncode != 0] + found
-        yield "resumed, %s, hypoelastic, %s%s" % (name, "cloud" if cloud else "lattice", ", bonds fail" if broken else ""), found
+    for name, cloud in itertools.product(names, (False, True) if everything else (False,)):
+        text = torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud).replace("frames = 3", "frames = 3\ncheckpoint_every = 50")
+        begin, end = text.index("[material]"), text.index("[initial]")
+        text = with_inclusion(text[:begin] + "[material]\n" + HYPOELASTIC + "\n" + text[end:])
+        # Of the same name, for checkpoints hold their scenes.
+        folder, found, kept = work + "/checkpoints", [], []
+        for ranks in (0, 3):
+            done = run(program, text, folder, ranks)
+            found += [done.stderr.strip()] if done.returncode != 0 else not_as_meant(text, folder)
+            with open(folder + "/checkpoint.h5", "rb") as file:
+                kept.append(file.read())
+        found += [] if kept[0] == kept[1] else ["checkpoint.h5"]
+        yield "checkpoints, %s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), found
 
 
 def log_lines(folder, name):
@@ -265,7 +258,7 @@ def main():
                 print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
         if name not in failed:
             print("same    " + name, flush=True)
-    for name, found in itertools.chain(carried(program, work, which == "all"), resumed(program, work, which == "all")):
+    for name, found in itertools.chain(carried(program, work, which == "all"), checkpoints(program, work, which == "all")):
         count += 1
         if found:
             failed.append(name)
