@@ -215,8 +215,4 @@ TEST_CASE("partition: what needs the whole body on one rank says so") {
     body.integrator = matrix + "\nsteps = 1";
     CHECK_THROWS_WITH(run_on(2, contract::scene_text(body, "type = \"conventional\"")), doctest::Contains("on 2 ranks; allowed: integrators that need no matrix"));
   }
-  body.conditions += "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n";
-  body.integrator = "type = \"jfnk\"\nsteps = 1";
-  CHECK_THROWS_WITH(run_on(2, contract::scene_text(body, "type = \"conventional\"")),
-                    doctest::Contains("found bonds that may fail with \"jfnk\" on 2 ranks; allowed: explicit integrators"));
 }
