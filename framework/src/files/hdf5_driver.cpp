@@ -28,8 +28,8 @@ const File& of(const H5FD_t* file) { return *reinterpret_cast<const File*>(file)
 
 H5FD_t* open(const char*, unsigned, hid_t access, haddr_t) {
   Target* const* target = static_cast<Target* const*>(H5Pget_driver_info(access));
-  File* const file = new (std::nothrow) File{};
-  if (!file || !target) return nullptr;
+  File* const file = target ? new (std::nothrow) File{} : nullptr;
+  if (!file) return nullptr;
   file->target = *target;
   return &file->base;
 }
