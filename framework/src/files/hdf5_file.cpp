@@ -180,6 +180,7 @@ StoredFile::StoredFile(const std::filesystem::path& file) : stored_(file), targe
 void StoredFile::keep() {
   file_ = Handle();
   check();
+  if (target_.size == 0) throw RunError("HDF5 cannot close " + std::string(new_file));
   stored_.check(::ftruncate(stored_.descriptor(), static_cast<off_t>(target_.size)) != 0 ? errno : 0);
   stored_.keep();
 }
