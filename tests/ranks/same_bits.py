@@ -113,9 +113,9 @@ def beyond(everything):
             yield "pressure, periodic, " + kind, BEYOND["periodic"](text)
 
 
-def torn(kinematics, damage, cloud):
+def torn(kinematics, damage, cloud, material=""):
     """Pulled apart so fast that bonds fail, pieces among them, and points are turned inside out before they are let go."""
-    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 10.0\ntime_step = 0.05')
+    text = scene(kinematics, 2, cloud, 'type = "verlet"\nend_time = 10.0\ntime_step = 0.05', material)
     text = text.replace("[[boundary]]", 'velocity = ["0.15*(x - 16)/16", "0.1*sin(x/3)*(y - 13)/13"]\n[[boundary]]', 1)
     return text.replace('"reaction"]', '"reaction", "damage"]') + CRACK + damage
 
@@ -205,9 +205,8 @@ def checkpoints(program, work, everything):
     """Whether runs leave the same checkpoints, byte for byte, where laws remember and bonds fail. What differs."""
     names = [name for name in KINEMATICS if name not in PAIRS and "order" not in name] if everything else ("baqp", "projection")
     for name, cloud in itertools.product(names, (False, True) if everything else (False,)):
-        text = torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud).replace("frames = 3", "frames = 3\ncheckpoint_every = 50")
-        begin, end = text.index("[material]"), text.index("[initial]")
-        text = with_inclusion(text[:begin] + "[material]\n" + HYPOELASTIC + "\n" + text[end:])
+        text = torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud, HYPOELASTIC).replace("frames = 3", "frames = 3\ncheckpoint_every = 50")
+        text = with_inclusion(text)
         # Of the same name, for checkpoints hold their scenes.
         folder, found, kept = work + "/checkpoints", [], []
         for ranks in (0, 3):

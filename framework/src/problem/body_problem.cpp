@@ -114,7 +114,7 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   if (ghosts_ && weak_springs_ && weak_springs_->any()) agree(status);
   if (weak_springs_ && status.ok()) {
     if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
-    else if (const EvaluationStatus refused = weak_springs_->refuse(seen(u, seen_)); !refused.ok()) return refused;
+    else status = weak_springs_->refuse(seen(u, seen_));
   }
   finish(force, status);
   return status;

@@ -27,11 +27,6 @@ std::vector<std::int32_t> points_of(const std::vector<LoosePiece>& pieces) {
   return points;
 }
 
-std::string told_text(const std::string& mine) {
-  const std::vector<char> told = told_to_all(std::vector<char>(mine.begin(), mine.end()));
-  return {told.begin(), told.end()};
-}
-
 }  // namespace
 
 WeakSprings::WeakSprings(const Families& families, Problem& problem, double share, const WholeBody* whole)
@@ -71,7 +66,9 @@ void WeakSprings::find(ConstFieldView u, bool fresh) {
 
 std::string WeakSprings::names() const {
   if (!first_rank_) return perikit::names(pieces_, families_.body());
-  return told_text(whole_ ? perikit::names(pieces_, whole_->families->body()) : std::string());
+  const std::string mine = whole_ ? perikit::names(pieces_, whole_->families->body()) : std::string();
+  const std::vector<char> told = told_to_all(std::vector<char>(mine.begin(), mine.end()));
+  return {told.begin(), told.end()};
 }
 
 EvaluationStatus WeakSprings::driven(const Body& body, ConstFieldView u, ConstFieldView force) const {
@@ -86,9 +83,7 @@ EvaluationStatus WeakSprings::refuse(ConstFieldView u) const {
   const ConstFieldView force = problem_.state().external_force();
   if (!first_rank_) return driven(families_.body(), u, force);
   const Field u_of_all = first_rank_->gather(u), force_of_all = first_rank_->gather(force);
-  const EvaluationStatus status = whole_ ? driven(whole_->families->body(), u_of_all, force_of_all) : EvaluationStatus{};
-  const std::vector<std::int64_t> point = told_to_all(std::vector{status.point});
-  return {point.front(), 0, told_text(status.description)};
+  return whole_ ? driven(whole_->families->body(), u_of_all, force_of_all) : EvaluationStatus{};
 }
 
 double WeakSprings::stiffness(std::int32_t point) const {

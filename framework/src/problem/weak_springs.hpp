@@ -28,7 +28,8 @@ class WeakSprings {
   /// All of them, in words; empty: none.
   std::string names() const;
   bool hold() const noexcept { return share_ > 0 && any_; }
-  /// The piece that the present loads move although nothing holds it; all well where springs do. The same on all ranks.
+  /// The piece that the present loads move although nothing holds it; all well where springs do. On several
+  /// ranks the first one says it.
   EvaluationStatus refuse(ConstFieldView u) const;
 
   // Where they hold.
