@@ -4,10 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <span>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -34,13 +32,6 @@ class Fingerprint {
 };
 
 /// Of the bytes of a file; of none where it cannot be read.
-inline Fingerprint fingerprint_of(const std::filesystem::path& file) {
-  Fingerprint fingerprint;
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<char> piece(std::size_t{1} << 20);
-  while (stream.read(piece.data(), static_cast<std::streamsize>(piece.size())), stream.gcount() > 0)
-    fingerprint.add(std::as_bytes(std::span(piece).first(static_cast<std::size_t>(stream.gcount()))));
-  return fingerprint;
-}
+Fingerprint fingerprint_of(const std::filesystem::path& file);
 
 }  // namespace perikit

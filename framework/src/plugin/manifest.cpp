@@ -4,11 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <fstream>
 #include <random>
-#include <span>
 #include <toml++/toml.h>
 
 #include "core/fingerprint.hpp"
@@ -25,17 +23,6 @@ namespace {
 
 constexpr std::int64_t manifest_format = 1;
 constexpr std::uintmax_t largest_manifest = 1 << 20;  // [bytes]: far more parts than any library brings
-
-std::string checksum(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::array<char, 1 << 16> buffer;
-  Fingerprint fingerprint;
-  do {
-    in.read(buffer.data(), buffer.size());
-    fingerprint.add(std::span<const char>(buffer.data(), static_cast<std::size_t>(in.gcount())));
-  } while (in);
-  return fingerprint.text();
-}
 
 SourcePosition place(const toml::node& node, const fs::path& file) {
   const toml::source_position at = node.source().begin;
@@ -76,7 +63,7 @@ bool Manifest::matches_size(const fs::path& library) const {
   return fs::file_size(library, unreadable) == size && !unreadable;
 }
 
-bool Manifest::matches(const fs::path& library) const { return matches_size(library) && checksum == perikit::checksum(library); }
+bool Manifest::matches(const fs::path& library) const { return matches_size(library) && checksum == fingerprint_of(library).text(); }
 
 fs::path manifest_path(const fs::path& library) { return fs::path(library).replace_extension(".parts"); }
 
@@ -123,7 +110,7 @@ void write_manifest(const fs::path& library, const std::vector<NamedPart>& parts
                           {"abi", PERIKIT_ABI_VERSION},
                           {"build_id", PERIKIT_BUILD_ID},
                           {"size", static_cast<std::int64_t>(fs::file_size(library))},
-                          {"checksum", checksum(library)},
+                          {"checksum", fingerprint_of(library).text()},
                           {"part", std::move(list)}};
   const fs::path file = manifest_path(library);
   const fs::path temporary = unused_name(file);
