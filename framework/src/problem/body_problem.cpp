@@ -30,9 +30,7 @@ void refuse_ranks(const ProblemParts& parts) {
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
     : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
   if (parts_.partition) ghosts_.emplace(*parts_.partition, body(), dimension());
-  if (!parts_.partition && !parts_.images) return;
-  seen_ = make_field();
-  seen_direction_ = make_field();
+  if (parts_.partition || parts_.images) seen_ = make_field();
 }
 
 BodyProblem::~BodyProblem() = default;
@@ -158,6 +156,7 @@ EvaluationStatus BodyProblem::add_load_stiffness(ConstFieldView u, double t, Con
 }
 
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  if (seen_.size() > seen_direction_.size()) seen_direction_ = make_field();   // explicit runs never need it
   EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
   if (weak_springs_ && weak_springs_->hold() && status.ok()) weak_springs_->add_tangent(w, Kw);
   finish(Kw, status);
