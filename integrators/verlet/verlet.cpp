@@ -174,6 +174,12 @@ void Verlet::run(Problem& problem, Observer& observer) {
     counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
+  const bool fresh = dt == 0;
+  if (fresh) {
+    check_time_step(problem, options_.values, &observer);
+    make_plan(estimated ? stable_step(problem) : options_.time_step);   // before the fields of the steps are there: it has its own
+    observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
+  }
   Stepper stepper(problem);
   const FieldView v = state.velocity();
   Field speeds = problem.constraints().any() ? problem.make_field() : Field();
@@ -187,7 +193,6 @@ void Verlet::run(Problem& problem, Observer& observer) {
     r.steps_expected = static_cast<std::int64_t>(first + counter);
     return r;
   };
-  const bool fresh = dt == 0;
   double& planned_end = state.declare_numbers("planned_end", 1)[0];
   if (!fresh && planned_end != options_.end_time) {
     make_plan(dt);   // not the step: only its end is another
@@ -195,9 +200,6 @@ void Verlet::run(Problem& problem, Observer& observer) {
   }
   planned_end = options_.end_time;
   if (fresh) {
-    check_time_step(problem, options_.values, &observer);
-    make_plan(estimated ? stable_step(problem) : options_.time_step);
-    observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
     stepper.prescribed_speed(state.time, speeds);
     problem.constraints().prescribe_velocity(state.time, v);
     const bool sample = observer.wants_sample(0, state.time);

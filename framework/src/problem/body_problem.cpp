@@ -30,7 +30,7 @@ void refuse_ranks(const ProblemParts& parts) {
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
     : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
   if (parts_.partition) ghosts_.emplace(*parts_.partition, body(), dimension());
-  if (parts_.partition || parts_.images) seen_ = make_field();
+  if (parts_.images) seen_ = make_field();
 }
 
 BodyProblem::~BodyProblem() = default;
@@ -69,12 +69,15 @@ void agree(EvaluationStatus& status) {
 
 }  // namespace
 
-ConstFieldView BodyProblem::seen(ConstFieldView u, Field& memory) {
-  if (!ghosts_ && !images()) return u;
-  copy(u, memory);
-  if (ghosts_) ghosts_->forward(memory);
-  if (images()) images()->extend(memory);
-  return memory;
+BodyProblem::Seen BodyProblem::seen(ConstFieldView u, Field& memory) {
+  if (images()) {
+    copy(u, memory);
+    if (ghosts_) ghosts_->forward(memory);
+    images()->extend(memory);
+    return {memory, nullptr};
+  }
+  if (ghosts_) ghosts_->forward(Seen::writable(u));
+  return {u, ghosts()};
 }
 
 void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
@@ -156,7 +159,7 @@ EvaluationStatus BodyProblem::add_load_stiffness(ConstFieldView u, double t, Con
 }
 
 EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  if (seen_.size() > seen_direction_.size()) seen_direction_ = make_field();   // explicit runs never need it
+  if (images() && seen_direction_.size() == 0) seen_direction_ = make_field();
   EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
   if (weak_springs_ && weak_springs_->hold() && status.ok()) weak_springs_->add_tangent(w, Kw);
   finish(Kw, status);

@@ -97,8 +97,26 @@ class BodyProblem final : public Problem {
   ProblemParts parts_;
   ProblemValues values_;
   std::optional<Ghosts> ghosts_;
-  /// u as the terms see it: with the values of ghosts and images, in `memory`; u itself where there are none.
-  ConstFieldView seen(ConstFieldView u, Field& memory);
+  /// A field as the terms see it, as long as this lives. Values of ghosts lie in the field itself meanwhile, and are zero again, as they
+  /// are in all fields of a problem, after it; none of an owner changes, so that a field that its caller may only read is taken as well.
+  class Seen {
+   public:
+    Seen(ConstFieldView field, const Ghosts* ghosts) : field_(field), ghosts_(ghosts) {}
+    Seen(const Seen&) = delete;
+    Seen& operator=(const Seen&) = delete;
+    ~Seen() {
+      if (ghosts_) ghosts_->clear(writable(field_));
+    }
+    operator ConstFieldView() const noexcept { return field_; }
+    static FieldView writable(ConstFieldView u) noexcept { return {const_cast<double*>(u.data), u.stride, u.components}; }
+
+   private:
+    ConstFieldView field_;
+    const Ghosts* ghosts_;   ///< null where there is nothing to clear
+  };
+
+  /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
+  Seen seen(ConstFieldView u, Field& memory);
   /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
   void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
