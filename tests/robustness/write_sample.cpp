@@ -7,12 +7,11 @@
 int main(int count, char** arguments) try {
   if (count != 2) return 2;
   perikit::ReferenceData reference;
-  for (int p = 0; p < 24; ++p) {
-    for (const int coordinate : {p % 4, p / 4 % 3, p / 12}) reference.position.push_back(coordinate);
-    reference.volume.push_back(1.0);
-    reference.id.push_back(p);
-    reference.material_id.push_back(p / 12);
-  }
+  reference.points = 24;
+  reference.point = [](std::size_t id) -> perikit::ReferenceData::Point {
+    const int p = static_cast<int>(id);
+    return {{p % 4 * 1.0, p / 4 % 3 * 1.0, p / 12 * 1.0}, 1.0, p / 12};
+  };
   reference.sets["left"] = {0, 4, 8};
   perikit::FrameWriter writer(arguments[1], reference, {"0.1.0", "sample <\"&\"> ü", std::string(100'000, '#')});
   for (int k = 0; k < 3; ++k) {

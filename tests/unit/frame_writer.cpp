@@ -25,12 +25,11 @@ constexpr std::size_t points = 4;
 
 ReferenceData reference() {
   ReferenceData data;
-  for (std::size_t p = 0; p < points; ++p) {
-    for (const double x : {1.0, 2.0, 3.0}) data.position.push_back(static_cast<double>(p) * x);
-    data.volume.push_back(0.5);
-    data.id.push_back(static_cast<std::int64_t>(p));
-    data.material_id.push_back(p < 2 ? 0 : 1);
-  }
+  data.points = points;
+  data.point = [](std::size_t p) -> ReferenceData::Point {
+    const auto x = static_cast<double>(p);
+    return {{x, 2 * x, 3 * x}, 0.5, p < 2 ? 0 : 1};
+  };
   data.sets["left"] = {0, 2};
   data.sets["nothing"] = {};
   return data;
@@ -121,7 +120,7 @@ TEST_CASE("a run's files have the documented layout, also after the folder was m
   CHECK(number<double>(results, "/frames/00000003", "time", H5T_NATIVE_DOUBLE) == 0.75);
   CHECK(number<std::int64_t>(results, "/frames/00000003", "step", H5T_NATIVE_INT64) == 30);
 
-  CHECK(dataset(results, "/reference/position").data == reference().position);
+  CHECK(dataset(results, "/reference/position").data == std::vector<double>{0, 0, 0, 1, 2, 3, 2, 4, 6, 3, 6, 9});
   CHECK(dataset(results, "/reference/volume").shape == std::vector<hsize_t>{points});
   CHECK_FALSE(dataset(results, "/reference/id").is_float);
   CHECK(dataset(results, "/reference/material_id").data == std::vector<double>{0, 0, 1, 1});

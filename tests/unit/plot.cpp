@@ -16,19 +16,19 @@ using namespace perikit;
 namespace {
 
 struct Sample {
-  ReferenceData reference;
+  std::vector<std::array<double, 3>> positions;
   OutputField displacement{"displacement", 3, {}}, cauchy{"cauchy", 9, {}}, damage{"damage", 1, {}};
 
   void add(double x, double y, double z, std::array<double, 3> moved, double fraction) {
-    for (const double c : {x, y, z}) reference.position.push_back(c);
-    reference.id.push_back(static_cast<std::int64_t>(reference.id.size()));
-    reference.material_id.push_back(0);
-    reference.volume.push_back(1.0);
+    positions.push_back({x, y, z});
     displacement.data.insert(displacement.data.end(), {moved[0] - x, moved[1] - y, moved[2] - z});
     for (int c = 0; c < 9; ++c) cauchy.data.push_back(c % 4 == 0 ? fraction * (c + 1) : 0.0);
     damage.data.push_back(fraction);
   }
   void write(const std::filesystem::path& folder, const std::string& title) const {
+    ReferenceData reference;
+    reference.points = positions.size();
+    reference.point = [&](std::size_t p) -> ReferenceData::Point { return {positions[p], 1.0, 0}; };
     FrameWriter writer(folder, reference, {"0.1.0", title, ""});
     for (int k = 0; k < 2; ++k) writer.write(0.5 * k, k, std::vector<OutputField>{displacement, cauchy, damage});
   }

@@ -55,12 +55,6 @@ Handle make_dataset(hid_t file, const std::string& path, hid_t file_type, const 
   return checked(H5Dcreate2(file, path.c_str(), file_type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose, path);
 }
 
-void write_dataset(hid_t file, const std::string& path, hid_t file_type, hid_t memory_type, const void* data,
-                   const std::vector<hsize_t>& shape) {
-  const Handle dataset = make_dataset(file, path, file_type, shape);
-  check(H5Dwrite(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), path);
-}
-
 std::vector<hsize_t> shape_of(std::size_t rows, int width) {
   std::vector<hsize_t> shape{rows};
   if (width > 1) shape.push_back(static_cast<hsize_t>(width));
@@ -107,27 +101,32 @@ void NewFile::dataset(const std::string& path, std::span<const double> values, i
   rows(path, values.size() / static_cast<std::size_t>(width), width).append(values);
 }
 
-NewFile::Rows NewFile::rows(const std::string& path, std::size_t rows, int width) {
-  return {make_dataset(file_.get(), path, H5T_IEEE_F64LE, shape_of(rows, width)), path, width};
+NewFile::Rows NewFile::rows(const std::string& path, std::size_t rows, int width, Numbers numbers) {
+  const hid_t type = numbers == Numbers::real ? H5T_IEEE_F64LE : H5T_STD_I64LE;
+  return {make_dataset(file_.get(), path, type, shape_of(rows, width)), path, width};
 }
 
-void NewFile::Rows::append(std::span<const double> values) {
-  const std::size_t count = values.size() / static_cast<std::size_t>(width_);
+void NewFile::Rows::append(std::span<const double> values) { append(values.data(), values.size(), H5T_NATIVE_DOUBLE); }
+void NewFile::Rows::append(std::span<const std::int64_t> values) { append(values.data(), values.size(), H5T_NATIVE_INT64); }
+
+void NewFile::Rows::append(const void* values, std::size_t size, hid_t memory_type) {
+  const std::size_t count = size / static_cast<std::size_t>(width_);
   if (count == 0) return;
   const std::vector<hsize_t> begin{rows_, 0}, shape = shape_of(count, width_);
   const Handle memory = make_space(path_, shape);
   const Handle file = checked(H5Dget_space(dataset_.get()), H5Sclose, path_);
   check(H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, begin.data(), nullptr, shape.data(), nullptr), path_);
-  check(H5Dwrite(dataset_.get(), H5T_NATIVE_DOUBLE, memory.get(), file.get(), H5P_DEFAULT, values.data()), path_);
+  check(H5Dwrite(dataset_.get(), memory_type, memory.get(), file.get(), H5P_DEFAULT, values), path_);
   rows_ += count;
 }
 
 void NewFile::dataset(const std::string& path, std::span<const std::int64_t> values) {
-  write_dataset(file_.get(), path, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()});
+  rows(path, values.size(), 1, Numbers::whole).append(values);
 }
 
 void NewFile::dataset(const std::string& path, std::span<const std::byte> values) {
-  write_dataset(file_.get(), path, H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), {values.size()});
+  const Handle dataset = make_dataset(file_.get(), path, H5T_STD_U8LE, {values.size()});
+  check(H5Dwrite(dataset.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path);
 }
 
 void NewFile::group(const std::string& path) {

@@ -43,16 +43,19 @@ class NewFile {
   class Rows {
    public:
     void append(std::span<const double> values);
+    void append(std::span<const std::int64_t> values);
 
    private:
     friend class NewFile;
+    void append(const void* values, std::size_t size, hid_t memory_type);
     Rows(Handle dataset, std::string path, int width) : dataset_(std::move(dataset)), path_(std::move(path)), width_(width) {}
     Handle dataset_;
     std::string path_;
     int width_;
     std::size_t rows_ = 0;
   };
-  Rows rows(const std::string& path, std::size_t rows, int width);
+  enum class Numbers { real, whole };
+  Rows rows(const std::string& path, std::size_t rows, int width = 1, Numbers numbers = Numbers::real);
   void group(const std::string& path);
   /// Attributes of the root group; text is stored as UTF-8 of variable length, which has no 64 kB limit.
   void attribute(const std::string& name, double value);

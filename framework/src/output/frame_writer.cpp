@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
 #include <system_error>
+#include <type_traits>
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
@@ -38,17 +38,37 @@ void write_run_attributes(hdf5::NewFile& file, const RunAttributes& run) {
   file.attribute("scene", run.scene);
 }
 
+/// A column, a piece at a time; add_values(p, values) appends those of a point.
+template <class Value, class ValuesOf>
+void store_column(hdf5::StoredFile& file, const std::string& name, std::size_t points, int width, ValuesOf&& add_values) {
+  constexpr std::size_t piece = 1 << 16;
+  hdf5::NewFile::Rows rows =
+      file.rows(name, points, width, std::is_same_v<Value, double> ? hdf5::NewFile::Numbers::real : hdf5::NewFile::Numbers::whole);
+  std::vector<Value> values;
+  for (std::size_t first = 0; first < points; first += piece) {
+    values.clear();
+    for (std::size_t p = first; p < std::min(points, first + piece); ++p) add_values(p, values);
+    rows.append(std::span<const Value>(values));
+  }
+}
+
 void store_reference(const fs::path& path, const ReferenceData& reference, const RunAttributes& run) {
   hdf5::StoredFile file(path);
   write_run_attributes(file, run);
-  file.dataset("position", reference.position, 3);
-  file.dataset("volume", reference.volume);
-  file.dataset("id", reference.id);
-  file.dataset("material_id", reference.material_id);
-  for (const auto& [name, indices] : reference.sets) file.dataset("set_" + name, indices);
-  std::vector<std::int64_t> connectivity(reference.volume.size());
-  std::iota(connectivity.begin(), connectivity.end(), std::int64_t{0});
-  file.dataset("connectivity", connectivity);
+  using Real = std::vector<double>;
+  using Whole = std::vector<std::int64_t>;
+  const std::size_t points = reference.points;
+  const auto number = [](std::size_t p, Whole& values) { values.push_back(static_cast<std::int64_t>(p)); };
+  store_column<double>(file, "position", points, 3, [&](std::size_t p, Real& values) {
+    const std::array<double, 3> x = reference.point(p).position;
+    values.insert(values.end(), x.begin(), x.end());
+  });
+  store_column<double>(file, "volume", points, 1, [&](std::size_t p, Real& values) { values.push_back(reference.point(p).volume); });
+  store_column<std::int64_t>(file, "id", points, 1, number);
+  store_column<std::int64_t>(file, "material_id", points, 1,
+                             [&](std::size_t p, Whole& values) { values.push_back(reference.point(p).material_id); });
+  for (const auto& [name, ids] : reference.sets) file.dataset("set_" + name, ids);
+  store_column<std::int64_t>(file, "connectivity", points, 1, number);
   file.keep();
 }
 
@@ -132,7 +152,7 @@ FrameWriter::FrameWriter(fs::path folder, const ReferenceData& reference, RunAtt
   Implementation& self = *implementation_;
   self.folder = std::move(folder);
   self.run = std::move(run);
-  self.points = reference.volume.size();
+  self.points = reference.points;
   make_folder(self.folder);
   make_folder(self.folder / "frames");
 

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <iterator>
 #include <set>
@@ -23,10 +24,13 @@ fs::path checkpoint_file(const fs::path& folder) { return folder / "checkpoint.h
 
 std::string body_fingerprint(const ReferenceData& body) {
   Fingerprint fingerprint;
-  const auto add = [&](const auto& values) { fingerprint.add(std::span(values)); };
-  add(body.position);
-  add(body.volume);
-  add(body.material_id);
+  const auto add = [&](const auto& values) { fingerprint.add(std::as_bytes(std::span(values))); };
+  for (std::size_t p = 0; p < body.points; ++p) {
+    const ReferenceData::Point point = body.point(p);
+    add(point.position);
+    add(std::array{point.volume});
+    add(std::array{point.material_id});
+  }
   for (const auto& [name, points] : body.sets) {
     add(name);
     add(points);

@@ -43,17 +43,11 @@ std::int64_t with_row(std::int64_t before, std::span<const double> row) {
 ReferenceData reference_of(const BodyProblem& problem) {
   const Body& body = problem.whole();
   ReferenceData data;
-  data.position.reserve(3 * body.owned().size());
-  for (auto* list : {&data.id, &data.material_id}) list->reserve(body.owned().size());
-  data.volume.reserve(body.owned().size());
-  for (std::size_t p = 0; p < body.owned().size(); ++p) {
+  data.points = body.owned().size();
+  data.point = [&body](std::size_t p) -> ReferenceData::Point {
     const auto i = static_cast<std::size_t>(body.owned()[p]);
-    const Point x = body.position(i);
-    data.position.insert(data.position.end(), x.begin(), x.end());
-    data.volume.push_back(body.volume(i));
-    data.id.push_back(static_cast<std::int64_t>(p));
-    data.material_id.push_back(body.material_ids().empty() ? 0 : body.material_ids()[i]);
-  }
+    return {body.position(i), body.volume(i), body.material_ids().empty() ? 0 : body.material_ids()[i]};
+  };
   for (const auto& [name, members] : body.sets()) {
     std::vector<std::int64_t>& set = data.sets[name];
     for (const std::int32_t i : members) set.push_back(body.input_of(static_cast<std::size_t>(i)));

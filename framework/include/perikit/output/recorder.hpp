@@ -2,8 +2,10 @@
 /// Result files (layout: README, "Results"): results.h5, reference.h5, frames/<8 digits>.h5, results.xdmf, history.csv.
 /// Every file appears by write to a temporary name, fsync and rename, so that a killed run leaves every finished frame readable.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -14,11 +16,16 @@
 
 namespace perikit {
 
+/// The body before the run, asked for point by point: a large one is never there twice.
 struct ReferenceData {
-  std::vector<double> position;        ///< rows of 3 [m]
-  std::vector<double> volume;          ///< [m^3]
-  std::vector<std::int64_t> id, material_id;
-  std::map<std::string, std::vector<std::int64_t>> sets;   ///< indices of points
+  struct Point {
+    std::array<double, 3> position;   ///< [m]
+    double volume = 0;                ///< [m^3]
+    std::int64_t material_id = 0;
+  };
+  std::size_t points = 0;
+  std::function<Point(std::size_t)> point;   ///< by id, 0 to points - 1
+  std::map<std::string, std::vector<std::int64_t>> sets;   ///< ids of points
 };
 
 struct RunAttributes {
