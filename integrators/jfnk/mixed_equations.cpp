@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sunlinsol/sunlinsol_spfgmr.h>
 
+#include <algorithm>
+
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -65,9 +67,25 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
   return false;
 }
 
+double MixedEquations::accuracy_for_motions(double accuracy) const {
+  // The rim alone cannot move without changing volumes: its forces are bulk moduli times strains, those of the answer shear moduli.
+  return accuracy * std::min(1.0, 100 / std::max(1.0, system_.largest_ratio()));
+}
+
+bool MixedEquations::correct(ConstFieldView u, VolumeEquations::Volumes volumes, double enough, FieldView du, std::string& note) {
+  const auto [before, after] = system_.correct(u, volumes, enough, du);
+  if (after >= before) return false;
+  note += fmt::format("  volumes {:.1e} to {:.1e}", before, after);
+  return true;
+}
+
 void MixedEquations::refine(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
-  const auto [before, after] = system_.correct(u, 0.1 * equilibrium.tolerance() * equilibrium.reference(), du);
-  if (after < before) note += fmt::format("  volumes {:.1e} to {:.1e}", before, after);
+  correct(u, VolumeEquations::Volumes::promised, 0.1 * equilibrium.tolerance() * equilibrium.reference(), du, note);
+}
+
+bool MixedEquations::refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
+  std::string failure;
+  return system_.linearise(equilibrium, u, failure) && correct(u, VolumeEquations::Volumes::kept, 0.0, du, note);
 }
 
 }  // namespace perikit

@@ -14,10 +14,13 @@ class MixedEquations final : public LinearisedProblem {
   bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
              std::string& failure) override;
   void refine(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) override;
+  bool refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) override;
+  double accuracy_for_motions(double accuracy) const override;
   bool exact() const noexcept override { return false; }
 
  private:
   static int multiply(void* self, N_Vector x, N_Vector y);
+  bool correct(ConstFieldView u, VolumeEquations::Volumes volumes, double enough, FieldView du, std::string& note);
   static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
 
   int max_restarts_, restart_;

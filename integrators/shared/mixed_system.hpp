@@ -37,8 +37,12 @@ class MixedSystem {
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
   bool multiply(const Product& K, FieldView x, FieldView y);
   void precondition(FieldView r, FieldView z);
+  /// W over the shear modulus, of the point where it is largest.
+  double largest_ratio() const { return volumes_.largest_ratio(); }
   /// See VolumeEquations::correct. The system is to be linearised afterwards.
-  std::pair<double, double> correct(ConstFieldView u, double enough, FieldView du) { return volumes_.correct(u, enough, du); }
+  std::pair<double, double> correct(ConstFieldView u, VolumeEquations::Volumes volumes, double enough, FieldView du) {
+    return volumes_.correct(u, volumes, enough, du);
+  }
 
  private:
   Problem& problem_;

@@ -1,5 +1,6 @@
 #include "volume_equations.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -15,7 +16,8 @@ namespace {
 
 constexpr double schur_accuracy = 0.1;  // of the two solves with L: a better one saves few iterations of the outer method
 constexpr double correction_accuracy = 0.05;
-constexpr int most_products = 200, most_corrections = 3;
+constexpr int most_products = 200, least_corrections = 3, most_corrections = 12;
+constexpr double small_pressure = 0.1;   // in shear moduli: an error of it leaves the tangent as it is
 
 /// Sum of term(k) over [0, n), block by block in their order: not exact, but the same on any number of threads, and mixed systems are on one rank.
 template <class Term>
@@ -61,13 +63,16 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
   volumes_->squares(force_, row_norms_);
   volumes_->squares(inverse_D_, inverse_diagonal_);
   for (Field* scalar : {&W_, &inverse_W_, &active_}) fill(0.0, *scalar);
+  largest_ratio_ = 0;
   for (const std::int32_t index : problem_.body().owned()) {
     const auto p = static_cast<std::size_t>(index);
-    const double excess = volumes_->stiffness().data[p] - ordinary * problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    const double excess = volumes_->stiffness().data[p] - ordinary * shear;
     row_norms_.data()[p] = std::sqrt(row_norms_.data()[p]);
     if (excess <= 0) continue;
     W_.data()[p] = excess;
     inverse_W_.data()[p] = 1 / excess;
+    largest_ratio_ = std::max(largest_ratio_, excess / shear);
     active_.data()[p] = 1;
     inverse_diagonal_.data()[p] = 1 / (inverse_diagonal_.data()[p] + 1 / excess);
   }
@@ -156,9 +161,19 @@ void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
   improve(schur_accuracy * schur_accuracy * scaled_square(second_), p);
 }
 
-std::pair<double, double> VolumeEquations::correct(ConstFieldView u, double enough, FieldView du) {
+double VolumeEquations::largest_pressure(ConstFieldView error) const {
+  double most = 0;
+  for (const std::int32_t index : problem_.body().owned()) {
+    const auto p = static_cast<std::size_t>(index);
+    const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    most = std::max(most, W_.data()[p] * std::abs(error.data[p]) / shear);
+  }
+  return most;
+}
+
+std::pair<double, double> VolumeEquations::correct(ConstFieldView u, Volumes volumes, double enough, FieldView du) {
   Field target = problem_.body().make_field(1), error = problem_.body().make_field(1), moved = problem_.make_field();
-  volumes_->rates(du, target);
+  if (volumes == Volumes::promised) volumes_->rates(du, target);
   combine(1, target, 1, volumes_->logarithms(), target);
   double before = 0, last = 0;
   for (int round = 0;; ++round) {
@@ -177,7 +192,8 @@ std::pair<double, double> VolumeEquations::correct(ConstFieldView u, double enou
     copy(error, second_);
     mask(W_, second_);
     forces(second_, force_);
-    if (round == most_corrections || norm(force_) <= enough) return {before, size};
+    if (round == most_corrections || norm(force_) <= enough || (round >= least_corrections && largest_pressure(error) <= small_pressure))
+      return {before, size};
     // The least motion z in the norm of D with B z = -error: z = -D^-1 B^T (B D^-1 B^T)^-1 error.
     solve(error, correction_accuracy, first_);
     forces(first_, action_);

@@ -36,18 +36,27 @@ class VolumeEquations {
   /// |b_i|, the Euclidean norms of the rows of B.
   ConstFieldView row_norms() const { return row_norms_; }
 
+  /// W over shear modulus and volume, of the point where it is largest.
+  double largest_ratio() const { return largest_ratio_; }
+
   /// p <- S^-1 r, S = B A^-1 B^T + W^-1 the Schur complement, by the least-squares commutator [Elman et al. 2006]:
   ///   S^-1 ~ L^-1 (B D^-1 A D^-1 B^T + W^-1) L^-1
   /// with the companion in place of A.
   void solve_schur(ConstFieldView r, FieldView p);
 
-  /// du += the least motion, in the norm of D, after which ln Jbar(u + du) is ln Jbar(u) + B du: the second-order correction of
+  /// Those that linear equations promised, ln Jbar(u) + B du, or those of u: what an extrapolated motion is to keep, because its own B du is
+  /// an error of second order itself.
+  enum class Volumes { promised, kept };
+
+  /// du += the least motion, in the norm of D, after which ln Jbar(u + du) is that of `volumes`: the second-order correction of
   /// sequential quadratic programming [Nocedal and Wright, 18.3]. What a full step errs in volumes, which is of second order, the
   /// bulk modulus would turn into pressures far beyond the true ones. Stops where B^T W times the error is below `enough` [N], or
   /// the error no longer falls. B is that of another state afterwards. Returns the norms of the error before and after.
-  std::pair<double, double> correct(ConstFieldView u, double enough, FieldView du);
+  std::pair<double, double> correct(ConstFieldView u, Volumes volumes, double enough, FieldView du);
 
  private:
+  /// Of pressures that such errors of ln Jbar are, over the shear modulus.
+  double largest_pressure(ConstFieldView error) const;
   double multiply(ConstFieldView p, FieldView Lp);
   void multiply_commutator(ConstFieldView p, FieldView Mp);
   /// b . diag(L)^-1 b
@@ -61,6 +70,7 @@ class VolumeEquations {
   std::unique_ptr<VolumetricPart> volumes_;
   const BlockMatrix* companion_ = nullptr;
   ConstFieldView free_;
+  double largest_ratio_ = 0;
   Field W_, inverse_W_, active_, row_norms_;
   Field inverse_D_;         ///< 0 on prescribed components
   Field inverse_diagonal_;  ///< of L

@@ -31,7 +31,12 @@ class Iteration {
       : equilibrium_(equilibrium), equations_(equations), u_(equilibrium.displacement()), r_(make()), trial_(make()), du_(make()),
         missing_(make()), action_(make()) {}
 
-  bool start(std::string& failure) {
+  bool start(bool extrapolated, std::string& note, std::string& failure) {
+    if (extrapolated) {
+      const ConstFieldView last = equilibrium_.problem().state().displacement();
+      combine(1, u_, -1, last, du_);
+      if (equations_.refine_extrapolation(equilibrium_, last, du_, note)) combine(1, last, 1, du_, u_);
+    }
     // What is missing of the prescribed displacements only by rounding, or by a good continuation, is set at once.
     gap_ = equilibrium_.missing(u_, missing_);
     if (gap_ <= 1e-6 * largest_magnitude(u_)) impose(u_);
@@ -50,6 +55,7 @@ class Iteration {
       equilibrium_.missing(u_, missing_);
       if (!equations_.apply(equilibrium_, missing_, action_, failure)) return false;
       combine(1, r_, -1, action_, r_);
+      accuracy = equations_.accuracy_for_motions(accuracy);
     }
     fill(0.0, du_);
     if (!equations_.solve(equilibrium_, r_, accuracy, du_, note, failure)) return false;
@@ -94,15 +100,16 @@ class Iteration {
 
 }  // namespace
 
-Solution NewtonIteration::solve(Equilibrium& equilibrium, bool) {
+Solution NewtonIteration::solve(Equilibrium& equilibrium, bool extrapolated) {
   Solution solution;
   Iteration iteration(equilibrium, equations_);
-  if (!iteration.start(solution.failure)) return solution;
+  std::string of_start;
+  if (!iteration.start(extrapolated, of_start, solution.failure)) return solution;
   const auto note = [&](double alpha, const std::string& more) {
     equilibrium.note(fmt::format("  iteration {:2}  residual {:.3e}{}{}", solution.iterations, equilibrium.relative_residual(),
                                  alpha < 1 ? fmt::format("  {:.3g} of the step", alpha) : "", more));
   };
-  note(1, "");
+  note(1, of_start);
   Field best_u = iteration.make();
   double best = 0, last_residual = 0, accuracy = 0;
   int since_best = 0;

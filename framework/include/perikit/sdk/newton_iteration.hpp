@@ -17,10 +17,15 @@ class LinearisedProblem {
   virtual bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) = 0;
   /// du (0 on entry and on prescribed components) with |K du - rhs| <= accuracy |rhs|. Adds what it has to say to `note`.
   virtual bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note, std::string& failure) = 0;
+  /// The accuracy to ask for where rhs is what prescribed motions of the rim alone push with, which may be far more than the reactions
+  /// at the end of the step. Called after linearise.
+  virtual double accuracy_for_motions(double accuracy) const { return accuracy; }
   /// True where solve() is as good as exact.
   virtual bool exact() const noexcept = 0;
   /// du, prescribed components included, is about to be added to u: it may become better than linear equations can be. Adds to `note`.
   virtual void refine(Equilibrium&, ConstFieldView /*u*/, FieldView /*du*/, std::string& /*note*/) {}
+  /// Likewise of a du that continues the path from the equilibrium u of the last step. False where it stays as it is.
+  virtual bool refine_extrapolation(Equilibrium&, ConstFieldView /*u*/, FieldView /*du*/, std::string& /*note*/) { return false; }
   /// See EquilibriumSolver.
   virtual void bonds_changed() {}
 };
