@@ -167,7 +167,11 @@ def cases(everything):
         for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
             if criterion == "max_stress" and name in PAIRS:
                 continue
-            yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), torn(KINEMATICS[name], DAMAGE[criterion], cloud), ranks, threads
+            text = torn(KINEMATICS[name], DAMAGE[criterion], cloud)
+            # Gradients of an order above 1 do not survive families that are torn to pieces.
+            if "order" in name:
+                text = text.replace("end_time = 10.0\ntime_step = 0.05", "end_time = 1.2\ntime_step = 0.02")
+            yield "%s, %s, %s" % (name, criterion, "cloud" if cloud else "lattice"), text, ranks, threads
     for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
