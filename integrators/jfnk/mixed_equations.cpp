@@ -85,7 +85,7 @@ void MixedEquations::refine(Equilibrium& equilibrium, ConstFieldView u, FieldVie
 
 bool MixedEquations::refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
   std::string failure;
-  return system_.linearise(equilibrium, u, failure) && correct(u, VolumeEquations::Volumes::kept, 0.0, du, note);
+  return system_.linearise_volumes(equilibrium, u, failure) && correct(u, VolumeEquations::Volumes::kept, 0.0, du, note);
 }
 
 }  // namespace perikit

@@ -6,8 +6,13 @@
 namespace perikit {
 
 bool MixedSystem::linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
-  problem_.assemble_companion(u, springs_, VolumeEquations::ordinary);
+  if (!linearise_volumes(equilibrium, u, failure)) return false;
   multigrid_.make(springs_, equilibrium.free(), rigid_motions(problem_.body(), u));
+  return true;
+}
+
+bool MixedSystem::linearise_volumes(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
+  problem_.assemble_companion(u, springs_, VolumeEquations::ordinary);
   const EvaluationStatus status = volumes_.linearise(u, springs_, equilibrium.free());
   if (!status.ok()) failure = status.description;
   return status.ok();

@@ -35,6 +35,8 @@ class MixedSystem {
 
   /// The system and its preconditioner at u. False where u is inadmissible; `failure` says why.
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
+  /// As much of it as `correct` needs.
+  bool linearise_volumes(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
   bool multiply(const Product& K, FieldView x, FieldView y);
   void precondition(FieldView r, FieldView z);
   /// W over the shear modulus, of the point where it is largest.
