@@ -93,6 +93,30 @@ TEST_CASE("prescribed motions of both ends: no step is cut back, and those that 
   }
 }
 
+TEST_CASE("volumes that alternate between neighbours are warned of") {
+  // A cube between held faces has a checkerboard of volumes that its displacements hardly change.
+  const auto cube = [](double ratio) {
+    return fmt::format(
+        "format = 1\n[body]\ndimension = 3\n[body.lattice]\nspacing = 0.2\nlower = [0, 0, 0]\nupper = [1, 1, 1]\n"
+        "[family]\nhorizon_ratio = 2.015\ninfluence = \"cubic_spline\"\n[kinematics]\ntype = \"selective\"\nbase = \"baqp\"\n"
+        "[material]\ntype = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = {}\n"
+        "[[boundary]]\nface = \"-z\"\ndisplacement = [0, 0, 0]\n[[boundary]]\nface = \"+z\"\ndisplacement = [0, 0, 0.1]\n"
+        "[integrator]\ntype = \"jfnk\"\nsteps = 1\ntolerance = 1e-8\n",
+        ratio);
+  };
+  const std::string said = "volumes of points that alternate between neighbours";
+  const auto soft = make(cube(100)), hard = make(cube(1e4));
+  CHECK(run(*soft).text.find(said) == std::string::npos);
+  const std::string text = run(*hard).text;
+  REQUIRE(text.find(said) != std::string::npos);
+  CHECK(text.rfind("warning: ", text.find(said)) != std::string::npos);
+  const double of_soft = soft->problem().state().energies.strain, of_hard = hard->problem().state().energies.strain;
+  MESSAGE("strain energy ", of_soft, " J with kappa/mu = 100, ", of_hard, " J with 1e4");
+  CHECK(of_hard > 1.1 * of_soft);  // what is warned of
+  // The block that is pulled by loads keeps its volumes.
+  CHECK(run(*make(scene(3, 8, 1e4, jfnk("mixed")))).text.find(said) == std::string::npos);
+}
+
 TEST_CASE("auto takes mixed systems where they are faster: from a ratio of 50 on lattices in 3D, elsewhere from 200") {
   for (const char* jitter : {"0", "0.2"})
     for (const double ratio : {40.0, 60.0, 190.0, 210.0}) {

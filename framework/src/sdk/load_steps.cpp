@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "perikit/core/field_operations.hpp"
+#include "sdk/alternating_volumes.hpp"
 
 namespace perikit {
 
@@ -69,8 +70,9 @@ class LoadSteps {
     while (position() < planned() && !observer_.cancelled()) {
       if (step()) continue;
       observer_.stopped_within_step();
-      return;
+      break;
     }
+    if (const std::string warning = warn_of_alternating_volumes(problem_, u_); !warning.empty()) observer_.log("warning: " + warning);
   }
 
  private:
@@ -110,6 +112,11 @@ class LoadSteps {
                       equilibrium_.residual_norm()));
   }
 
+  std::string hint_of_volumes() {
+    const std::string warning = warn_of_alternating_volumes(problem_, equilibrium_.displacement());
+    return warning.empty() ? warning : "; where it failed " + warning;
+  }
+
   /// The same load, of another number of planned steps: `ratio` times as many.
   void plan_anew(double ratio) {
     position() *= ratio;
@@ -141,8 +148,8 @@ class LoadSteps {
       if (span / 2 < smallest) {
         throw RunError(fmt::format(
             "{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, failed because {}. More steps or cut_backs may "
-            "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed",
-            integrator_, state_.time, state_.step, span / planned(), solution.failure));
+            "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed{}",
+            integrator_, state_.time, state_.step, span / planned(), solution.failure, hint_of_volumes()));
       }
       span /= 2;
       increment() = span;
