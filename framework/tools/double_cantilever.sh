@@ -1,19 +1,23 @@
 #!/usr/bin/env bash
 # The double cantilever beam of configs/fracture/double_cantilever.toml: energy dissipated per new area over Gc, the mean of G over Gc while
-# the crack grows (P^2 (a + 0.64 h)^2 12/(E h^3), a from the line of the load), and the length of the crack at the end [mm].
+# the crack grows, and the length of the crack at the end [mm]. a: by what the rows beside the crack have lost, from the line of the load,
+# and 0.64 h for the rotation of the clamped end. G = 12 P^2 a^2/(E h^3), with the E at which P = E h^3 w/(4 a^3) holds before the crack grows.
 #   double_cantilever.sh PERIKIT OUT [--set KEY=VALUE]...
 set -euo pipefail
 perikit=$1 out=$2
 shift 2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 "$perikit" run configs/fracture/double_cantilever.toml -o "$out" --threads 1 --quiet "$@"
-awk -F, '
+opening=$(awk '$1 == "w" && $2 == "=" { print $3 + 0; exit }' "$out/scene.toml")
+awk -F, -v opening="$opening" '
   NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }
   {
-    lost = $at["lost"]; e = $at["dissipated_energy"]; p = $at["pull"]
+    lost = $at["lost"]; e = $at["dissipated_energy"]; p = $at["pull"]; h = 0.01
     if (NR == 2) start = lost
     a = 0.03*lost/start
-    if (a > before + 1e-9 && NR > 2 && a > 0.035) { arm = a - 0.0005 + 0.64*0.01; sum += 12*p*p*arm*arm/(3e9*1e-6)/500; ++n }
+    arm = a - 0.0005 + 0.64*h
+    if (NR == 3) E = 4*p*arm^3/(h^3*opening*$at["time"])
+    if (a > before + 1e-9 && NR > 2 && a > 0.035) { sum += 12*p*p*arm*arm/(E*h^3)/500; ++n }
     if (a > 0.035 && !first) { first = a; first_e = e }
     before = a
   }

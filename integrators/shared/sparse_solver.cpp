@@ -2,6 +2,7 @@
 
 #include <cholmod.h>
 #include <fmt/format.h>
+#include <omp.h>
 #include <sys/resource.h>
 #include <umfpack.h>
 #include <unistd.h>
@@ -38,6 +39,19 @@ double address_space_left() {
   std::ifstream("/proc/self/statm") >> pages;
   return static_cast<double>(limit.rlim_cur) - pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
+
+/// CHOLMOD moves the numbers of each supernode with four threads, however many there are: waking them takes longer than that, ten times as
+/// long as all the rest for some thousand unknowns. No parallel regions as long as this lives.
+class OneThread {
+ public:
+  OneThread() { omp_set_max_active_levels(0); }
+  ~OneThread() { omp_set_max_active_levels(levels_); }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int levels_ = omp_get_max_active_levels();
+};
 
 /// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
 cholmod_sparse view(std::size_t n, FreeMatrix::Index* first, FreeMatrix::Index* row, double* value) {
@@ -150,7 +164,10 @@ struct SparseSolver::Implementation {
     if (!cholesky && !analyse(K, failure)) return false;
     free.values(K, true, upper_first, value);
     cholmod_sparse A = view(free.unknowns(), upper_first.data(), upper_row.data(), value.data());
-    cholmod_l_factorize(&A, cholesky, &common);
+    {
+      const OneThread one;
+      cholmod_l_factorize(&A, cholesky, &common);
+    }
     definite = common.status == CHOLMOD_OK && cholesky->minor == free.unknowns();
     if (common.status == CHOLMOD_OUT_OF_MEMORY)
       failure =

@@ -1,6 +1,7 @@
 /// Constants of the damage criteria, by hand.
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
@@ -76,6 +77,40 @@ TEST_CASE("critical_energy: the bonds that cross a unit of area hold the energy 
   CHECK(value[0] == 0.01);
   x.crossing_shares = 0;
   CHECK_THROWS_WITH_AS(shared->limits(x), doctest::Contains("allowed: one that gives a finite energy > 0"), std::domain_error);
+}
+
+TEST_CASE("critical_energy: bonds that weaken take up the same energy, and their force falls in a straight line") {
+  DamagePoint x{{Space::solid, 1.0, 0.4, {2.0, 1.5}}, 0.3};
+  x.crossing = 5.0;
+  x.crossing_shares = 2.0;
+  const double limit = 0.015;
+  for (const double softening : {1.5, 4.0, 25.0}) {
+    INFO("softening ", softening);
+    const auto damage = make("critical_energy", fmt::format("energy_release_rate = 0.03\nsoftening = {}", softening));
+    CHECK(!damage->traits().bits);
+    const DamageLimits limits = damage->limits(x);
+    CHECK(limits.onset == doctest::Approx(limit / softening).epsilon(1e-14));
+    CHECK(limits.failure == doctest::Approx(limit * softening).epsilon(1e-14));
+    const auto left = [&](double w) {
+      alignas(64) double value[8] = {w}, onset[8] = {limits.onset}, failure[8] = {limits.failure}, b[8];
+      damage->integrity({1, value, onset, failure, b});
+      return b[0];
+    };
+    const double first = std::sqrt(limits.onset), last = std::sqrt(limits.failure);
+    for (const double share : {0.25, 0.5, 0.75}) {
+      const double q = first + share * (last - first);
+      CHECK(q * left(q * q) == doctest::Approx((1 - share) * first).epsilon(1e-13));
+    }
+    // int q^2 (-db), the midpoint rule.
+    constexpr int n = 20000;
+    double taken = 0;
+    for (int k = 0; k < n; ++k) {
+      const double q = first + (last - first) * k / n, next = first + (last - first) * (k + 1) / n, mid = 0.5 * (q + next);
+      taken += mid * mid * (left(q * q) - left(next * next));
+    }
+    CHECK(taken == doctest::Approx(limit).epsilon(1e-6));
+  }
+  CHECK(make("critical_energy", "energy_release_rate = 0.03")->traits().bits);
 }
 
 TEST_CASE("max_stress: the largest principal stress of bonds in extension") {

@@ -56,6 +56,10 @@ struct Fault {
   const char* allowed;
 };
 
+// A material of its own on the left.
+#define REGION \
+  "[[region]]\nset = \"left\"\nmaterial = { type = \"neo_hookean\", density = 1, shear_modulus = 1, bulk_modulus = 2 }\n"
+
 const Fault faults[]{
     {"sets", "left", "\"x < 0\"", "", 0, "sets.left", "found a condition that holds at no point",
      "one that holds at one point or more"},
@@ -119,6 +123,14 @@ const Fault faults[]{
      "found true with \"smooth_degradation\"", "criteria that break bonds at once"},
     {"integrator", "type", "\"newton\"\n[constants]", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.3\ngradual = true\n", 1004, "damage.gradual",
      "found true with integrator \"newton\"", "explicit integrators"},
+    {"", "format", "1",
+     REGION "[damage]\ntype = \"critical_energy\"\nenergy_release_rate = 1.0\n[[interface]]\nbetween = [\"left\", \"rest\"]\n"
+            "damage = { type = \"critical_energy\", energy_release_rate = 0.5, softening = 4 }\n",
+     1009, "interface.0.damage", "found bonds that weaken, unlike those of [damage]", "the same for both"},
+    {"", "format", "1",
+     REGION "[damage]\ntype = \"smooth_degradation\"\nstretch_min = 0.1\nstretch = 0.2\n[[interface]]\nbetween = [\"left\", \"rest\"]\n"
+            "damage = { type = \"smooth_degradation\", stretch_min = 0.1, stretch = 0.3 }\n",
+     1010, "interface.0.damage", "whose bonds weaken by more numbers than two limits", "break bonds at once"},
     // conditions
     {"boundary", "displacement", "[\"log(x - 3)\", 0]", "", 0, "boundary.0.displacement", "nan at x", "finite values"},
     {"", "format", "1", "[initial]\nvelocity = [\"1/(x - 0.5)\", 0]\n", 1002, "initial.velocity", "inf at x = (0.5",

@@ -1,4 +1,5 @@
-/// The fracture tests of Partmann et al., sections 5.2 and 5.3, on coarse lattices: where the crack goes, and where the energy goes.
+/// The fracture tests of Partmann et al., sections 5.2 and 5.3, on coarse lattices: where the crack goes, and where the energy goes. A double
+/// cantilever beam: what a crack costs.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -46,7 +47,30 @@ void check_dissipation(const contract::Watch& watch, double least, double most_r
   CHECK(std::abs(before + last.external_work - last.strain - last.kinetic - last.dissipated) <= 0.001 * before);
 }
 
+/// What a new crack in a beam of arms of five points took per area over Gc.
+double cost_of_crack(double softening) {
+  const auto beam = load("fracture/double_cantilever.toml",
+                         {"body.lattice.spacing=2e-3", "constants.dx=2e-3", "integrator.steps=40", "run.threads=1",
+                          fmt::format("damage.softening={}", softening), fmt::format("interface.0.damage.softening={}", softening)});
+  const auto lost = [&] {
+    const Field damage = beam->problem().terms().damage();
+    double sum = 0;
+    for (const std::int32_t p : beam->problem().body().set("lips")) sum += damage.data()[p];
+    return sum;
+  };
+  const double before = lost(), dissipated = run(*beam).dissipated, grown = 0.03 * (lost() / before - 1);
+  CHECK(grown > 0.01);
+  return dissipated / (500 * grown);
+}
+
 }  // namespace
+
+TEST_CASE("double cantilever beam: bonds that weaken take Gc per area, those that break at once what they set free too") {
+  const double weakening = cost_of_crack(4), at_once = cost_of_crack(1);
+  MESSAGE("dissipated per area over Gc: ", weakening, ", at once ", at_once);
+  CHECK(weakening == doctest::Approx(1).epsilon(0.1));
+  CHECK(at_once > 1.4);
+}
 
 TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
   struct Run {

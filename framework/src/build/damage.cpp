@@ -81,9 +81,10 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
   const auto refuse = [](const InterfaceDescription& interface, const std::string& message) {
     throw InputError(interface.damage->values.position(""), interface.damage->values.path(), message);
   };
-  if (!damage.law->traits().bits)
-    refuse(first,
-           fmt::format("found with \"{}\", whose bonds weaken; allowed: criteria that break bonds at once", scene.damage->type));
+  const DamageTraits of_body = damage.law->traits();
+  if (!of_body.bits && !of_body.by_limits)
+    refuse(first, fmt::format("found with \"{}\", whose bonds weaken by more numbers than two limits; allowed: criteria that break bonds at "
+                              "once, or weaken them between their limits alone", scene.damage->type));
   if (images) refuse(first, "found in a body with held faces, symmetry or periodic sides; allowed: bodies without");
   // Regions may overlap: the last one has a point, as it has its material. Side 0 is the rest.
   const auto side_of = [&](const std::string& name) {
@@ -103,6 +104,9 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
   for (const InterfaceDescription& interface : scene.interfaces) {
     InterfaceDamage own{side_of(interface.between[0]), side_of(interface.between[1]), {infinite, infinite}};
     const auto law = factory.damage(*interface.damage);
+    if (law->traits().bits != of_body.bits)
+      refuse(interface, fmt::format("found bonds that {}, unlike those of [damage]; allowed: the same for both",
+                                    of_body.bits ? "weaken" : "break at once"));
     for (const std::int32_t index : body.owned()) {
       const auto p = static_cast<std::size_t>(index);
       if (damage.side[p] != own.a && damage.side[p] != own.b) continue;

@@ -62,6 +62,12 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;
   if (!begin) {
+    if (time_step > 0) hastened_.forget();
+    if (!damage_.law->traits().bits) {
+      std::vector<double> from;
+      for (const BondChange& change : changes) from.push_back(families_.integrity(change.bond));
+      hastened_.hasten(changes, from);
+    }
     fail(std::move(changes), u, 0, {}, body, update);
     return update;
   }
@@ -196,6 +202,7 @@ void Fracture::restore(std::span<const BondChange> of_all, const std::function<v
   changed(ends);
   if (gradual_) gradual_->restore(changes, fragments(ends));
   finder_->forget();
+  hastened_.forget();
 }
 
 BondChecks Fracture::checks() const {

@@ -12,6 +12,7 @@
 #include "families/bond_finder.hpp"
 #include "families/families.hpp"
 #include "families/gradual_failure.hpp"
+#include "families/hastened_bonds.hpp"
 #include "families/shared_bonds.hpp"
 
 namespace perikit {
@@ -55,6 +56,7 @@ class Fracture {
   SharedBonds shared_;
   std::unique_ptr<BondFinder> finder_;
   std::optional<GradualFailure> gradual_;
+  HastenedBonds hastened_;
   std::size_t updates_ = 0;
   Field before_, at_;  ///< displacement at the beginning of the step, and where bonds fail
   Field part_;         ///< of an impulse, as long as nobody knows whether it is whole

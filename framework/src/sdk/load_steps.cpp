@@ -198,7 +198,7 @@ class LoadSteps {
     take();
     continues_ = true;
     bool settled = false;
-    for (std::int64_t round = 1; !settled && problem_.advance(span / planned()); ++round) {
+    for (std::int64_t round = 1; !settled && problem_.advance(round == 1 ? span / planned() : 0); ++round) {
       continues_ = false;
       solver_.bonds_changed();
       solution.converged = equilibrium_.residual(u_, residual_, &energies.strain);

@@ -14,10 +14,14 @@ namespace {
 /// The energy of a bond, of bonds in extension alone, against the one at which the bonds that cross a unit of area hold Gc.
 class CriticalEnergy final : public Damage {
  public:
-  CriticalEnergy(double energy_release_rate, bool shared) : energy_release_rate_(energy_release_rate), shared_(shared) {}
+  CriticalEnergy(double energy_release_rate, double softening, bool shared)
+      : energy_release_rate_(energy_release_rate), softening_(softening), shared_(shared) {}
 
   DamageTraits traits() const noexcept override {
-    return {.bits = true, .energy = true, .bound = shared_ ? ValueBound::energy_over_share : ValueBound::energy};
+    return {.bits = softening_ == 1,
+            .energy = true,
+            .bound = shared_ ? ValueBound::energy_over_share : ValueBound::energy,
+            .by_limits = true};
   }
 
   DamageLimits limits(const DamagePoint& x) const override {
@@ -27,7 +31,7 @@ class CriticalEnergy final : public Damage {
           fmt::format("found energy_release_rate = {}, which gives bonds a critical energy of {} with this family and "
                       "influence function; allowed: one that gives a finite energy > 0",
                       energy_release_rate_, limit));
-    return {limit, limit};
+    return {limit / softening_, limit * softening_};
   }
 
   void measure(const BondStates& b) const noexcept override {
@@ -35,27 +39,43 @@ class CriticalEnergy final : public Damage {
   }
 
   void integrity(const IntegrityBatch& b) const noexcept override {
-    for (int k = 0; k < b.n; ++k) b.integrity[k] = b.value[k] > b.failure[k] ? 0.0 : 1.0;
+    for (int k = 0; k < b.n; ++k) b.integrity[k] = left(b.value[k], b.onset[k], b.failure[k]);
   }
 
  private:
-  double energy_release_rate_;
+  /// b of a bond that holds w without it, whose force b q falls from q = first to 0 at q = last in a straight line, q = w^(1/2). On the way it
+  /// takes up int q^2 (-db) = first last.
+  static double left(double w, double onset, double failure) noexcept {
+    if (w <= onset) return 1;
+    if (w >= failure) return 0;
+    const double q = std::sqrt(w), first = std::sqrt(onset), last = std::sqrt(failure);
+    return first / q * (last - q) / (last - first);
+  }
+
+  double energy_release_rate_, softening_;
   bool shared_;
 };
 
 PartDescription description() {
   PartDescription part{
       .name = "critical_energy",
-      .summary = "a bond breaks for good once it holds more energy than its part of Gc",
+      .summary = "a bond breaks for good once it holds more energy than its part of Gc, or weakens for as much",
       .parameters = {},
-      .examples = {"energy_release_rate = 0.05", "energy_release_rate = 0.05\nlimit = \"equal\""},
+      .examples = {"energy_release_rate = 0.05", "energy_release_rate = 0.05\nlimit = \"equal\"", "energy_release_rate = 0.05\nsoftening = 4.0"},
       .equations =
           "b = 0 once w_ij > w_c(xi) and s > 0,  w_ij the energy of the bond over V_i V_j\n"
           "shared: w_c = Gc omega(xi)/(sum omega xi.n V_j over the bonds with xi.n > 0)\n"
-          "equal:  w_c = Gc/(sum xi.n V_j over these) -> 4 Gc/(pi delta^4) (3D), 3 Gc/(2 h delta^3) (2D)",
+          "equal:  w_c = Gc/(sum xi.n V_j over these) -> 4 Gc/(pi delta^4) (3D), 3 Gc/(2 h delta^3) (2D)\n"
+          "softening r: b = (r^1/2 - q)/(q (r - 1)), q = (w_ij/w_c)^1/2 from r^-1/2 to r^1/2, the largest so far",
       .source = "Foster, Silling, Chen, International Journal for Multiscale Computational Engineering 9 (2011) 675",
       .limits = "bonds that are shorter than at rest never break; not with held faces, symmetry or periodic sides"};
   part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").require().positive();
+  part.parameters
+      .number("softening", "-",
+              "Stretch at which a bond is gone over the one at which it begins to weaken, in a straight line and for the same energy; 1: at once.")
+      .by_default("1.0")
+      .at_least(1)
+      .at_most(1e3);
   part.parameters
       .choice("limit", {"shared", "equal"},
               "Critical energies of near and far bonds: in proportion to what they hold in a homogeneous expansion, or equal.")
@@ -67,6 +87,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.damage(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<CriticalEnergy>(values.number("energy_release_rate"), values.text("limit") == "shared");
+    return std::make_unique<CriticalEnergy>(values.number("energy_release_rate"), values.number("softening"), values.text("limit") == "shared");
   });
 }

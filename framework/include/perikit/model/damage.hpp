@@ -21,6 +21,8 @@ struct DamageTraits {
   bool energy = false;  ///< BondStates::energy
   bool stress = false;  ///< BondStates::stress; not of pair laws, which have none
   ValueBound bound = ValueBound::none;
+  /// `integrity` depends on value and limits alone, not on further parameters: bonds of an interface share it with those of the body.
+  bool by_limits = false;
 };
 
 /// What the limits of a point's bonds may depend on.

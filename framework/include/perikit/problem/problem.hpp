@@ -75,8 +75,8 @@ class Problem {
   /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
   /// velocity: of explicit schemes, of the half step that led here. Bonds that are found beyond their limit then failed inside of
   /// the step: the internal forces, the energies and this velocity become what they are with bonds that acted until then. To be
-  /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium:
-  /// as long as bonds change, the step is not over.
+  /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium
+  /// of a step, after the first one with time_step = 0: as long as bonds change, the step is not over.
   virtual bool advance(double time_step, FieldView velocity = {}) = 0;
   /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
