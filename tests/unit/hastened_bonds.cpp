@@ -29,7 +29,7 @@ TEST_CASE("hastened bonds: of a series half of what is to come is taken in its s
   for (const double ratio : {0.3, 0.8, 0.95}) {
     INFO("ratio ", ratio);
     const auto b = rounds(40, [&](double now) { return 0.7 + ratio * (now - 0.7); });
-    CHECK(b[1] == 0.7 + ratio * 0.3);  // nothing is known in the first round
+    CHECK(b[1] == 0.7 + ratio * (1.0 - 0.7));  // nothing is known in the first round
     CHECK(b[2] - 0.7 == doctest::Approx(0.5 * ratio * ratio * 0.3).epsilon(1e-10));
     for (std::size_t k = 1; k < b.size(); ++k) {
       CHECK(b[k] <= b[k - 1]);

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# What a crack costs by critical_energy, bonds that break at once and bonds that weaken: the double cantilever beam under six kinematics. A
+# Markdown table is printed: that of framework/docs/fracture.md, "What a crack costs". About an hour on one core; part of `ninja fracture`.
+#   crack_cost.sh PERIKIT OUT
+# Runs that are done are kept.
+set -euo pipefail
+perikit=$(realpath "$1")
+out=$(realpath -m "$2")
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+mkdir -p "$out"
+
+# Folder, name in the table, setting, opening of each end [m]: those that need more load are opened farther.
+all=(
+  bond_based '`bond_based`' bond_based 1.8e-3
+  ordinary '`ordinary`' ordinary 1.8e-3
+  baqp '`baqp`' baqp 1.8e-3
+  projection '`projection`' projection 1.8e-3
+  bond_associated '`bond_associated`' bond_associated 3e-3
+  silling '`conventional` with `silling`, 1' '{type="conventional",stabilization={type="silling",coefficient=1.0}}' 4e-3
+)
+
+# One cell: energy per area, G, load over LEFM's.
+cell() {
+  local folder=$out/$1_$4
+  [ -s "$folder.txt" ] || { rm -rf "$folder"; framework/tools/double_cantilever.sh "$perikit" "$folder" --set kinematics="$2" --set constants.w="$3" \
+    --set damage.softening="$4" --set interface.0.damage.softening="$4" > "$folder.part"; mv "$folder.part" "$folder.txt"; }
+  awk 'NF == 6 && $1 + 0 > 0 { printf " %.2f, %.2f, %.2f |", $1, $2, $4; next } { printf " %s |", $0 }' "$folder.txt"
+}
+
+printf '| kinematics | at once | softening 4 |\n|---|---|---|\n'
+for ((k = 0; k < ${#all[@]}; k += 4)); do
+  printf '| %s |' "${all[k + 1]}"
+  for softening in 1 4; do cell "${all[k]}" "${all[k + 2]}" "${all[k + 3]}" "$softening"; done
+  printf '\n'
+done
