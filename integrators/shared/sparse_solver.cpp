@@ -40,8 +40,8 @@ double address_space_left() {
   return static_cast<double>(limit.rlim_cur) - pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-/// CHOLMOD moves the numbers of each supernode with four threads, however many there are: waking them takes longer than that, ten times as
-/// long as all the rest for some thousand unknowns. No parallel regions as long as this lives.
+/// CHOLMOD moves the numbers of each supernode with four threads, however many there are: for some thousand unknowns waking them takes four
+/// times as long as all the rest. No parallel regions as long as this lives.
 class OneThread {
  public:
   OneThread() { omp_set_max_active_levels(0); }

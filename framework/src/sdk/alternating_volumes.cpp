@@ -12,8 +12,8 @@ namespace perikit {
 
 namespace {
 
-constexpr double nearly_incompressible =
-    500;  // second derivative of the energy over the shear modulus: true fields hold less than `noticed`
+// Second derivative of the energy over the shear modulus: true fields of volumes hold less than `noticed` there.
+constexpr double nearly_incompressible = 500;
 constexpr double ordinary_bulk = 5.0 / 3;  // of the companion, of which only the pattern counts
 constexpr double noticed = 0.01;
 

@@ -70,8 +70,9 @@ class LoadSteps {
     while (position() < planned() && !observer_.cancelled()) {
       if (step()) continue;
       observer_.stopped_within_step();
-      break;
+      return;
     }
+    if (observer_.cancelled()) return;
     if (const std::string warning = warn_of_alternating_volumes(problem_, u_); !warning.empty()) observer_.log("warning: " + warning);
   }
 

@@ -29,6 +29,15 @@ void clear(double* values, std::size_t size) {
   parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
 }
 
+/// Criteria by energy where a bond takes far more than it holds (framework/docs/fracture.md, "What a crack costs").
+void warn_of_cost(const TermParts& parts, ModelReport& report) {
+  const Formulation& f = parts.formulation;
+  if (!parts.damage->law->traits().energy || f.pairs || !(f.point || f.weighted)) return;
+  report.warnings.push_back(
+      "a criterion by energy with one gradient per point or with weighted gradients: bonds take more than they hold, and cracks cost three times Gc and "
+      "more; what they cost is measured in fracture.md, \"What a crack costs\"");
+}
+
 /// Formulations whose bonds create energy as they fail (framework/docs/fracture.md, "Every kinematics and kernel").
 void warn_of_energy(const TermParts& parts, ModelReport& report) {
   const Formulation& f = parts.formulation;
@@ -299,7 +308,10 @@ ModelReport Terms::report() const {
   if (!conservative())
     report.warnings.push_back(
         "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
-  if (parts_.damage) warn_of_energy(parts_, report);
+  if (parts_.damage) {
+    warn_of_energy(parts_, report);
+    warn_of_cost(parts_, report);
+  }
   for (const std::string& note : parts_.interfaces ? parts_.interfaces->notes : std::vector<std::string>()) report.notes.emplace_back("interfaces", note);
   for (const auto& term : terms_) term->report(report);
   return report;
