@@ -28,10 +28,10 @@ bool has_nearly_incompressible(const Problem& problem) {
 
 double energy_of_alternating_volumes(Problem& problem, ConstFieldView u) {
   const std::unique_ptr<VolumetricPart> volumes = has_nearly_incompressible(problem) ? problem.volumetric_part() : nullptr;
+  if (!volumes || !volumes->linearise(u).ok()) return 0;
   Field force = problem.make_field();
   double strain_energy = 0;
-  if (!volumes || !volumes->linearise(u).ok() || !problem.evaluate_forces(u, force, &strain_energy).ok() || !(strain_energy > 0))
-    return 0;
+  if (!problem.evaluate_forces(u, force, &strain_energy).ok() || !(strain_energy > 0)) return 0;
   BlockMatrix neighbours;
   problem.assemble_companion(u, neighbours, ordinary_bulk);
   const double *logarithm = volumes->logarithms().data, *stiffness = volumes->stiffness().data;
