@@ -20,12 +20,11 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/kalthoff_winkler.toml"
-STRETCH = '{type="critical_stretch",energy_release_rate=22.2e3,consistent=true,no_fail=["struck"]}'
 KINEMATICS = {  # by name: settings
     "bond_based": ["kinematics=bond_based"],
     "ordinary": ["kinematics=ordinary"],
     "baqp": ["kinematics=baqp"],
-    "conventional, silling": ['kinematics={type="conventional",stabilization={type="silling",coefficient=1.0}}', "damage=" + STRETCH],
+    "conventional, silling": ['kinematics={type="conventional",stabilization={type="silling",coefficient=1.0}}'],
 }
 KERNELS = {"bond_based": ["constant"]}  # which the influence function does not change
 

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <set>
+#include <stdexcept>
 
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/reference_body.hpp"
@@ -73,7 +75,7 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
                                 : d == 2 ? 0.667 * body.section() * std::pow(body.horizon(), 3)
                                          : 0.5 * body.section() * std::pow(body.horizon(), 2);
         options.conditions = fmt::format(
-            "[damage]\ntype = \"critical_energy\"\nlimit = \"equal\"\nno_fail = [\"part\"]\nenergy_release_rate = {:.17g}\n",
+            "[damage]\ntype = \"critical_energy\"\nenergy = \"held\"\nlimit = \"equal\"\nno_fail = [\"part\"]\nenergy_release_rate = {:.17g}\n",
             crossing * densities[densities.size() * 9 / 10]);
         const std::string text = scene_text(options, kinematics_table(example));
         options.skip = false;
@@ -102,6 +104,84 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
             most = std::max(most, density(b));
         }
         CHECK(most < least);
+      }
+}
+
+TEST_CASE("kinematics: what a bond sets free is the derivative of the stored energy by its integrity, and bonds fail by it, screened or not") {
+  for (const Example& example : kinematics_examples())
+    for (const bool cloud : {false, true})
+      for (const int d : {1, 2, 3}) {
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
+        if (!suits(example, d) || formulation_of(example).force_state == ForceState::local) continue;
+        BodyOptions options{.dimension = d, .cloud = cloud};
+        const char* const weakening =
+            "[damage]\ntype = \"critical_energy\"\nenergy = \"{}\"\nsoftening = {}\nenergy_release_rate = {:.17g}\n";
+        options.conditions = fmt::format(fmt::runtime(weakening), "held", "2.0", 1e9);
+        const auto simulation = build(scene_text(options, kinematics_table(example)));
+        BodyProblem& problem = simulation->problem();
+        respond(problem, 23);
+        const FieldView u = problem.state().displacement();
+        const Formulation formulation = formulation_of(example);
+        if (formulation.pairs || formulation.order > 1 || (formulation.weighted && formulation.parts(d) > 0)) {
+          CHECK_THROWS_AS(problem.terms().released_energies(u), std::logic_error);
+          continue;
+        }
+        // Some bonds have weakened.
+        std::vector<BondEnergy> released = problem.terms().released_energies(u);
+        std::mt19937_64 random(7);
+        std::vector<BondChange> state;
+        for (std::size_t k = 0; k < released.size(); k += 1 + random() % 3)
+          state.push_back({released[k].bond, 0.4 + 0.5 * static_cast<double>(random() % 1000) / 1000});
+        problem.terms().restore_bonds(state);
+        released = problem.terms().released_energies(u);
+        double most = 0;
+        for (const BondEnergy& b : released) most = std::max(most, std::abs(b.energy));
+        Field force = problem.make_field();
+        const auto energy_with = [&](std::size_t k, double b) {
+          std::vector<BondChange> changed = state;
+          changed[k].integrity = b;
+          problem.terms().restore_bonds(changed);
+          double energy = 0;
+          REQUIRE(problem.evaluate_forces(u, force, &energy).ok());
+          return energy;
+        };
+        double whole = 0;
+        REQUIRE(problem.evaluate_forces(u, force, &whole).ok());
+        constexpr double h = 1e-4;
+        for (std::size_t n = 0; n < 6; ++n) {
+          const std::size_t k = n * (state.size() - 1) / 5;
+          const auto at = std::ranges::lower_bound(released, state[k].bond, {}, &BondEnergy::bond);
+          REQUIRE(at->bond == state[k].bond);
+          const double b = state[k].integrity, slope = (energy_with(k, b + h) - energy_with(k, b - h)) / (2 * h);
+          INFO("bond ", state[k].bond.point, " ", state[k].bond.far, " of ", state.size(), ": found ", at->energy, ", slope ", slope);
+          CHECK(std::abs(at->energy - slope) <= 1e-6 * most + 1e-12 * whole / h);
+        }
+        // Bonds break at once by it, as many whether the others are looked at or not.
+        const Body& body = problem.body();
+        problem.terms().restore_bonds({});
+        std::vector<double> densities;
+        for (const BondEnergy& b : problem.terms().released_energies(u))
+          densities.push_back(b.energy / (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far))));
+        std::ranges::sort(densities);
+        const double crossing = d == 3   ? 0.785 * std::pow(body.horizon(), 4)
+                                : d == 2 ? 0.667 * body.section() * std::pow(body.horizon(), 3)
+                                         : 0.5 * body.section() * std::pow(body.horizon(), 2);
+        options.conditions = fmt::format(fmt::runtime(weakening), "released", "1.0", crossing * densities[densities.size() * 9 / 10]) +
+                             "limit = \"equal\"\n";
+        const std::string text = scene_text(options, kinematics_table(example));
+        options.skip = false;
+        const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics_table(example)));
+        respond(screened->problem(), 23);
+        const FieldView at = screened->problem().state().displacement();
+        const BondUpdate update = screened->problem().terms().update_bonds(at);
+        CHECK(update.changed > 0);
+        CHECK(update.changed < released.size());
+        std::set<std::pair<std::int32_t, std::int32_t>> failed;
+        for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
+        for (auto* other : {unscreened.get(), slow.get()}) {
+          CHECK(other->problem().terms().update_bonds(at).changed == update.changed);
+          for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
+        }
       }
 }
 

@@ -48,10 +48,12 @@ void check_dissipation(const contract::Watch& watch, double least, double most_r
 }
 
 /// What a new crack in a beam of arms of five points took per area over Gc.
-double cost_of_crack(double softening) {
+double cost_of_crack(const char* kinematics, double softening, const char* energy = "released") {
   const auto beam = load("fracture/double_cantilever.toml",
                          {"body.lattice.spacing=2e-3", "constants.dx=2e-3", "integrator.steps=40", "run.threads=1",
-                          fmt::format("damage.softening={}", softening), fmt::format("interface.0.damage.softening={}", softening)});
+                          fmt::format("kinematics={}", kinematics), fmt::format("damage.softening={}", softening),
+                          fmt::format("interface.0.damage.softening={}", softening), fmt::format("damage.energy={}", energy),
+                          fmt::format("interface.0.damage.energy={}", energy)});
   const auto lost = [&] {
     const Field damage = beam->problem().terms().damage();
     double sum = 0;
@@ -66,10 +68,18 @@ double cost_of_crack(double softening) {
 }  // namespace
 
 TEST_CASE("double cantilever beam: bonds that weaken take Gc per area, those that break at once what they set free too") {
-  const double weakening = cost_of_crack(4), at_once = cost_of_crack(1);
+  const double weakening = cost_of_crack("bond_based", 4), at_once = cost_of_crack("bond_based", 1);
   MESSAGE("dissipated per area over Gc: ", weakening, ", at once ", at_once);
   CHECK(weakening == doctest::Approx(1).epsilon(0.1));
   CHECK(at_once > 1.4);
+}
+
+TEST_CASE("double cantilever beam: with gradients bonds take Gc per area by the energy that they set free, and more by the one that they hold") {
+  const double released = cost_of_crack("baqp", 4), held = cost_of_crack("baqp", 4, "held"), weighted = cost_of_crack("bond_associated", 4);
+  MESSAGE("dissipated per area over Gc: by the energy set free ", released, " and ", weighted, ", held ", held);
+  CHECK(released == doctest::Approx(1).epsilon(0.1));
+  CHECK(weighted == doctest::Approx(1).epsilon(0.1));
+  CHECK(held > 1.2);
 }
 
 TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {

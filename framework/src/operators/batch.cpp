@@ -182,7 +182,7 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* ene
   }
   add_energies(n, s.weight, s, 0, energy);
   if (ends == 2) add_energies(n, s.far_weight, s, lanes, energy);
-  if (work_ == Work::sample) return -1;
+  if (work_ == Work::sample && !pulled_back_) return -1;
   selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
   return -1;
 }
@@ -267,7 +267,7 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnerg
 void Pass::add_samples(int n, const BatchScratch& s) {
   if (work.finds()) return;
   if (bonds)
-    bonds->add(n, s);
+    bonds->add(n, s, work.selective());
   else
     work.add_samples(n, s, *sums);
 }

@@ -123,7 +123,11 @@ class BatchWork {
   BatchWork(const Laws& laws, LaminateFinder& finder)
       : laws_(laws), work_(Work::sample), energy_(false), selective_(false), history_(nullptr), balance_(nullptr), screen_(nullptr), finder_(&finder) {}
 
+  /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
+  void pull_back() noexcept { pulled_back_ = true; }
+
   Work work() const noexcept { return work_; }
+  bool selective() const noexcept { return selective_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
   /// The evaluation ends a step in which laws dissipate.
   bool dissipates() const noexcept { return work_ == Work::force && history_ && history_->time_step() > 0 && laws_.dissipates(); }
@@ -179,7 +183,7 @@ class BatchWork {
   const Laws& laws_;
   Work work_;
   bool energy_;
-  bool selective_;
+  bool selective_, pulled_back_ = false;
   LawHistory* history_;
   const Balance* balance_;
   BondScreen* screen_;

@@ -20,18 +20,26 @@ void BondSamples::add(const Entry& entry) {
   if (keeps(entry.owner, entry.far)) of_thread_[static_cast<std::size_t>(thread_index())].push_back(entry);
 }
 
-void BondSamples::add(int n, const BatchScratch& s) {
+void BondSamples::add(int n, const BatchScratch& s, bool selective) {
   std::vector<Entry>& entries = of_thread_[static_cast<std::size_t>(thread_index())];
   std::optional<LaneStresses> stresses;
-  if (stress_) stresses.emplace(n, space_, s);
+  const int components = dimension(space_) * dimension(space_);
+  if (what_ == BondSampling::stress) stresses.emplace(n, space_, s);
   for (int l = 0; l < n; ++l) {
     const double w = s.weight[l];
     if (w == 0 || s.owner[l] == s.far[l] || !keeps(s.owner[l], s.far[l])) continue;
-    Entry& entry = entries.emplace_back(Entry{s.owner[l], s.far[l], w, w * s.psi[l], {}});
-    if (!stress_) continue;
+    Entry& entry = entries.emplace_back(Entry{s.owner[l], s.far[l], w, w * s.psi[l]});
+    if (what_ == BondSampling::derivative) {
+      for (int k = 0; k < components; ++k) entry.tensor[k] = (selective ? 1.0 : w) * s.P[k * batch_points + l];
+      if (selective) {
+        entry.pressure = s.pressure[l];
+        entry.growth = s.growth[l];
+      }
+    }
+    if (what_ != BondSampling::stress) continue;
     constexpr int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
     const auto sigma = [&](int a, int b) { return stresses->sigma[3 * a + b][l]; };
-    for (int c = 0; c < 6; ++c) entry.stress[c] = 0.5 * w * (sigma(pair[c][0], pair[c][1]) + sigma(pair[c][1], pair[c][0]));
+    for (int c = 0; c < 6; ++c) entry.tensor[c] = 0.5 * w * (sigma(pair[c][0], pair[c][1]) + sigma(pair[c][1], pair[c][0]));
   }
 }
 
@@ -59,7 +67,7 @@ void BondSamples::merge() {
   parallel_for(owners, [&](std::size_t o) {
     // Evaluation points of one bond or point come from one thread, in an order that is always the same.
     Entry *const begin = all_.data() + first_[o], *const end = all_.data() + first_[o + 1], *kept = begin;
-    std::stable_sort(begin, end, [](const Entry& a, const Entry& b) { return a.far < b.far; });
+    if (!std::ranges::is_sorted(begin, end, {}, &Entry::far)) std::stable_sort(begin, end, [](const Entry& a, const Entry& b) { return a.far < b.far; });
     for (const Entry* entry = begin; entry != end; ++entry) {
       if (kept == begin || kept[-1].far != entry->far) {
         *kept++ = *entry;
@@ -68,13 +76,14 @@ void BondSamples::merge() {
       Entry& last = kept[-1];
       last.weight += entry->weight;
       last.energy += entry->energy;
-      for (int c = 0; c < 6; ++c) last.stress[c] += entry->stress[c];
+      last.pressure += entry->pressure;
+      for (int c = 0; c < 9; ++c) last.tensor[c] += entry->tensor[c];
     }
     left[o] = static_cast<std::size_t>(kept - begin);
   });
   std::size_t kept = 0;
   for (std::size_t o = 0; o < owners; ++o) {
-    std::copy_n(all_.begin() + static_cast<std::ptrdiff_t>(first_[o]), left[o], all_.begin() + static_cast<std::ptrdiff_t>(kept));
+    if (kept != first_[o]) std::copy_n(all_.begin() + static_cast<std::ptrdiff_t>(first_[o]), left[o], all_.begin() + static_cast<std::ptrdiff_t>(kept));
     first_[o] = kept;
     kept += left[o];
   }

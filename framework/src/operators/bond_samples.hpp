@@ -10,18 +10,26 @@
 
 namespace perikit {
 
+/// Beside energies: nothing; Cauchy stresses; or derivatives of the energy by the gradients.
+enum class BondSampling { energy, stress, derivative };
+
 class BondSamples {
  public:
   /// Of the directed bond from owner to far, or of the owner as a whole (far = -1).
   struct Entry {
     std::int32_t owner, far;
-    double weight;     ///< sum W_q [m^3]
-    double energy;     ///< sum W_q psi_q [J]
-    double stress[6];  ///< sum W_q sigma_q: xx yy zz xy xz yz
+    double weight = 0;  ///< sum W_q [m^3]
+    double energy = 0;  ///< sum W_q psi_q [J]
+    /// stress: sum W_q sigma_q, xx yy zz xy xz yz. derivative: dE/dH by the gradient of the space, [c * dimension + e].
+    double tensor[9] = {};
+    double pressure = 0;  ///< derivative, selective map: sum W_q p/3 (maps/selective_map.hpp)
+    double growth = 0;    ///< likewise, a - 1 of the evaluation point
   };
 
-  BondSamples(Space space, bool stress) : space_(space), stress_(stress) {}
-  bool stress() const noexcept { return stress_; }
+  BondSamples(Space space, BondSampling what) : space_(space), what_(what) {}
+  BondSampling what() const noexcept { return what_; }
+  /// From the next `clear` on.
+  void ask(BondSampling what) noexcept { what_ = what; }
 
   /// Before a parallel loop: empties all. Of directed bonds only those with an end in a group of `kept` are kept, by group of
   /// eight points; empty: all.
@@ -29,7 +37,8 @@ class BondSamples {
   /// Whether bonds of the points of this group are kept whatever their other ends.
   bool keeps_group(std::size_t group) const noexcept { return kept_.empty() || kept_[group]; }
   /// The n lanes of a batch with their owners and far ends (-1: of the owner as a whole), after an evaluation with Work::sample.
-  void add(int n, const BatchScratch& s);
+  /// selective: of the selective map, whose stresses come with their weight.
+  void add(int n, const BatchScratch& s, bool selective);
   void add(const Entry& entry);
   /// After the loops: in ascending order, each owner and far end once, whatever thread they came from.
   void merge();
@@ -45,7 +54,7 @@ class BondSamples {
   }
 
   Space space_;
-  bool stress_;
+  BondSampling what_;
   std::span<const std::uint8_t> kept_;
   std::vector<std::vector<Entry>> of_thread_;
   std::vector<Entry> all_;

@@ -2,6 +2,7 @@
 /// Finds the bonds that fail by more than their stretch: by their energy or their stress, which the terms are asked for.
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "operators/bond_samples.hpp"
 #include "operators/bond_screen.hpp"
 #include "perikit/model/formulation.hpp"
+#include "terms/bond_release.hpp"
 #include "terms/term.hpp"
 
 namespace perikit {
@@ -17,8 +19,9 @@ namespace perikit {
 class BondCriterion final : public BondFinder {
  public:
   using TermsOf = std::span<const std::unique_ptr<Term>>;
-  /// All must outlive this. damage: null for energies alone. skip = false: every bond in every step.
-  BondCriterion(const Families& families, const Formulation& formulation, const BodyDamage* damage, TermsOf terms, bool skip);
+  /// All must outlive this. asked: what is looked at, that of the criterion. damage: null for energies alone. skip = false: every
+  /// bond in every step.
+  BondCriterion(const ReleaseParts& parts, DamageTraits asked, const BodyDamage* damage, TermsOf terms, bool skip);
 
   std::vector<BondChange> find(ConstFieldView u) override;
   void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) override;
@@ -26,14 +29,14 @@ class BondCriterion final : public BondFinder {
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }
   std::size_t bytes() const noexcept override {
-    return samples_.bytes() + 4 * own_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
+    return samples_.bytes() + 4 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
   }
   /// For evaluations of forces to mark the groups that need a look; null where they cannot.
   BondScreen* screen() noexcept;
   /// Before and after an evaluation of forces at u where they do.
   void begin_forces(ConstFieldView u);
   void end_forces() noexcept { screen_.known = true; }
-  /// Of all bonds, ascending.
+  /// Of all bonds, ascending: what they hold, or dE/db.
   std::vector<BondEnergy> energies(ConstFieldView u);
 
  private:
@@ -53,6 +56,7 @@ class BondCriterion final : public BondFinder {
   template <class Visit>
   void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
   void sample(std::span<const std::int32_t> groups, ConstFieldView u);
+  void collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept);
   /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).
   template <class Visit>
   void bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit);
@@ -69,8 +73,9 @@ class BondCriterion final : public BondFinder {
   DamageTraits traits_;
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
+  std::optional<BondRelease> release_;  ///< where the criterion asks for what bonds set free
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
-  GroupMarks own_;
+  GroupMarks own_, near_;             ///< what was sampled last: groups, and those of everything in their families
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
   std::size_t checked_ = 0;

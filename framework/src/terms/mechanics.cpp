@@ -173,7 +173,8 @@ std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, 
 }
 
 void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
-  const BatchWork work = this->work(Work::sample, false);
+  BatchWork work = this->work(Work::sample, false);
+  if (samples.what() == BondSampling::derivative) work.pull_back();
   Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), &samples};
   space_->run(pass);
 }

@@ -264,8 +264,8 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
       for (std::size_t k = 0; k < family.far.size(); ++k) {
         const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * bonds.extension[k];
         const double energy = body_.volume(p) * family.volume[k] * family.b(k) * w;
-        samples.add({own, family.far[k], 0.0, energy, {}});
-        if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy, {}});
+        samples.add({own, family.far[k], 0.0, energy});
+        if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy});
       }
     }
   });

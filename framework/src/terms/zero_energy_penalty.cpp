@@ -22,12 +22,13 @@ std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samp
 
 /// The penalty of a point belongs to its bonds as the rest of its energy does. It is no stress.
 void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
+  if (samples.what() == BondSampling::derivative) return;  // terms/bond_release.hpp knows what it does
   const Body& body = parts_.families.body();
   Field density = body.make_field(1);
   add_density(u, density.data());
   for (const std::int32_t p : body.internal()) {
     const auto at = static_cast<std::size_t>(p);
-    if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at), {}});
+    if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at)});
   }
 }
 

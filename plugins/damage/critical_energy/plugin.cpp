@@ -11,17 +11,18 @@ using namespace perikit;
 
 namespace {
 
-/// The energy of a bond, of bonds in extension alone, against the one at which the bonds that cross a unit of area hold Gc.
+/// The energy of a bond, of bonds in extension alone, against the one at which the bonds that cross a unit of area have Gc.
 class CriticalEnergy final : public Damage {
  public:
-  CriticalEnergy(double energy_release_rate, double softening, bool shared)
-      : energy_release_rate_(energy_release_rate), softening_(softening), shared_(shared) {}
+  CriticalEnergy(double energy_release_rate, double softening, bool shared, bool released)
+      : energy_release_rate_(energy_release_rate), softening_(softening), shared_(shared), released_(released) {}
 
   DamageTraits traits() const noexcept override {
     return {.bits = softening_ == 1,
             .energy = true,
             .bound = shared_ ? ValueBound::energy_over_share : ValueBound::energy,
-            .by_limits = true};
+            .by_limits = true,
+            .released = released_};
   }
 
   DamageLimits limits(const DamagePoint& x) const override {
@@ -53,7 +54,7 @@ class CriticalEnergy final : public Damage {
   }
 
   double energy_release_rate_, softening_;
-  bool shared_;
+  bool shared_, released_;
 };
 
 PartDescription description() {
@@ -63,7 +64,7 @@ PartDescription description() {
       .parameters = {},
       .examples = {"energy_release_rate = 0.05", "energy_release_rate = 0.05\nlimit = \"equal\"", "energy_release_rate = 0.05\nsoftening = 4.0"},
       .equations =
-          "b = 0 once w_ij > w_c(xi) and s > 0,  w_ij the energy of the bond over V_i V_j\n"
+          "b = 0 once w_ij > w_c(xi) and s > 0,  w_ij = dE/db_ij (released) or the share of the bond in E (held), over V_i V_j\n"
           "shared: w_c = Gc omega(xi)/(sum omega xi.n V_j over the bonds with xi.n > 0)\n"
           "equal:  w_c = Gc/(sum xi.n V_j over these) -> 4 Gc/(pi delta^4) (3D), 3 Gc/(2 h delta^3) (2D)\n"
           "softening r: b = (r^1/2 - q)/(q (r - 1)), q = (w_ij/w_c)^1/2 from r^-1/2 to r^1/2, the largest so far",
@@ -80,6 +81,10 @@ PartDescription description() {
       .choice("limit", {"shared", "equal"},
               "Critical energies of near and far bonds: in proportion to what they hold in a homogeneous expansion, or equal.")
       .by_default("\"shared\"");
+  part.parameters
+      .choice("energy", {"released", "held"},
+              "Energy of a bond: what the body gives up per b of it, displacements held (of pair laws and where it is not known: held), or its share.")
+      .by_default("\"released\"");
   return part;
 }
 
@@ -87,6 +92,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.damage(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<CriticalEnergy>(values.number("energy_release_rate"), values.number("softening"), values.text("limit") == "shared");
+    return std::make_unique<CriticalEnergy>(values.number("energy_release_rate"), values.number("softening"), values.text("limit") == "shared", values.text("energy") == "released");
   });
 }

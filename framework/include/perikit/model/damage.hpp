@@ -23,6 +23,10 @@ struct DamageTraits {
   ValueBound bound = ValueBound::none;
   /// `integrity` depends on value and limits alone, not on further parameters: bonds of an interface share it with those of the body.
   bool by_limits = false;
+  /// BondStates::energy is not what the bond holds but what it would set free, dE/db_ij, where the engine knows that: with one gradient of
+  /// order 1 per point, gradients of bonds, and weighted gradients of bonds. A `bound` then means: bonds are looked at where an evaluation
+  /// point holds an eighth of what would be needed.
+  bool released = false;
 };
 
 /// What the limits of a point's bonds may depend on.
@@ -45,6 +49,7 @@ struct BondStates {
   const double* share = nullptr;
   /// w_ij [J/m^6]: what both directions of the bond hold, without b, over V_i V_j. V_i V_j b w adds up to the stored energy
   /// (framework/docs/decisions/0014-what-bonds-hold.md).
+  /// `released`: dE/db_ij over V_i V_j instead, with displacements held; may be below zero, and does not add up.
   const double* energy = nullptr;
   /// Cauchy stress of the bond's evaluation points, the mean of both ends: xx yy zz xy xz yz, stress[c * stride + k] [Pa].
   const double* stress = nullptr;

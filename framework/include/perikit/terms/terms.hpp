@@ -89,6 +89,9 @@ class Terms {
   BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepBegin& begin = {}, BondReaction* reaction = nullptr);
   /// The shares of all bonds in the energy at u: they add up to it. Ascending. Not where laws have a history.
   std::vector<BondEnergy> bond_energies(ConstFieldView u);
+  /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
+  /// DamageTraits::released).
+  std::vector<BondEnergy> released_energies(ConstFieldView u);
   /// Every bond that is not as it was at the set-up: run state, for checkpoints.
   std::vector<BondChange> changed_bonds() const;
   void restore_bonds(std::span<const BondChange> changes);

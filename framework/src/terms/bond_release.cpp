@@ -1,0 +1,385 @@
+#include "terms/bond_release.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "families/shape_tensor.hpp"
+#include "maps/selective_map.hpp"
+#include "perikit/core/dimension.hpp"
+#include "perikit/core/parallel.hpp"
+#include "spaces/local_stencil.hpp"
+#include "spaces/shift.hpp"
+#include "terms/family_point.hpp"
+#include "terms/penalty_matrix.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Step of central differences in b for what kinematics and stabilizations state as functions of a family.
+constexpr double step = 1e-5;
+
+template <int D>
+double product(const double* a, const double* b) noexcept {
+  double sum = 0;
+  for (int c = 0; c < D; ++c) sum += a[c] * b[c];
+  return sum;
+}
+
+/// S : (z (x) g)
+template <int D>
+double work(const double* S, const double* z, const double* g) noexcept {
+  double sum = 0;
+  for (int c = 0; c < D; ++c) sum += z[c] * product<D>(S + c * D, g);
+  return sum;
+}
+
+/// z -= H xi
+template <int D>
+void subtract(const double* H, const double* xi, double* z) noexcept {
+  for (int c = 0; c < D; ++c) z[c] -= product<D>(H + c * D, xi);
+}
+
+}  // namespace
+
+/// Of one thread. Vectors by bond have D components each.
+struct BondRelease::Memory {
+  FamilyArrays family;
+  std::vector<double> xi, u, z;       ///< bond vectors, relative displacements, and what is not affine of them
+  std::vector<double> g, gradient;    ///< corrections of the bonds, and the point gradient
+  AlignedVector<double> correction, shares, components;
+  std::vector<double> weighted;
+  LocalStencil<1> line;
+  LocalStencil<2> plane;
+  LocalStencil<3> solid;
+  template <int D>
+  LocalStencil<D>& stencil() noexcept {
+    if constexpr (D == 1) return line;
+    else if constexpr (D == 2) return plane;
+    else return solid;
+  }
+};
+
+BondRelease::BondRelease(const ReleaseParts& parts) : parts_(parts) {}
+BondRelease::~BondRelease() = default;
+
+const char* BondRelease::unknown(const Formulation& f, int dimension) {
+  if (f.pairs) return "of pair laws";
+  if (f.weighted && f.parts(dimension) > 0) return "of gradients of parts of families";
+  if (f.order > 1) return "of gradients of orders above 1";
+  if (f.force_state == ForceState::local) return "of local force states";
+  return nullptr;
+}
+
+std::size_t BondRelease::Owner::place_of(std::int32_t end) const noexcept {
+  const auto at = std::ranges::lower_bound(far, end);
+  return at == far.end() || *at != end ? far.size() : static_cast<std::size_t>(at - far.begin());
+}
+
+double BondRelease::of(std::int32_t p, std::int32_t far) const noexcept {
+  const Owner& owner = owner_of(p);
+  const std::size_t k = owner.place_of(far);
+  return k == owner.far.size() ? 0.0 : owner.released[k];
+}
+
+void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples) {
+  const Body& body = parts_.families.body();
+  for (std::size_t k = 0; k < count_; ++k) place_[static_cast<std::size_t>(owners_[k].point)] = -1;
+  place_.resize(body.stride(), -1);
+  while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Memory>());
+  count_ = 0;
+  for (const std::int32_t p : body.internal()) {
+    if (!wide[static_cast<std::size_t>(p) / padding]) continue;
+    if (count_ == owners_.size()) owners_.emplace_back();
+    owners_[count_].point = p;
+    place_[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(count_++);
+  }
+  with_dimension(body.dimension(), [&](auto d) { find_bonds<d>(u, near, samples); });
+}
+
+template <int D>
+void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const BondSamples& samples) {
+  const auto over_owners = [&](auto&& visit) {
+    parallel_for(count_, [&](std::size_t k) { visit(owners_[k], *memory_[static_cast<std::size_t>(thread_index())]); });
+  };
+  const bool bonds = parts_.formulation.bond != nullptr;
+  if (bonds)
+    over_owners([&](Owner& owner, Memory& m) {
+      load<D>(owner, m);
+      correct<D>(m);
+      find_onto<D>(owner, samples, m);
+      if (!parts_.formulation.g_from_xi_only) find_gradient<D>(owner, u, m);
+    });
+  over_owners([&](Owner& owner, Memory& m) {
+    if (!near[static_cast<std::size_t>(owner.point) / padding]) return;
+    load<D>(owner, m);
+    find_gradient<D>(owner, u, m);
+    release<D>(owner, samples, m);
+  });
+}
+
+template <int D>
+void BondRelease::load(Owner& owner, Memory& m) const {
+  parts_.families.load(static_cast<std::size_t>(owner.point), BondsOf::intact, m.family);
+  const FamilyArrays& family = m.family;
+  const std::size_t n = family.far.size();
+  owner.far = family.far;
+  m.xi.resize(D * n);
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t c = 0; c < D; ++c) m.xi[D * k + c] = family.xi[c][k];
+}
+
+template <int D>
+void BondRelease::correct(Memory& m) const {
+  const FamilyArrays& family = m.family;
+  m.correction.resize(D * family.size);
+  parts_.formulation.bond->correction(family.view(parts_.families.body().horizon()), m.correction.data(), family.size);
+  m.g.resize(D * family.far.size());
+  for (std::size_t k = 0; k < family.far.size(); ++k)
+    for (std::size_t e = 0; e < D; ++e) m.g[D * k + e] = m.correction[e * family.size + k];
+}
+
+template <int D>
+void BondRelease::find_gradient(Owner& owner, ConstFieldView u, Memory& m) const {
+  const auto p = static_cast<std::size_t>(owner.point);
+  const std::size_t n = owner.far.size();
+  m.u.resize(D * n);
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t c = 0; c < D; ++c) {
+      const double* const component = u.component(static_cast<int>(c));
+      m.u[D * k + c] = component[owner.far[k]] - component[p];
+    }
+  const auto gradient = [&](double* H) {
+    std::fill_n(H, D * D, 0.0);
+    for (std::size_t k = 0; k < n; ++k)
+      for (std::size_t c = 0; c < D; ++c)
+        for (std::size_t e = 0; e < D; ++e) H[c * D + e] += m.u[D * k + c] * m.gradient[D * k + e];
+  };
+  // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
+  point_gradient(m.family, parts_.families.body().horizon(), 1, m.gradient);
+  gradient(owner.H);
+  m.z = m.u;
+  for (std::size_t k = 0; k < n; ++k) subtract<D>(owner.H, &m.xi[D * k], &m.z[D * k]);
+  if (!parts_.shift.data) return;
+  shift_gradient(m.family, p, parts_.shift, m.gradient);
+  gradient(owner.H);
+}
+
+/// H_b = A (I - xi (x) g) + u (x) g: dE/dA = dE/dH (I - g (x) xi).
+template <int D>
+void BondRelease::find_onto(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const std::size_t n = owner.far.size();
+  owner.onto.assign(n * D * D, 0.0);
+  for (std::size_t k = 0; k < n; ++k) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    if (!entry) continue;
+    for (std::size_t c = 0; c < D; ++c) {
+      const double t = product<D>(entry->tensor + c * D, &m.g[D * k]);
+      for (std::size_t e = 0; e < D; ++e) owner.onto[(k * D + c) * D + e] = entry->tensor[c * D + e] - t * m.xi[D * k + e];
+    }
+  }
+}
+
+template <int D>
+void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const auto p = static_cast<std::size_t>(owner.point);
+  const FamilyArrays& family = m.family;
+  owner.released.assign(owner.far.size(), 0.0);
+  if (parts_.formulation.weighted) return release_weighted<D>(owner, samples, m);
+  double S[D * D] = {};  // dE/dH of the owner
+  if (parts_.formulation.bond) {
+    release_bonds<D>(owner, samples, m, S);
+  } else if (const BondSamples::Entry* const entry = samples.find(owner.point, -1)) {
+    std::copy_n(entry->tensor, D * D, S);
+    const double left = (1 - parts_.families.damage(p)) * parts_.families.normaliser(p, BondWeight::kernel);
+    for (std::size_t k = 0; k < owner.far.size() && left > 0; ++k)
+      owner.released[k] += entry->energy * family.whole_omega(k) * family.volume[k] / left;
+  }
+  for (std::size_t k = 0; k < owner.far.size(); ++k) owner.released[k] += work<D>(S, &m.z[D * k], &m.gradient[D * k]) / family.b(k);
+  if (parts_.stabilization) release_penalty<D>(owner, m);
+}
+
+template <int D>
+void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory& m, double* S) const {
+  const double share = parts_.formulation.far_share;
+  double pressure = 0, by_share = 0;
+  const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
+  for (std::size_t k = 0; k < owner.far.size(); ++k) {
+    const double* const own = &owner.onto[k * D * D];
+    for (int c = 0; c < D * D; ++c) S[c] += (1 - share) * own[c];
+    if (share > 0) {
+      const Owner& far = owner_of(owner.far[k]);
+      const double* const other = &far.onto[far.place_of(owner.point) * D * D];
+      for (int c = 0; c < D * D; ++c) S[c] += share * other[c];
+    }
+    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    if (!entry) continue;
+    owner.released[k] += entry->energy / m.family.b(k);
+    pressure += entry->pressure;
+    if (left > 0) by_share += 3 * entry->pressure * entry->growth / ((entry->growth + left) * left);
+  }
+  if (parts_.formulation.selective()) release_volume<D>(owner, pressure, by_share, m, S);
+  if (!parts_.formulation.g_from_xi_only) release_corrections<D>(owner, samples, m);
+}
+
+template <int D>
+void BondRelease::release_volume(Owner& owner, double pressure, double by_share, const Memory& m, double* S) const {
+  double H[9 * padding] = {}, pressures[padding] = {}, stress[9 * padding] = {};
+  for (std::size_t c = 0; c < D * D; ++c) H[c * padding] = owner.H[c];
+  pressures[0] = pressure;
+  add_owner_stress(parts_.laws.space(), {static_cast<int>(padding), padding, H, nullptr}, pressures, nullptr, stress, padding);
+  for (std::size_t c = 0; c < D * D; ++c) S[c] += stress[c * padding];
+  // The share c of the volume is that of the influence that is left.
+  const auto p = static_cast<std::size_t>(owner.point);
+  double influence = 0;
+  for (std::size_t k = 0; k < owner.far.size(); ++k) influence += m.family.omega[k] * m.family.volume[k];
+  if (!std::isfinite(parts_.families.condition(p)) || !(influence > 0)) return;
+  for (std::size_t k = 0; k < owner.far.size(); ++k)
+    owner.released[k] += by_share * m.family.whole_omega(k) * m.family.volume[k] * parts_.families.left(p) / influence;
+}
+
+/// Corrections that follow from the shape tensor and the influence of the bonds.
+template <int D>
+void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, Memory& m) const {
+  FamilyArrays& family = m.family;
+  const std::size_t n = owner.far.size(), size = family.size;
+  const double horizon = parts_.families.body().horizon(), share = parts_.formulation.far_share;
+  double inverse[6];
+  std::copy_n(family.inverse_shape, 6, inverse);
+  if (inverse[0] == 0) return;
+  // By bond and component of its g: dE/dg_e = (dE/dH)_ce (u - A xi)_c.
+  m.weighted.assign(D * n, 0.0);
+  for (std::size_t k = 0; k < n; ++k) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    if (!entry) continue;
+    double A[D * D], z[D];
+    const double* const other = share > 0 ? owner_of(owner.far[k]).H : owner.H;
+    for (int c = 0; c < D * D; ++c) A[c] = (1 - share) * owner.H[c] + share * other[c];
+    std::copy_n(&m.u[D * k], D, z);
+    subtract<D>(A, &m.xi[D * k], z);
+    for (std::size_t e = 0; e < D; ++e)
+      for (std::size_t c = 0; c < D; ++c) m.weighted[D * k + e] += entry->tensor[c * D + e] * z[c];
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    double Ax[D];
+    for (int a = 0; a < D; ++a) {
+      Ax[a] = 0;
+      for (int b = 0; b < D; ++b) Ax[a] += inverse[symmetric_index(D, a, b)] * family.xi[b][k];
+    }
+    const double whole = family.whole_omega(k), omega = family.omega[k];
+    double difference = 0;
+    for (const double by : {step, -step}) {
+      // K^-1 - db omega V K^-1 xi (x) K^-1 xi
+      for (int a = 0; a < D; ++a)
+        for (int b = a; b < D; ++b)
+          family.inverse_shape[symmetric_index(D, a, b)] = inverse[symmetric_index(D, a, b)] - by * whole * family.volume[k] * Ax[a] * Ax[b];
+      family.omega[k] = omega + by * whole;
+      parts_.formulation.bond->correction(family.view(horizon), m.correction.data(), size);
+      for (std::size_t l = 0; l < n; ++l)
+        for (std::size_t e = 0; e < D; ++e) difference += (by > 0 ? 1 : -1) * m.weighted[D * l + e] * m.correction[e * size + l];
+    }
+    family.omega[k] = omega;
+    owner.released[k] += difference / (2 * step);
+  }
+  std::copy_n(inverse, 6, family.inverse_shape);
+}
+
+template <int D>
+void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const auto p = static_cast<std::size_t>(owner.point);
+  const FamilyArrays& family = m.family;
+  const std::size_t n = owner.far.size();
+  if (n == 0) return;
+  bond_shares(parts_.families, p, parts_.formulation.weight, family, m.shares);
+  m.components.assign(D * family.size, 0.0);
+  const double* fields[1][D];
+  for (std::size_t c = 0; c < D; ++c) {
+    for (std::size_t k = 0; k < n; ++k) m.components[c * family.size + k] = m.u[D * k + c];
+    fields[0][c] = m.components.data() + c * family.size;
+  }
+  LocalStencil<D>& stencil = m.stencil<D>();
+  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, family, m.shares.data(), 1, fields);
+  stencil.expand(m.weighted);
+  const int owners = parts_.formulation.selective() ? 1 : 0;
+  const double left = parts_.families.left(p);
+  double pressure = 0, by_share = 0;
+  const auto through = [&](int q, const double* S) {
+    double H[D * D];
+    std::fill_n(H, D * D, 0.0);
+    const double* const g = m.weighted.data() + static_cast<std::size_t>(q) * n * D;
+    for (std::size_t k = 0; k < n; ++k)
+      for (std::size_t c = 0; c < D; ++c)
+        for (std::size_t e = 0; e < D; ++e) H[c * D + e] += m.u[D * k + c] * g[D * k + e];
+    for (std::size_t k = 0; k < n; ++k) {
+      double z[D];
+      std::copy_n(&m.u[D * k], D, z);
+      subtract<D>(H, &m.xi[D * k], z);
+      owner.released[k] += work<D>(S, z, g + D * k) / family.b(k);
+    }
+    if (q == 0) std::copy_n(H, D * D, owner.H);
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[j]);
+    if (!entry) continue;
+    owner.released[j] += entry->energy / family.b(j);
+    pressure += entry->pressure;
+    if (left > 0) by_share += 3 * entry->pressure * entry->growth / ((entry->growth + left) * left);
+    through(owners + static_cast<int>(j), entry->tensor);
+  }
+  if (owners == 0) return;
+  double S[D * D] = {};
+  const double none[D * D] = {};
+  through(0, none);  // H of the owner
+  release_volume<D>(owner, pressure, by_share, m, S);
+  through(0, S);
+}
+
+/// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H nothing happens: sum of omega V z (x) xi is zero.
+template <int D>
+void BondRelease::release_penalty(Owner& owner, Memory& m) const {
+  const auto p = static_cast<std::size_t>(owner.point);
+  const FamilyArrays& family = m.family;
+  if (!penalised(parts_.families.condition(p))) return;
+  const std::size_t n = owner.far.size();
+  const bool isotropic = D == 1 || parts_.stabilization->traits().isotropic;
+  const double volume = parts_.families.body().volume(p);
+  double intact = 0, squares[D * D] = {};  // sum of omega V z (x) z
+  for (std::size_t k = 0; k < n; ++k) {
+    const double w = family.omega[k] * family.volume[k];
+    intact += w;
+    for (std::size_t a = 0; a < D; ++a)
+      for (std::size_t b = 0; b < D; ++b) squares[a * D + b] += w * m.z[D * k + a] * m.z[D * k + b];
+  }
+  const auto times = [&](const double* M, const double* zz) {
+    double sum = 0;
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b)
+        if (isotropic ? a == b : true) sum += M[isotropic ? 0 : symmetric_index(D, a, b)] * zz[a * D + b];
+    return sum;
+  };
+  double M[6];
+  parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, family.inverse_shape), M);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double w = family.whole_omega(k) * family.volume[k];
+    double zz[D * D], Ax[D];
+    for (std::size_t a = 0; a < D; ++a) {
+      Ax[a] = 0;
+      for (std::size_t b = 0; b < D; ++b) {
+        zz[a * D + b] = w * m.z[D * k + a] * m.z[D * k + b];
+        Ax[a] += family.inverse_shape[symmetric_index(D, static_cast<int>(a), static_cast<int>(b))] * m.xi[D * k + b];
+      }
+    }
+    double change = times(M, zz);
+    for (const double by : {step, -step}) {
+      double inverse[6], at[6];
+      for (int a = 0; a < D; ++a)
+        for (int b = a; b < D; ++b)
+          inverse[symmetric_index(D, a, b)] = family.inverse_shape[symmetric_index(D, a, b)] - by * w * Ax[a] * Ax[b];
+      parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, inverse), at);
+      change += (by > 0 ? 1 : -1) * times(at, squares) / (2 * step);
+    }
+    owner.released[k] += 0.5 * volume * change;
+  }
+}
+
+}  // namespace perikit

@@ -1,0 +1,90 @@
+#pragma once
+/// What a bond sets free as it weakens, with displacements held: dE/db_ij of the stored energy
+///
+///   E = sum_q W_q(b) psi(H_q(b, u)) + penalties.
+///
+/// Gradients follow from bonds, too: H = sum_k u_k (x) g_k changes by z_j (x) g_j / b_j per b_j, z_j = u_j - H xi_j the part of the bond
+/// that is not affine. What a bond sets free is the share that it holds, dE/dH : (z (x) g / b) of every gradient that it takes part in,
+/// and what corrections, volumes of owners and penalty matrices change by. Kinematics with one gradient of order 1 per point, with
+/// bonds, and with weighted gradients of bonds.
+
+#include <memory>
+#include <vector>
+
+#include "families/families.hpp"
+#include "operators/bond_samples.hpp"
+#include "perikit/model/formulation.hpp"
+#include "perikit/model/stabilization.hpp"
+#include "perikit/operators/laws.hpp"
+
+namespace perikit {
+
+/// All must outlive what is made of them.
+struct ReleaseParts {
+  const Families& families;
+  const Formulation& formulation;
+  const Laws& laws;
+  const Stabilization* stabilization;  ///< may be null
+  ConstFieldView shift;                ///< of point gradients (spaces/cloud_gradient.hpp); without data: none
+};
+
+class BondRelease {
+ public:
+  /// Why it is not known of this formulation; null where it is.
+  static const char* unknown(const Formulation& formulation, int dimension);
+
+  explicit BondRelease(const ReleaseParts& parts);
+  ~BondRelease();
+  /// How many bonds away from a point evaluation points matter to what its bonds set free.
+  int reach() const noexcept { return parts_.formulation.bond && parts_.formulation.far_share > 0 ? 2 : 1; }
+  /// Of the bonds of points in the groups `near`. samples: derivatives, of the groups `wide` (those of `near` and, at a reach of 2,
+  /// everything in their families).
+  void find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples);
+  /// dE/db_ij by what belongs to p and its evaluation points [J], of an intact bond; the rest is that of the far end.
+  double of(std::int32_t p, std::int32_t far) const noexcept;
+
+ private:
+  /// A point with its bonds.
+  struct Owner {
+    std::int32_t point = -1;
+    std::vector<std::int32_t> far;
+    std::vector<double> released;
+    double H[9];               ///< [c * dimension + e]
+    std::vector<double> onto;  ///< evaluation points at bonds: dE/dA of each, A their gradient before the correction
+    std::size_t place_of(std::int32_t end) const noexcept;
+  };
+  struct Memory;
+  template <int D>
+  void find_bonds(ConstFieldView u, const GroupMarks& near, const BondSamples& samples);
+  /// The bonds of the owner; their corrections; its gradient, and what of the bonds is not affine.
+  template <int D>
+  void load(Owner& owner, Memory& m) const;
+  template <int D>
+  void correct(Memory& m) const;
+  template <int D>
+  void find_gradient(Owner& owner, ConstFieldView u, Memory& m) const;
+  template <int D>
+  void find_onto(Owner& owner, const BondSamples& samples, Memory& m) const;
+  template <int D>
+  void release(Owner& owner, const BondSamples& samples, Memory& m) const;
+  template <int D>
+  void release_bonds(Owner& owner, const BondSamples& samples, Memory& m, double* S) const;
+  template <int D>
+  void release_corrections(Owner& owner, const BondSamples& samples, Memory& m) const;
+  template <int D>
+  void release_weighted(Owner& owner, const BondSamples& samples, Memory& m) const;
+  template <int D>
+  void release_penalty(Owner& owner, Memory& m) const;
+  /// Of a selective map: the pressure on the owner's gradient is added to S, and what the share of its volume does to `released`.
+  template <int D>
+  void release_volume(Owner& owner, double pressure, double by_share, const Memory& m, double* S) const;
+  const Owner& owner_of(std::int32_t p) const noexcept { return owners_[static_cast<std::size_t>(place_[static_cast<std::size_t>(p)])]; }
+
+  ReleaseParts parts_;
+  std::vector<Owner> owners_;
+  std::size_t count_ = 0;            ///< of them in use
+  std::vector<std::int32_t> place_;  ///< by point: its owner, or -1
+  std::vector<std::unique_ptr<Memory>> memory_;
+};
+
+}  // namespace perikit
