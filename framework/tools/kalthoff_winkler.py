@@ -6,8 +6,8 @@ horizon and orientation of the lattice. A Markdown table is printed; it is that 
 
 Runs that are done are kept: a stopped command goes on where it was. Needs numpy and h5py.
 
-Angle: of the line through the mean heights of the points with damage above 0.35, from 2 mm to 30 mm above the notch (of the fitted x over y,
-so that a vertical crack has 90 degrees). Start: the first frame in which the crack is 2 mm long. Speed: of its tip from there to 30 mm.
+Angle: of the line through the points with damage above 0.35, from 2 mm to 30 mm above the notch (of the fitted x over y, so that a vertical crack
+has 90 degrees), in the first frame in which the crack has come so far: later other cracks come from the far edge. Start: the first frame in which the crack is 2 mm long. Speed: of its tip from there to 30 mm.
 """
 
 import argparse
@@ -62,13 +62,15 @@ def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
 def measured(folder):
     with h5py.File(folder / "reference.h5") as file:
         x = file["position"][:]
-    tips, last = [], None
+    tips, last, height = [], None, 0.0
     for frame in sorted((folder / "frames").glob("*.h5")):
         with h5py.File(frame) as file:
             damage, time = file["damage"][:], float(file.attrs["time"])
         crack = (damage > 0.35) & (x[:, 1] > 0.027) & (x[:, 0] > 0.02)
-        tips.append((time, x[crack, 1].max() - 0.025 if crack.any() else 0.0))
-        last = crack
+        if height <= 0.03:
+            last = crack
+        height = x[crack, 1].max() - 0.025 if crack.any() else 0.0
+        tips.append((time, height))
     within = last & (x[:, 1] < 0.055)
     if within.sum() < 20:
         return "no crack", "", ""

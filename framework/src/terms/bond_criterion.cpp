@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "families/cloud_families.hpp"
 #include "perikit/core/parallel.hpp"
 #include "terms/energy_shares.hpp"
 
@@ -39,12 +40,12 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
-  if (damage && traits_.bound != ValueBound::none) set_screen();
+  if (damage && traits_.bound != ValueBound::none) set_screen(parts.factors);
 }
 
 /// A bond holds psi_ij/N_i + psi_ji/N_j over its share, N the normaliser of its share, so that one of them is above half of the
 /// limit where it fails.
-void BondCriterion::set_screen() {
+void BondCriterion::set_screen(std::span<const double> factors) {
   const BondWeight kind = by_point_ ? BondWeight::kernel : formulation_.weight;
   const Field& onset = damage_->onset;
   FamilyArrays family;
@@ -69,9 +70,17 @@ void BondCriterion::set_screen() {
       for (std::size_t k = 0; k < family.far.size(); ++k) most = std::max(most, share[k]);
     });
   }
+  const std::size_t parts = by_point_ ? static_cast<std::size_t>(formulation_.parts(body_.dimension())) : 0;
+  const auto largest_factor = [&](std::size_t p) {
+    if (factors.empty()) return 1.0;
+    const FamilyLists& lists = families_.cloud()->lists();
+    const auto of_point = parts > 0 ? factors.subspan(p * parts, parts)
+                                    : factors.subspan(static_cast<std::size_t>(lists.first[p]), static_cast<std::size_t>(lists.first[p + 1] - lists.first[p]));
+    return of_point.empty() ? 1.0 : std::max(1.0, std::ranges::max(of_point));
+  };
   const auto own = [&](std::int32_t p) {
     const auto at = static_cast<std::size_t>(p);
-    return (release_ ? screened_release(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / most;
+    return (release_ ? screened_release(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at));
   };
   for (const std::int32_t p : body_.owned()) {
     const auto at = static_cast<std::size_t>(p);

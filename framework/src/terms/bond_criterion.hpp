@@ -49,7 +49,7 @@ class BondCriterion final : public BondFinder {
     AlignedVector<double> all_shares;
   };
 
-  void set_screen();
+  void set_screen(std::span<const double> factors);
   std::vector<std::int32_t> near_failure(ConstFieldView u);
   std::vector<std::int32_t> marked(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).

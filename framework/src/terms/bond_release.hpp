@@ -9,6 +9,7 @@
 /// bonds, and with weighted gradients of bonds.
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "families/families.hpp"
@@ -26,6 +27,7 @@ struct ReleaseParts {
   const Laws& laws;
   const Stabilization* stabilization;  ///< may be null
   ConstFieldView shift;                ///< of point gradients (spaces/cloud_gradient.hpp); without data: none
+  std::span<const double> factors;     ///< of the weights of evaluation points (EvaluationSpace::set_factors); empty: 1
 };
 
 class BondRelease {

@@ -32,7 +32,12 @@ void clear(double* values, std::size_t size) {
 
 ReleaseParts release_parts(const TermParts& parts) {
   const bool shifted = parts.consistency && parts.consistency->shift.components() > 0;
-  return {*parts.families, parts.formulation, *parts.laws, parts.stabilization.get(), shifted ? ConstFieldView(parts.consistency->shift) : ConstFieldView{}};
+  return {*parts.families,
+          parts.formulation,
+          *parts.laws,
+          parts.stabilization.get(),
+          shifted ? ConstFieldView(parts.consistency->shift) : ConstFieldView{},
+          parts.consistency ? std::span<const double>(parts.consistency->factors) : std::span<const double>()};
 }
 
 /// What the criterion looks at with these kinematics.
@@ -119,8 +124,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     finder = all.make_monitor(*parts_.damage, parts_.skip, known);
   else {
     auto criterion = std::make_unique<BondCriterion>(release_parts(parts_), asked_of(parts_), parts_.damage, terms_, parts_.skip);
-    // Consistent weights are not those of the families, which the screen knows.
-    criterion_ = parts_.skip && !parts_.consistency && criterion->screen() ? criterion.get() : nullptr;
+    criterion_ = parts_.skip && criterion->screen() ? criterion.get() : nullptr;
     if (criterion_) terms_.front()->screen(criterion_->screen());
     finder = std::move(criterion);
   }
