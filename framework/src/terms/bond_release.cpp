@@ -60,7 +60,9 @@ struct BondRelease::Memory {
   }
 };
 
-BondRelease::BondRelease(const ReleaseParts& parts) : parts_(parts) {}
+BondRelease::BondRelease(const ReleaseParts& parts)
+    : parts_(parts),
+      mirrored_(parts.formulation.pair_symmetric && !parts.formulation.selective() && parts.laws.single() && parts.factors.empty()) {}
 BondRelease::~BondRelease() = default;
 
 const char* BondRelease::unknown(const Formulation& f, int dimension) {
@@ -102,17 +104,20 @@ void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const Bon
   const auto over_owners = [&](auto&& visit) {
     parallel_for(count_, [&](std::size_t k) { visit(owners_[k], *memory_[static_cast<std::size_t>(thread_index())]); });
   };
-  const bool bonds = parts_.formulation.bond != nullptr;
-  if (bonds)
+  const auto with_bonds = [&](Owner& owner, Memory& m) {
+    load<D>(owner, m);
+    if (!parts_.formulation.bond) return;
+    correct<D>(m);
+    find_onto<D>(owner, samples, m);
+  };
+  if (reach() == 2)
     over_owners([&](Owner& owner, Memory& m) {
-      load<D>(owner, m);
-      correct<D>(m);
-      find_onto<D>(owner, samples, m);
+      with_bonds(owner, m);
       if (!parts_.formulation.g_from_xi_only) find_gradient<D>(owner, u, m);
     });
   over_owners([&](Owner& owner, Memory& m) {
     if (!near[static_cast<std::size_t>(owner.point) / padding]) return;
-    load<D>(owner, m);
+    reach() == 2 ? load<D>(owner, m) : with_bonds(owner, m);
     find_gradient<D>(owner, u, m);
     release<D>(owner, samples, m);
   });
@@ -204,10 +209,13 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
   const double share = parts_.formulation.far_share;
   double pressure = 0, by_share = 0;
   const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
+  const auto normaliser = [&](std::int32_t p) { return parts_.families.normaliser(static_cast<std::size_t>(p), parts_.formulation.weight); };
+  const double of_owner = mirrored_ ? normaliser(owner.point) : 0.0;
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
     const double* const own = &owner.onto[k * D * D];
-    for (int c = 0; c < D * D; ++c) S[c] += (1 - share) * own[c];
-    if (share > 0) {
+    const double both = (1 - share) + (mirrored_ ? share * of_owner / normaliser(owner.far[k]) : 0.0);
+    for (int c = 0; c < D * D; ++c) S[c] += both * own[c];
+    if (share > 0 && !mirrored_) {
       const Owner& far = owner_of(owner.far[k]);
       const double* const other = &far.onto[far.place_of(owner.point) * D * D];
       for (int c = 0; c < D * D; ++c) S[c] += share * other[c];

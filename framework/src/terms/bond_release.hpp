@@ -38,7 +38,7 @@ class BondRelease {
   explicit BondRelease(const ReleaseParts& parts);
   ~BondRelease();
   /// How many bonds away from a point evaluation points matter to what its bonds set free.
-  int reach() const noexcept { return parts_.formulation.bond && parts_.formulation.far_share > 0 ? 2 : 1; }
+  int reach() const noexcept { return parts_.formulation.bond && parts_.formulation.far_share > 0 && !mirrored_ ? 2 : 1; }
   /// Of the bonds of points in the groups `near`. samples: derivatives, of the groups `wide` (those of `near` and, at a reach of 2,
   /// everything in their families).
   void find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples);
@@ -83,6 +83,7 @@ class BondRelease {
   const Owner& owner_of(std::int32_t p) const noexcept { return owners_[static_cast<std::size_t>(place_[static_cast<std::size_t>(p)])]; }
 
   ReleaseParts parts_;
+  bool mirrored_;  ///< both directions of a bond have the same gradient, law and stress, and weights as their normalisers say
   std::vector<Owner> owners_;
   std::size_t count_ = 0;            ///< of them in use
   std::vector<std::int32_t> place_;  ///< by point: its owner, or -1
