@@ -255,6 +255,7 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
   double inverse[6];
   std::copy_n(family.inverse_shape, 6, inverse);
   if (inverse[0] == 0) return;
+  m.correction.resize(D * size);
   // By bond and component of its g: dE/dg_e = (dE/dH)_ce (u - A xi)_c.
   m.weighted.assign(D * n, 0.0);
   for (std::size_t k = 0; k < n; ++k) {
