@@ -40,6 +40,12 @@ void subtract(const double* H, const double* xi, double* z) noexcept {
   for (int c = 0; c < D; ++c) z[c] -= product<D>(H + c * D, xi);
 }
 
+/// One law with the same constants at all points that store energy; on every rank the same.
+bool one_law(const Laws& laws) {
+  const auto stores = [](const MaterialRecord& record) { return !record.silent; };
+  return std::ranges::count_if(laws.records(), stores) == 1 && laws.records().front().uniform;
+}
+
 }  // namespace
 
 /// Of one thread. Vectors by bond have D components each.
@@ -62,7 +68,7 @@ struct BondRelease::Memory {
 
 BondRelease::BondRelease(const ReleaseParts& parts)
     : parts_(parts),
-      mirrored_(parts.formulation.pair_symmetric && !parts.formulation.selective() && parts.laws.single() && parts.factors.empty()) {}
+      mirrored_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws) && parts.factors.empty()) {}
 BondRelease::~BondRelease() = default;
 
 const char* BondRelease::unknown(const Formulation& f, int dimension) {

@@ -43,7 +43,8 @@ ReleaseParts release_parts(const TermParts& parts) {
 /// What the criterion looks at with these kinematics.
 DamageTraits asked_of(const TermParts& parts) {
   DamageTraits traits = parts.damage->law->traits();
-  if (BondRelease::unknown(parts.formulation, parts.families->body().dimension())) traits.released = false;
+  const bool known = BondRelease::unknown(parts.formulation, parts.families->body().dimension()) == nullptr;
+  traits.released = traits.released && traits.energy && !traits.stress && known;
   return traits;
 }
 

@@ -24,8 +24,8 @@ struct DamageTraits {
   /// `integrity` depends on value and limits alone, not on further parameters: bonds of an interface share it with those of the body.
   bool by_limits = false;
   /// BondStates::energy is not what the bond holds but what it would set free, dE/db_ij, where the engine knows that: with one gradient of
-  /// order 1 per point, gradients of bonds, and weighted gradients of bonds. A `bound` then means: bonds are looked at where an evaluation
-  /// point holds an eighth of what would be needed.
+  /// order 1 per point, gradients of bonds, and weighted gradients of bonds, and not with `stress`. A `bound` then means: bonds are looked
+  /// at where an evaluation point holds an eighth of what would be needed.
   bool released = false;
 };
 
