@@ -97,6 +97,11 @@ void CloudPoints<D>::run(Pass& pass) {
 }
 
 template <int D>
+void CloudPoints<D>::bonds_changed(std::span<const std::int32_t> points) {
+  for (const std::int32_t p : points) gradient_.renew(static_cast<std::size_t>(p));
+}
+
+template <int D>
 void CloudPoints<D>::shift_gradients(ConstFieldView lambda) {
   gradient_.shift(lambda);
   stress_.assign(D * points_, Row{});

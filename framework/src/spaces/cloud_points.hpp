@@ -15,7 +15,7 @@ class CloudPoints final : public EvaluationSpace {
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
   bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
   std::size_t numbers() const noexcept override { return padded(points_); }
-  void bonds_changed(std::span<const std::int32_t>) override {}
+  void bonds_changed(std::span<const std::int32_t> points) override;
   void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
 
