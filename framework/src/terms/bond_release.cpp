@@ -55,6 +55,7 @@ struct BondRelease::Memory {
   std::vector<double> g, gradient;    ///< corrections of the bonds, and the point gradient
   AlignedVector<double> correction, shares, components;
   std::vector<double> weighted;
+  double H[9];                        ///< [c * dimension + e]
   LocalStencil<1> line;
   LocalStencil<2> plane;
   LocalStencil<3> solid;
@@ -111,30 +112,33 @@ void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const Bon
     parallel_for(count_, [&](std::size_t k) { visit(owners_[k], *memory_[static_cast<std::size_t>(thread_index())]); });
   };
   const auto with_bonds = [&](Owner& owner, Memory& m) {
-    load<D>(owner, m);
+    load<D>(owner.point, m);
+    owner.far = m.family.far;
     if (!parts_.formulation.bond) return;
     correct<D>(m);
     find_onto<D>(owner, samples, m);
   };
-  if (reach() == 2)
+  const bool twice = reach() == 2;
+  if (twice)
     over_owners([&](Owner& owner, Memory& m) {
       with_bonds(owner, m);
-      if (!parts_.formulation.g_from_xi_only) find_gradient<D>(owner, u, m);
+      find_gradient<D>(owner.point, u, m);
+      std::copy_n(m.H, D * D, owner.H);
     });
+  // What other owners read of an owner stays as it is from here on.
   over_owners([&](Owner& owner, Memory& m) {
     if (!near[static_cast<std::size_t>(owner.point) / padding]) return;
-    reach() == 2 ? load<D>(owner, m) : with_bonds(owner, m);
-    find_gradient<D>(owner, u, m);
+    twice ? load<D>(owner.point, m) : with_bonds(owner, m);
+    find_gradient<D>(owner.point, u, m);
     release<D>(owner, samples, m);
   });
 }
 
 template <int D>
-void BondRelease::load(Owner& owner, Memory& m) const {
-  parts_.families.load(static_cast<std::size_t>(owner.point), BondsOf::intact, m.family);
+void BondRelease::load(std::int32_t point, Memory& m) const {
+  parts_.families.load(static_cast<std::size_t>(point), BondsOf::intact, m.family);
   const FamilyArrays& family = m.family;
   const std::size_t n = family.far.size();
-  owner.far = family.far;
   m.xi.resize(D * n);
   for (std::size_t k = 0; k < n; ++k)
     for (std::size_t c = 0; c < D; ++c) m.xi[D * k + c] = family.xi[c][k];
@@ -151,14 +155,14 @@ void BondRelease::correct(Memory& m) const {
 }
 
 template <int D>
-void BondRelease::find_gradient(Owner& owner, ConstFieldView u, Memory& m) const {
-  const auto p = static_cast<std::size_t>(owner.point);
-  const std::size_t n = owner.far.size();
+void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m) const {
+  const auto p = static_cast<std::size_t>(point);
+  const std::size_t n = m.family.far.size();
   m.u.resize(D * n);
   for (std::size_t k = 0; k < n; ++k)
     for (std::size_t c = 0; c < D; ++c) {
       const double* const component = u.component(static_cast<int>(c));
-      m.u[D * k + c] = component[owner.far[k]] - component[p];
+      m.u[D * k + c] = component[m.family.far[k]] - component[p];
     }
   const auto gradient = [&](double* H) {
     std::fill_n(H, D * D, 0.0);
@@ -168,12 +172,12 @@ void BondRelease::find_gradient(Owner& owner, ConstFieldView u, Memory& m) const
   };
   // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
   point_gradient(m.family, parts_.families.body().horizon(), 1, m.gradient);
-  gradient(owner.H);
+  gradient(m.H);
   m.z = m.u;
-  for (std::size_t k = 0; k < n; ++k) subtract<D>(owner.H, &m.xi[D * k], &m.z[D * k]);
+  for (std::size_t k = 0; k < n; ++k) subtract<D>(m.H, &m.xi[D * k], &m.z[D * k]);
   if (!parts_.shift.data) return;
   shift_gradient(m.family, p, parts_.shift, m.gradient);
-  gradient(owner.H);
+  gradient(m.H);
 }
 
 /// H_b = A (I - xi (x) g) + u (x) g: dE/dA = dE/dH (I - g (x) xi).
@@ -239,7 +243,7 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
 template <int D>
 void BondRelease::release_volume(Owner& owner, double pressure, double by_share, const Memory& m, double* S) const {
   double H[9 * padding] = {}, pressures[padding] = {}, stress[9 * padding] = {};
-  for (std::size_t c = 0; c < D * D; ++c) H[c * padding] = owner.H[c];
+  for (std::size_t c = 0; c < D * D; ++c) H[c * padding] = m.H[c];
   pressures[0] = pressure;
   add_owner_stress(parts_.laws.space(), {static_cast<int>(padding), padding, H, nullptr}, pressures, nullptr, stress, padding);
   for (std::size_t c = 0; c < D * D; ++c) S[c] += stress[c * padding];
@@ -268,8 +272,8 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
     const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
     if (!entry) continue;
     double A[D * D], z[D];
-    const double* const other = share > 0 ? owner_of(owner.far[k]).H : owner.H;
-    for (int c = 0; c < D * D; ++c) A[c] = (1 - share) * owner.H[c] + share * other[c];
+    const double* const other = share > 0 ? owner_of(owner.far[k]).H : m.H;
+    for (int c = 0; c < D * D; ++c) A[c] = (1 - share) * m.H[c] + share * other[c];
     std::copy_n(&m.u[D * k], D, z);
     subtract<D>(A, &m.xi[D * k], z);
     for (std::size_t e = 0; e < D; ++e)
@@ -331,7 +335,7 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
       subtract<D>(H, &m.xi[D * k], z);
       owner.released[k] += work<D>(S, z, g + D * k) / family.b(k);
     }
-    if (q == 0) std::copy_n(H, D * D, owner.H);
+    if (q == 0) std::copy_n(H, D * D, m.H);
   };
   for (std::size_t j = 0; j < n; ++j) {
     const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[j]);

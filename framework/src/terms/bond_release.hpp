@@ -51,20 +51,20 @@ class BondRelease {
     std::int32_t point = -1;
     std::vector<std::int32_t> far;
     std::vector<double> released;
-    double H[9];               ///< [c * dimension + e]
     std::vector<double> onto;  ///< evaluation points at bonds: dE/dA of each, A their gradient before the correction
+    double H[9];               ///< at a reach of 2, [c * dimension + e]
     std::size_t place_of(std::int32_t end) const noexcept;
   };
   struct Memory;
   template <int D>
   void find_bonds(ConstFieldView u, const GroupMarks& near, const BondSamples& samples);
-  /// The bonds of the owner; their corrections; its gradient, and what of the bonds is not affine.
+  /// The bonds of a point; their corrections; its gradient, and what of the bonds is not affine.
   template <int D>
-  void load(Owner& owner, Memory& m) const;
+  void load(std::int32_t point, Memory& m) const;
   template <int D>
   void correct(Memory& m) const;
   template <int D>
-  void find_gradient(Owner& owner, ConstFieldView u, Memory& m) const;
+  void find_gradient(std::int32_t point, ConstFieldView u, Memory& m) const;
   template <int D>
   void find_onto(Owner& owner, const BondSamples& samples, Memory& m) const;
   template <int D>
