@@ -44,6 +44,34 @@ bool suits(const Example& example, int dimension) {
   return false;
 }
 
+/// Bonds that cross a unit of area, about.
+double crossing(const Body& body) {
+  switch (body.dimension()) {
+    case 1: return 0.5 * body.section() * std::pow(body.horizon(), 2);
+    case 2: return 0.667 * body.section() * std::pow(body.horizon(), 3);
+    default: return 0.785 * std::pow(body.horizon(), 4);
+  }
+}
+
+/// The bonds that fail, some of `bonds`: the same ones whether evaluations of forces said which to look at, did not, or were not to.
+std::set<std::pair<std::int32_t, std::int32_t>> fail_screened_or_not(BodyOptions options, const std::string& kinematics, std::size_t bonds) {
+  const std::string text = scene_text(options, kinematics);
+  options.skip = false;
+  const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics));
+  respond(screened->problem(), 23);
+  const FieldView u = screened->problem().state().displacement();
+  const BondUpdate update = screened->problem().terms().update_bonds(u);
+  CHECK(update.changed > 0);
+  CHECK(update.changed < bonds);
+  std::set<std::pair<std::int32_t, std::int32_t>> failed;
+  for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
+  for (auto* other : {unscreened.get(), slow.get()}) {
+    CHECK(other->problem().terms().update_bonds(u).changed == update.changed);
+    for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
+  }
+  return failed;
+}
+
 }  // namespace
 
 TEST_CASE("kinematics: bonds share the stored energy, and those that hold the most of it fail by it, screened or not") {
@@ -70,28 +98,11 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
         }
         CHECK(std::abs(sum - whole) <= 1e-12 * whole);
         std::sort(densities.begin(), densities.end());
-        // Bonds that cross a unit of area, about.
-        const double crossing = d == 3   ? 0.785 * std::pow(body.horizon(), 4)
-                                : d == 2 ? 0.667 * body.section() * std::pow(body.horizon(), 3)
-                                         : 0.5 * body.section() * std::pow(body.horizon(), 2);
         options.conditions = fmt::format(
             "[damage]\ntype = \"critical_energy\"\nenergy = \"held\"\nlimit = \"equal\"\nno_fail = [\"part\"]\nenergy_release_rate = {:.17g}\n",
-            crossing * densities[densities.size() * 9 / 10]);
-        const std::string text = scene_text(options, kinematics_table(example));
-        options.skip = false;
-        const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics_table(example)));
-        respond(screened->problem(), 23);
-        const FieldView u = screened->problem().state().displacement();
-        const BondUpdate update = screened->problem().terms().update_bonds(u);
-        CHECK(update.changed > 0);
-        CHECK(update.changed < shares.size());
-        std::set<std::pair<std::int32_t, std::int32_t>> failed;
-        for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
-        for (auto* other : {unscreened.get(), slow.get()}) {
-          CHECK(other->problem().terms().update_bonds(u).changed == update.changed);
-          for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
-        }
-        if (screened->problem().terms().has_gradients()) continue;  // fragments lose all of their bonds
+            crossing(body) * densities[densities.size() * 9 / 10]);
+        const std::set<std::pair<std::int32_t, std::int32_t>> failed = fail_screened_or_not(options, kinematics_table(example), shares.size());
+        if (plain->problem().terms().has_gradients()) continue;  // fragments lose all of their bonds
         const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
         double least = INFINITY, most = 0;
         for (const BondEnergy& b : shares) {
@@ -167,25 +178,9 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         for (const BondEnergy& b : problem.terms().released_energies(u))
           densities.push_back(b.energy / (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far))));
         std::ranges::sort(densities);
-        const double crossing = d == 3   ? 0.785 * std::pow(body.horizon(), 4)
-                                : d == 2 ? 0.667 * body.section() * std::pow(body.horizon(), 3)
-                                         : 0.5 * body.section() * std::pow(body.horizon(), 2);
-        options.conditions = fmt::format(fmt::runtime(weakening), "released", "1.0", crossing * densities[densities.size() * 9 / 10]) +
+        options.conditions = fmt::format(fmt::runtime(weakening), "released", "1.0", crossing(body) * densities[densities.size() * 9 / 10]) +
                              "limit = \"equal\"\n";
-        const std::string text = scene_text(options, kinematics_table(example));
-        options.skip = false;
-        const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics_table(example)));
-        respond(screened->problem(), 23);
-        const FieldView at = screened->problem().state().displacement();
-        const BondUpdate update = screened->problem().terms().update_bonds(at);
-        CHECK(update.changed > 0);
-        CHECK(update.changed < released.size());
-        std::set<std::pair<std::int32_t, std::int32_t>> failed;
-        for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
-        for (auto* other : {unscreened.get(), slow.get()}) {
-          CHECK(other->problem().terms().update_bonds(at).changed == update.changed);
-          for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
-        }
+        fail_screened_or_not(options, kinematics_table(example), released.size());
       }
 }
 

@@ -40,6 +40,25 @@ void subtract(const double* H, const double* xi, double* z) noexcept {
   for (int c = 0; c < D; ++c) z[c] -= product<D>(H + c * D, xi);
 }
 
+/// H = sum_k u_k (x) g_k of n bonds.
+template <int D>
+void sum_gradient(std::size_t n, const double* u, const double* g, double* H) noexcept {
+  std::fill_n(H, D * D, 0.0);
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t c = 0; c < D; ++c)
+      for (std::size_t e = 0; e < D; ++e) H[c * D + e] += u[D * k + c] * g[D * k + e];
+}
+
+/// K^-1 where the b of one bond is greater by `by`: K^-1 - by omega V K^-1 xi (x) K^-1 xi. weight: omega V.
+template <int D>
+void change_inverse(const double* inverse, double weight, const double* xi, double by, double* changed) noexcept {
+  double Ax[D] = {};
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b) Ax[a] += inverse[symmetric_index(D, a, b)] * xi[b];
+  for (int a = 0; a < D; ++a)
+    for (int b = a; b < D; ++b) changed[symmetric_index(D, a, b)] = inverse[symmetric_index(D, a, b)] - by * weight * Ax[a] * Ax[b];
+}
+
 /// One law with the same constants at all points that store energy; on every rank the same.
 bool one_law(const Laws& laws) {
   const auto stores = [](const MaterialRecord& record) { return !record.silent; };
@@ -53,7 +72,7 @@ struct BondRelease::Memory {
   FamilyArrays family;
   std::vector<double> xi, u, z;       ///< bond vectors, relative displacements, and what is not affine of them
   std::vector<double> g, gradient;    ///< corrections of the bonds, and the point gradient
-  AlignedVector<double> correction, shares, components;
+  AlignedVector<double> correction, shares;
   std::vector<double> weighted;
   double H[9];                        ///< [c * dimension + e]
   LocalStencil<1> line;
@@ -164,20 +183,14 @@ void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m)
       const double* const component = u.component(static_cast<int>(c));
       m.u[D * k + c] = component[m.family.far[k]] - component[p];
     }
-  const auto gradient = [&](double* H) {
-    std::fill_n(H, D * D, 0.0);
-    for (std::size_t k = 0; k < n; ++k)
-      for (std::size_t c = 0; c < D; ++c)
-        for (std::size_t e = 0; e < D; ++e) H[c * D + e] += m.u[D * k + c] * m.gradient[D * k + e];
-  };
   // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
   point_gradient(m.family, parts_.families.body().horizon(), 1, m.gradient);
-  gradient(m.H);
+  sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
   m.z = m.u;
   for (std::size_t k = 0; k < n; ++k) subtract<D>(m.H, &m.xi[D * k], &m.z[D * k]);
   if (!parts_.shift.data) return;
   shift_gradient(m.family, p, parts_.shift, m.gradient);
-  gradient(m.H);
+  sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
 }
 
 /// H_b = A (I - xi (x) g) + u (x) g: dE/dA = dE/dH (I - g (x) xi).
@@ -200,10 +213,13 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
   const auto p = static_cast<std::size_t>(owner.point);
   const FamilyArrays& family = m.family;
   owner.released.assign(owner.far.size(), 0.0);
-  if (parts_.formulation.weighted) return release_weighted<D>(owner, samples, m);
   double S[D * D] = {};  // dE/dH of the owner
-  if (parts_.formulation.bond) {
+  if (parts_.formulation.weighted) {
+    release_weighted<D>(owner, samples, m);
+    release_shares<D>(owner, samples, m, S);
+  } else if (parts_.formulation.bond) {
     release_bonds<D>(owner, samples, m, S);
+    release_shares<D>(owner, samples, m, S);
   } else if (const BondSamples::Entry* const entry = samples.find(owner.point, -1)) {
     std::copy_n(entry->tensor, D * D, S);
     const double left = (1 - parts_.families.damage(p)) * parts_.families.normaliser(p, BondWeight::kernel);
@@ -217,8 +233,6 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
 template <int D>
 void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory& m, double* S) const {
   const double share = parts_.formulation.far_share;
-  double pressure = 0, by_share = 0;
-  const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
   const auto normaliser = [&](std::int32_t p) { return parts_.families.normaliser(static_cast<std::size_t>(p), parts_.formulation.weight); };
   const double of_owner = mirrored_ ? normaliser(owner.point) : 0.0;
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
@@ -230,6 +244,15 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
       const double* const other = &far.onto[far.place_of(owner.point) * D * D];
       for (int c = 0; c < D * D; ++c) S[c] += share * other[c];
     }
+  }
+  if (!parts_.formulation.g_from_xi_only) release_corrections<D>(owner, samples, m);
+}
+
+template <int D>
+void BondRelease::release_shares(Owner& owner, const BondSamples& samples, const Memory& m, double* S) const {
+  const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
+  double pressure = 0, by_share = 0;
+  for (std::size_t k = 0; k < owner.far.size(); ++k) {
     const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
     if (!entry) continue;
     owner.released[k] += entry->energy / m.family.b(k);
@@ -237,7 +260,6 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
     if (left > 0) by_share += 3 * entry->pressure * entry->growth / ((entry->growth + left) * left);
   }
   if (parts_.formulation.selective()) release_volume<D>(owner, pressure, by_share, m, S);
-  if (!parts_.formulation.g_from_xi_only) release_corrections<D>(owner, samples, m);
 }
 
 template <int D>
@@ -280,18 +302,10 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
       for (std::size_t c = 0; c < D; ++c) m.weighted[D * k + e] += entry->tensor[c * D + e] * z[c];
   }
   for (std::size_t k = 0; k < n; ++k) {
-    double Ax[D];
-    for (int a = 0; a < D; ++a) {
-      Ax[a] = 0;
-      for (int b = 0; b < D; ++b) Ax[a] += inverse[symmetric_index(D, a, b)] * family.xi[b][k];
-    }
     const double whole = family.whole_omega(k), omega = family.omega[k];
     double difference = 0;
     for (const double by : {step, -step}) {
-      // K^-1 - db omega V K^-1 xi (x) K^-1 xi
-      for (int a = 0; a < D; ++a)
-        for (int b = a; b < D; ++b)
-          family.inverse_shape[symmetric_index(D, a, b)] = inverse[symmetric_index(D, a, b)] - by * whole * family.volume[k] * Ax[a] * Ax[b];
+      change_inverse<D>(inverse, whole * family.volume[k], &m.xi[D * k], by, family.inverse_shape);
       family.omega[k] = omega + by * whole;
       parts_.formulation.bond->correction(family.view(horizon), m.correction.data(), size);
       for (std::size_t l = 0; l < n; ++l)
@@ -310,47 +324,23 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
   const std::size_t n = owner.far.size();
   if (n == 0) return;
   bond_shares(parts_.families, p, parts_.formulation.weight, family, m.shares);
-  m.components.assign(D * family.size, 0.0);
-  const double* fields[1][D];
-  for (std::size_t c = 0; c < D; ++c) {
-    for (std::size_t k = 0; k < n; ++k) m.components[c * family.size + k] = m.u[D * k + c];
-    fields[0][c] = m.components.data() + c * family.size;
-  }
   LocalStencil<D>& stencil = m.stencil<D>();
-  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, family, m.shares.data(), 1, fields);
+  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, family, m.shares.data(), 0, nullptr);
   stencil.expand(m.weighted);
-  const int owners = parts_.formulation.selective() ? 1 : 0;
-  const double left = parts_.families.left(p);
-  double pressure = 0, by_share = 0;
-  const auto through = [&](int q, const double* S) {
+  const std::size_t owners = parts_.formulation.selective() ? 1 : 0;
+  for (std::size_t j = 0; j < n; ++j) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[j]);
+    if (!entry) continue;
+    const double* const g = m.weighted.data() + (owners + j) * n * D;
     double H[D * D];
-    std::fill_n(H, D * D, 0.0);
-    const double* const g = m.weighted.data() + static_cast<std::size_t>(q) * n * D;
-    for (std::size_t k = 0; k < n; ++k)
-      for (std::size_t c = 0; c < D; ++c)
-        for (std::size_t e = 0; e < D; ++e) H[c * D + e] += m.u[D * k + c] * g[D * k + e];
+    sum_gradient<D>(n, m.u.data(), g, H);
     for (std::size_t k = 0; k < n; ++k) {
       double z[D];
       std::copy_n(&m.u[D * k], D, z);
       subtract<D>(H, &m.xi[D * k], z);
-      owner.released[k] += work<D>(S, z, g + D * k) / family.b(k);
+      owner.released[k] += work<D>(entry->tensor, z, g + D * k) / family.b(k);
     }
-    if (q == 0) std::copy_n(H, D * D, m.H);
-  };
-  for (std::size_t j = 0; j < n; ++j) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[j]);
-    if (!entry) continue;
-    owner.released[j] += entry->energy / family.b(j);
-    pressure += entry->pressure;
-    if (left > 0) by_share += 3 * entry->pressure * entry->growth / ((entry->growth + left) * left);
-    through(owners + static_cast<int>(j), entry->tensor);
   }
-  if (owners == 0) return;
-  double S[D * D] = {};
-  const double none[D * D] = {};
-  through(0, none);  // H of the owner
-  release_volume<D>(owner, pressure, by_share, m, S);
-  through(0, S);
 }
 
 /// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H nothing happens: sum of omega V z (x) xi is zero.
@@ -373,27 +363,20 @@ void BondRelease::release_penalty(Owner& owner, Memory& m) const {
     double sum = 0;
     for (int a = 0; a < D; ++a)
       for (int b = 0; b < D; ++b)
-        if (isotropic ? a == b : true) sum += M[isotropic ? 0 : symmetric_index(D, a, b)] * zz[a * D + b];
+        if (!isotropic || a == b) sum += M[isotropic ? 0 : symmetric_index(D, a, b)] * zz[a * D + b];
     return sum;
   };
   double M[6];
   parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, family.inverse_shape), M);
   for (std::size_t k = 0; k < n; ++k) {
     const double w = family.whole_omega(k) * family.volume[k];
-    double zz[D * D], Ax[D];
-    for (std::size_t a = 0; a < D; ++a) {
-      Ax[a] = 0;
-      for (std::size_t b = 0; b < D; ++b) {
-        zz[a * D + b] = w * m.z[D * k + a] * m.z[D * k + b];
-        Ax[a] += family.inverse_shape[symmetric_index(D, static_cast<int>(a), static_cast<int>(b))] * m.xi[D * k + b];
-      }
-    }
+    double zz[D * D];
+    for (std::size_t a = 0; a < D; ++a)
+      for (std::size_t b = 0; b < D; ++b) zz[a * D + b] = w * m.z[D * k + a] * m.z[D * k + b];
     double change = times(M, zz);
     for (const double by : {step, -step}) {
       double inverse[6], at[6];
-      for (int a = 0; a < D; ++a)
-        for (int b = a; b < D; ++b)
-          inverse[symmetric_index(D, a, b)] = family.inverse_shape[symmetric_index(D, a, b)] - by * w * Ax[a] * Ax[b];
+      change_inverse<D>(family.inverse_shape, w, &m.xi[D * k], by, inverse);
       parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, inverse), at);
       change += (by > 0 ? 1 : -1) * times(at, squares) / (2 * step);
     }

@@ -77,6 +77,9 @@ class BondRelease {
   void release_weighted(Owner& owner, const BondSamples& samples, Memory& m) const;
   template <int D>
   void release_penalty(Owner& owner, Memory& m) const;
+  /// What the evaluation points of the bonds hold; of a selective map what they do to the owner's volume: see below.
+  template <int D>
+  void release_shares(Owner& owner, const BondSamples& samples, const Memory& m, double* S) const;
   /// Of a selective map: the pressure on the owner's gradient is added to S, and what the share of its volume does to `released`.
   template <int D>
   void release_volume(Owner& owner, double pressure, double by_share, const Memory& m, double* S) const;
