@@ -20,9 +20,7 @@ std::vector<Example> consistent_examples() {
   std::vector<Example> all;
   for (const Example& example : kinematics_examples()) {
     const Formulation f = formulation_of(example);
-    if (f.pairs || f.force_state == ForceState::local || (f.weighted && (f.selective() || f.parts(2) == 1)) ||
-        ((f.point || f.selective()) && f.order > 1))
-      continue;
+    if (f.pairs || f.force_state == ForceState::local || ((f.point || f.selective()) && f.order > 1)) continue;
     all.push_back(example);
   }
   return all;

@@ -42,7 +42,7 @@ TEST_CASE("the stiffness of a bar on a cloud is that of its material") {
   };
   for (const auto& [kinematics, jitters] :
        {Cloud{"\"baqp\"", {0.1, 0.3}}, Cloud{"\"projection\"", {0.1, 0.3}}, Cloud{"\"bond_augmented\"", {0.1, 0.3}},
-        Cloud{"\"bond_associated\"", {0.1, 0.3}}, Cloud{"\"non_spherical\"", {0.1, 0.3}}, Cloud{"\"sub_horizon\"", {0.3}},
+        Cloud{"\"bond_associated\"", {0.1, 0.3}}, Cloud{"\"non_spherical\"", {0.1, 0.3}}, Cloud{"\"sub_horizon\"", {0.1, 0.3}},
         Cloud{"{type=\"conventional\",stabilization=\"wan\"}", {0.1, 0.3}},
         Cloud{"{type=\"conventional\",stabilization=\"silling\"}", {0.1, 0.3}}})
     for (const double jitter : jitters) {

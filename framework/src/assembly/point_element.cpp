@@ -75,11 +75,10 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     return;
   }
   bond_shares(rows.families(), p, formulation.weight, s.family, s.share);
-  s.stencil.build({&formulation, horizon}, s.family, s.share.data(), 0, nullptr, rows.families().normaliser(p, BondWeight::volume));
+  s.stencil.build({&formulation, horizon, shape.shift}, s.family, s.share.data(), 0, nullptr, rows.families().normaliser(p, BondWeight::volume));
   s.stencil.expand(s.gradient);
   const int owners = formulation.selective() ? 1 : 0;
   const std::vector<double>& tested = s.stencil.tested();
-  const std::size_t first_factor = shape.parts > 0 ? row * static_cast<std::size_t>(shape.parts) : rows.first(row);
   out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
   if (!tested.empty()) out.test = out.g;
   for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
@@ -94,7 +93,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     }
     write_point<D>(out, to++, gradient);
     if (q < owners) continue;
-    const double factor = shape.factors.empty() ? 1.0 : shape.factors[first_factor + static_cast<std::size_t>(q - owners)];
+    const double factor = shape.factors.empty() ? 1.0 : shape.factors[rows.first(row) + static_cast<std::size_t>(q - owners)];
     out.weight.push_back(share * (shape.parts > 0 ? intact : rows.volume(row)) * factor);
     ++out.points;
   }

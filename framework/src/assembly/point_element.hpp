@@ -16,7 +16,7 @@ struct ElementShape {
   const Formulation& formulation;
   int parts = 1;                         ///< evaluation points per point; 0: one per bond
   std::span<const double> factors = {};  ///< of their weights, as spaces number them; empty: 1
-  ConstFieldView shift = {};             ///< of point gradients; without data: none
+  ConstFieldView shift = {};             ///< of gradients (spaces/shift.hpp); without data: none
 };
 
 /// The nodes of a row, ascending: its family and the point itself. Returns the place of the point.

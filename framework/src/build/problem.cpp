@@ -134,10 +134,6 @@ std::optional<Unbalanced> unbalanced(const Scene& scene, const ProblemParts& par
     return Unbalanced{of(" and force_state = \"local\", whose forces are not -dE/du"), "force_state = \"variational\""};
   const bool moves_gradients = formulation.point || formulation.selective();
   if (moves_gradients && formulation.order > 1) return Unbalanced{of(" of order 2 or more"), "order = 1"};
-  if (formulation.selective() && formulation.weighted)
-    return Unbalanced{of(" over this base"), "a base with a point gradient in its bonds: baqp, projection, bond_augmented"};
-  if (formulation.weighted && formulation.parts(parts.body->dimension()) == 1)
-    return Unbalanced{of(" and one part"), "several parts, or kinematics \"conventional\""};
   return std::nullopt;
 }
 
@@ -205,7 +201,7 @@ std::unique_ptr<WholeBody> build_whole(const Scene& scene, const ProblemParts& p
 }  // namespace
 
 std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
-                                           WorkSteps& steps) {
+                                           WorkSteps& steps, std::vector<TermMaker> further) {
   const bool quasi_static = integrator.quasi_static;
   ProblemParts parts;
   TermParts of_terms{
@@ -233,6 +229,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   std::vector<std::string> warnings;
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
+  of_terms.further = std::move(further);
   steps.begin("evaluation points");
   parts.terms = std::make_unique<Terms>(of_terms);
   parts.kinematics = scene.kinematics->type;

@@ -203,6 +203,7 @@ std::span<const CloudFamilies::CutBond> CloudFamilies::cut_bonds(std::size_t p) 
 
 void CloudFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) const {
   const std::span<const std::int32_t> family = neighbours(p);
+  out.owner = static_cast<std::int32_t>(p);
   out.resize(body_.dimension(), static_cast<int>(family.size()));
   std::copy(family.begin(), family.end(), out.far.begin());
   if (omega_.empty()) std::fill_n(out.omega.begin(), family.size(), 1.0);

@@ -17,6 +17,7 @@ struct FamilyArrays {
   AlignedVector<double> omega;      ///< b omega
   AlignedVector<double> integrity, whole;  ///< b, and omega without it, where some bond of the family is not whole; else empty
   std::vector<std::int32_t> far;    ///< internal indices
+  std::int32_t owner = -1;          ///< likewise; -1: of a class of points
   double inverse_shape[6] = {};     ///< K^-1; 0 where singular
 
   double whole_omega(std::size_t k) const noexcept { return whole.empty() ? omega[k] : whole[k]; }

@@ -153,7 +153,8 @@ void LatticeFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) cons
     broken = broken || now.b(s, lane) != 1;
   }
   load(of, out);
-  for (std::int32_t& far : out.far) far += static_cast<std::int32_t>(p);
+  out.owner = static_cast<std::int32_t>(p);
+  for (std::int32_t& far : out.far) far += out.owner;
   inverse_shape(now, lane, out.inverse_shape);
   if (!broken) return;
   out.whole = out.omega;

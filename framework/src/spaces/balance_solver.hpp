@@ -66,7 +66,7 @@ Solved solve(System& system, const Field& b, double wanted, const BalanceEffort&
       since = next < 0.5 * least ? 0 : since + 1;
       least = std::min(least, next);
       if (next > contradictory_growth * start) return {iterations, true};
-      if (since > 300 || next < 1e-30 * start) break;
+      if (since > 1000 || next < 1e-30 * start) break;
       combine(1, z, next / product, direction, direction);
       product = next;
     }

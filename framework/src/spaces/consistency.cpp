@@ -264,6 +264,28 @@ std::vector<std::uint8_t> storing_points(const SpaceParts& parts) {
   return stores;
 }
 
+/// Of the gradients of points, or of owners where the map is selective, then of those of parts.
+template <int D>
+Field find_shifts(const SpaceParts& parts, const ClosedPoints& closed, CloudConsistency& out) {
+  const Formulation& formulation = parts.formulation;
+  std::vector<Field> found;
+  const auto take = [&](Field field, const Balanced& result) {
+    found.push_back(std::move(field));
+    const int iterations = out.gradients.iterations + result.iterations;
+    const double before = std::max(out.gradients.before, result.before);
+    if (found.size() == 1 || result.after > out.gradients.after) out.gradients = result;
+    out.gradients.iterations = iterations;
+    out.gradients.before = before;
+  };
+  Balanced result;
+  if (formulation.point || formulation.selective()) take(find_shift<D>(parts, closed, out, result), result);
+  if (formulation.weighted && formulation.parts(D) > 0) take(find_part_shift<D>(parts, closed, out, result), result);
+  if (found.size() < 2) return found.empty() ? Field() : std::move(found.front());
+  Field both = parts.families.body().make_field(2 * D);
+  for (int c = 0; c < 2 * D; ++c) std::copy_n(found[static_cast<std::size_t>(c / D)].component(c % D), both.stride(), both.component(c));
+  return both;
+}
+
 void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudConsistency& out) {
   const auto begin = std::chrono::steady_clock::now();
   ClosedPoints closed = find_closed_points(parts.families, out.copy_from_sources);
@@ -273,11 +295,8 @@ void find_consistency(const SpaceParts& parts, EvaluationSpace& space, CloudCons
     out.unbalanced = 0;
     out.factors.clear();
     out.at_surfaces = of_all_ranks(closed.at_surfaces.size());
-    if (parts.formulation.point || parts.formulation.selective()) {
-      out.shift = with_dimension(parts.families.body().dimension(),
-                                 [&](auto d) { return find_shift<d>(parts, closed, out, out.gradients); });
-      space.shift_gradients(out.shift);
-    }
+    out.shift = with_dimension(parts.families.body().dimension(), [&](auto d) { return find_shifts<d>(parts, closed, out); });
+    if (out.shift.components() > 0) space.shift_gradients(out.shift);
     if (of_all_ranks(space.factors()) > 0 && out.whole + out.at_surfaces > 0) WeightSearch(parts, space, closed, out).run();
   };
   find();

@@ -36,7 +36,7 @@ struct CloudConsistency {
 
   bool found = false;
   AlignedVector<double> factors;  ///< f_q by number of the evaluation point; empty where there are none to choose
-  Field shift;                    ///< of point gradients (spaces/shift.hpp); no components where they stay
+  Field shift;                    ///< of point gradients, then of those of parts (spaces/shift.hpp); no components where they stay
   std::size_t whole = 0;          ///< points k with all components of A_k
   std::size_t unbalanced = 0;     ///< of them, that had to be let go
   std::size_t at_surfaces = 0;    ///< with the components along surfaces (closed_points.hpp)

@@ -31,12 +31,12 @@ class EvaluationSpace {
   /// What follows from the bonds of these points is to be made anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Weights of evaluation points may be multiplied by factors, of which there are so many; 0: they may not. Bonds of a cloud: by
-  /// place in the lists of the set-up; parts of families: point * parts + part.
+  /// place in the lists of the set-up.
   virtual std::size_t factors() const noexcept { return 0; }
   /// From now on W_q times factors[q]; empty: 1. They must outlive the space.
   virtual void set_factors(std::span<const double>) {}
-  /// Point gradients of order 1 on clouds: shifted by this field from now on (spaces/cloud_gradient.hpp). It must outlive the
-  /// space.
+  /// Point gradients of order 1 on clouds, and those of parts of families: shifted by this field from now on (spaces/shift.hpp). It
+  /// must outlive the space.
   virtual void shift_gradients(ConstFieldView) {}
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
@@ -58,7 +58,7 @@ struct SpaceParts {
   std::span<const double> factors = {};  ///< of the weights, as set_factors takes them; for assemblies
   std::shared_ptr<const Interfaces> interfaces = {};  ///< null: no laminates
 
-  ConstFieldView shift = {};  ///< of point gradients, as shift_gradients takes it; for assemblies
+  ConstFieldView shift = {};  ///< of gradients, as shift_gradients takes it; for assemblies
   bool history() const noexcept { return laws.state_components() > 0; }
   /// Evaluation points need numbers.
   bool numbered() const noexcept { return history() || interfaces; }

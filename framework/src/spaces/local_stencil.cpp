@@ -213,6 +213,27 @@ void LocalStencil<D>::weigh(const StencilRules& rules, const FamilyArrays& famil
 template <int D>
 void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields,
                             const double* const (*u)[D], double family_volume) {
+  make(rules, family, bond_share, fields, u, family_volume);
+  shift_.clear();
+  if (!rules.shift.data) return;
+  set_shift(rules, family);
+  shift_.gradients(fields, u);
+}
+
+template <int D>
+void LocalStencil<D>::set_shift(const StencilRules& rules, const FamilyArrays& family) {
+  const bool selective = rules.formulation->selective();
+  shift_.begin(rules.formulation->parts(D) > 0 ? points_ : selective ? 1 : 0, family);
+  std::vector<double> g(static_cast<std::size_t>(bonds_) * D);
+  for (int q = 0; q < shift_.points(); ++q) {
+    expand_one(q, g.data());
+    shift_.set(q, family, omega_.data() + static_cast<std::size_t>(q) * row_, g.data(), rules.shift, selective && q > 0 ? D : 0);
+  }
+}
+
+template <int D>
+void LocalStencil<D>::make(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields,
+                           const double* const (*u)[D], double family_volume) {
   bonds_ = family.bonds;
   row_ = family.size;
   fallbacks_ = dropped_ = 0;
@@ -310,6 +331,7 @@ void LocalStencil<D>::gradient(int field, int first, int n, double* H, std::size
                  Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
         sum.store(H + (c * D + static_cast<std::size_t>(e)) * stride + l);
       }
+  shift_.add_gradient(field, first, n, H, stride);
 }
 
 template <int D>
@@ -326,6 +348,7 @@ void LocalStencil<D>::add_stress(int first, int n, const double* P, std::size_t 
                  Pack::load(inverse + static_cast<std::size_t>(symmetric_index(D, a, e)) * lanes_ + l);
         sum.store(at);
       }
+  shift_.add_stress(first, n, P, stride);
 }
 
 template <int D>
@@ -342,21 +365,31 @@ void LocalStencil<D>::adjoint(double* const (&t)[D]) noexcept {
     for (std::size_t c = 0; c < D; ++c)
       for (std::size_t e = 0; e < D; ++e) t[c][b] += tested_[b] * omega_[q * row_ + b] * stress_[(c * D + e) * lanes_ + q] * lever_[e * row_ + b];
   }
+  if (!shift_.empty()) shift_.add_adjoint(t);
+}
+
+template <int D>
+void LocalStencil<D>::expand_one(int q, double* g) const {
+  const auto row = static_cast<std::size_t>(q);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
+    for (std::size_t e = 0; e < D; ++e) {
+      double sum = 0;
+      for (std::size_t a = 0; a < D; ++a)
+        sum += inverse(q, symmetric_index(D, static_cast<int>(a), static_cast<int>(e))) * lever_[a * row_ + k];
+      g[k * D + e] = omega_[row * row_ + k] * sum;
+    }
 }
 
 template <int D>
 void LocalStencil<D>::expand(std::vector<double>& g) const {
   const auto bonds = static_cast<std::size_t>(bonds_);
   g.assign(static_cast<std::size_t>(points_) * bonds * D, 0.0);
-  for (std::size_t q = 0; q < static_cast<std::size_t>(points_); ++q)
-    for (std::size_t k = 0; k < bonds; ++k)
-      for (std::size_t e = 0; e < D; ++e) {
-        double sum = 0;
-        for (std::size_t a = 0; a < D; ++a)
-          sum += inverse_[static_cast<std::size_t>(symmetric_index(D, static_cast<int>(a), static_cast<int>(e))) * lanes_ + q] *
-                 lever_[a * row_ + k];
-        g[(q * bonds + k) * D + e] = omega_[q * row_ + k] * sum;
-      }
+  for (int q = 0; q < points_; ++q) {
+    double* const to = g.data() + static_cast<std::size_t>(q) * bonds * D;
+    expand_one(q, to);
+    for (std::size_t k = 0; k < bonds && q < shift_.points(); ++k)
+      for (std::size_t e = 0; e < D; ++e) to[k * D + e] += shift_.d(q, k, e);
+  }
 }
 
 template class LocalStencil<1>;

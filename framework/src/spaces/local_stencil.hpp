@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "families/family_arrays.hpp"
+#include "perikit/core/field.hpp"
 #include "perikit/model/formulation.hpp"
+#include "spaces/stencil_shift.hpp"
 
 namespace perikit {
 
@@ -21,6 +23,8 @@ namespace perikit {
 struct StencilRules {
   const Formulation* formulation;
   double horizon;
+  /// Of balanced clouds, by point (spaces/shift.hpp): of the owners' gradients, where the map is selective, then of those of parts.
+  ConstFieldView shift = {};
   bool at_points() const noexcept { return formulation->point != nullptr; }  ///< a point gradient of higher order
   bool local() const noexcept { return formulation->force_state == ForceState::local; }
 };
@@ -50,10 +54,19 @@ class LocalStencil {
   void adjoint(double* const (&t)[D]) noexcept;
   /// g_qk, all of them: g[(q * bonds + k) * D + e].
   void expand(std::vector<double>& g) const;
+  /// The influence of bond k in evaluation point q, and an entry of K_q^-1, 0 where it has no gradient.
+  double influence(int q, int k) const noexcept { return omega_[static_cast<std::size_t>(q) * row_ + static_cast<std::size_t>(k)]; }
+  double inverse(int q, int entry) const noexcept { return inverse_[static_cast<std::size_t>(entry) * lanes_ + static_cast<std::size_t>(q)]; }
   /// Local force states: the factor of P_q g_qq; empty for others.
   const std::vector<double>& tested() const noexcept { return tested_; }
 
  private:
+  /// All but the shift.
+  void make(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields, const double* const (*u)[D],
+            double family_volume);
+  void set_shift(const StencilRules& rules, const FamilyArrays& family);
+  /// g_qk without the shift: g[k * D + e].
+  void expand_one(int q, double* g) const;
   void set_lever(const StencilRules& rules, const FamilyArrays& family);
   template <int Fields>
   void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
@@ -81,6 +94,7 @@ class LocalStencil {
   AlignedVector<double> share_;
   std::vector<std::uint8_t> regular_;
   std::vector<double> tested_;
+  StencilShift<D> shift_;
 };
 
 }  // namespace perikit

@@ -271,7 +271,7 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       const int k = first + l / 8 - owners_;
       const bool in = here >> lane & 1;
       s.owner[l] = members[lane < members.size() ? lane : 0];
-      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) * factor(s.owner[l], k) : 0.0;
+      s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) : 0.0;
       s.number[l] = k < 0 || !in ? -1 : number + 8 * k + static_cast<std::int64_t>(lane);
     }
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
@@ -281,9 +281,6 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       std::fill_n(s.far, 8 * n, -1);
       pass.add_samples(8 * n, s);
     }
-    for (int l = 0; l < 8 * n && alone && pass.work.balance(); ++l)
-      if (const int k = first + l / 8 - owners_; k >= 0 && l % 8 < g.count)
-        pass.work.balance()->factors[factor_of(s.owner[l], k)] = s.psi[l];
     if (alone) continue;
     if (selective_) add_pressures(8 * n, 8, s, tangent, m);
     scatter(first, n);

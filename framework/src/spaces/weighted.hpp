@@ -31,9 +31,10 @@ class Weighted final : public EvaluationSpace {
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override {
-    return cloud_ ? parts_ > 0 ? body_.points() * static_cast<std::size_t>(parts_) : families_.bonds() : 0;
+    return cloud_ && parts_ == 0 ? families_.bonds() : 0;
   }
   void set_factors(std::span<const double> factors) override { factor_ = factors.empty() ? nullptr : factors.data(); }
+  void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
 
  private:
@@ -70,6 +71,8 @@ class Weighted final : public EvaluationSpace {
   // Set-up (weighted_groups.cpp).
   void prepare_lattice();
   void prepare_cloud();
+  /// Clouds: counts what the stencils of all points lack, and keeps those with few evaluation points.
+  void make_cloud_stencils();
   /// Stencils of the classes, the most common ones first, up to the cap; by class: index of the stencil or -1.
   std::vector<std::int32_t> store_stencils();
   void group_points(std::span<const std::int32_t> points, std::int32_t family, std::int32_t stencil);
@@ -92,11 +95,9 @@ class Weighted final : public EvaluationSpace {
   /// A point with the family in m; `number` is that of its first evaluation point.
   std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
   void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
-  /// Of evaluation point k of a point of a cloud.
+  /// Of evaluation point k of a point of a cloud, where they belong to bonds.
   std::size_t factor_of(std::int32_t p, int k) const noexcept {
-    const auto at = static_cast<std::size_t>(p);
-    return (parts_ > 0 ? at * static_cast<std::size_t>(parts_) : static_cast<std::size_t>(cloud_->lists().first[at])) +
-           static_cast<std::size_t>(k);
+    return static_cast<std::size_t>(cloud_->lists().first[static_cast<std::size_t>(p)]) + static_cast<std::size_t>(k);
   }
   /// w / W of it; evaluation points of the map's owners, k < 0, have no weight.
   double factor(std::int32_t p, int k) const noexcept { return factor_ && k >= 0 ? factor_[factor_of(p, k)] : 1.0; }

@@ -110,8 +110,20 @@ void Weighted<D>::prepare_cloud() {
     members_.push_back(static_cast<std::int32_t>(p));
   }
   block_first_.push_back(groups_.size());
+  make_cloud_stencils();
+  cloud_colouring_ = cloud_colouring(body_, cloud_reach(cloud_->lists(), body_.points(), cloud_block), cloud_block);
+}
+
+template <int D>
+void Weighted<D>::shift_gradients(ConstFieldView lambda) {
+  rules_.shift = lambda;
+  make_cloud_stencils();
+}
+
+template <int D>
+void Weighted<D>::make_cloud_stencils() {
   std::vector<std::size_t> fallbacks(blocks(), 0), dropped(blocks(), 0);
-  if (parts_ > 0) sparse_.resize(blocks());
+  if (parts_ > 0) sparse_.assign(blocks(), {});
   parallel_for(blocks(), [&](std::size_t b) {
     Memory m;
     const auto member = [&](std::size_t g) { return g < groups_.size() ? groups_[g].first : members_.size(); };
@@ -126,7 +138,6 @@ void Weighted<D>::prepare_cloud() {
   });
   fallbacks_ = std::accumulate(fallbacks.begin(), fallbacks.end(), std::size_t{0});
   dropped_ = std::accumulate(dropped.begin(), dropped.end(), std::size_t{0});
-  cloud_colouring_ = cloud_colouring(body_, cloud_reach(cloud_->lists(), body_.points(), cloud_block), cloud_block);
 }
 
 template <int D>
@@ -201,6 +212,7 @@ void Weighted<D>::report(ModelReport& report) const {
 
 #define PERIKIT_INSTANTIATE(D)                                                          \
   template Weighted<D>::Weighted(const SpaceParts&);                                    \
+  template void Weighted<D>::shift_gradients(ConstFieldView);                           \
   template void Weighted<D>::bonds_changed(std::span<const std::int32_t>);              \
   template void Weighted<D>::load_class(std::int32_t, Memory&) const;                   \
   template void Weighted<D>::load_family(std::size_t, BondsOf, Memory&) const;          \

@@ -3,71 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "families/bond_finder.hpp"
 #include "perikit/core/dimension.hpp"
 #include "terms/family_point.hpp"
 #include "terms/pair_assembly.hpp"
+#include "terms/surface_correction.hpp"
 
 namespace perikit {
-
-namespace {
-
-/// Stiffness of the whole bonds of a family against a homogeneous stretch along each axis: 1/2 sum_j V_j w''(0) (|xi| cos^2)^2.
-template <int D>
-std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus, const FamilyArrays& family) {
-  const std::size_t n = family.size;
-  AlignedVector<double> omega(n, 0.0), rest(n, 0.0), moduli(n, modulus), stiffness(n, 0.0);
-  for (std::size_t k = 0; k < family.far.size(); ++k) omega[k] = family.whole_omega(k);
-  law.bond_law({family.bonds, family.length.data(), omega.data(), rest.data(), moduli.data(), nullptr, nullptr, stiffness.data()});
-  std::array<double, D> sum{};
-  for (std::size_t k = 0; k < family.far.size(); ++k)
-    for (std::size_t a = 0; a < D; ++a) {
-      const double extension = family.xi[a][k] * family.xi[a][k] / family.length[k];
-      sum[a] += 0.5 * family.volume[k] * stiffness[k] * extension * extension;
-    }
-  return sum;
-}
-
-/// m over what is left of the bonds, or over whole ones.
-double weighted_volume(const FamilyArrays& family, bool whole) {
-  double m = 0;
-  for (std::size_t k = 0; k < family.far.size(); ++k)
-    m += (whole ? family.whole_omega(k) : family.omega[k]) * family.length[k] * family.length[k] * family.volume[k];
-  return m;
-}
-
-/// A whole family of a regular lattice with the spacing of the body.
-template <int D>
-FamilyArrays regular_family(const Families& families) {
-  const Body& body = families.body();
-  Lattice lattice;
-  lattice.dimension = D;
-  lattice.spacing = body.spacing();
-  lattice.extent.fill(std::int64_t{1} << 20);
-  for (std::size_t a = D; a < 3; ++a) lattice.extent[a] = 1;
-  const auto offsets = family_offsets(lattice, body.horizon());
-  FamilyArrays family;
-  family.resize(D, static_cast<int>(offsets.size()));
-  std::vector<double> r, omega(offsets.size(), 1.0);
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    double square = 0;
-    for (std::size_t a = 0; a < D; ++a) {
-      family.xi[a][k] = offsets[k][a] * body.spacing();
-      square += family.xi[a][k] * family.xi[a][k];
-    }
-    family.length[k] = std::sqrt(square);
-    family.volume[k] = body.section() * std::pow(body.spacing(), D);
-    r.push_back(std::min(1.0, family.length[k] / body.horizon()));
-  }
-  if (families.needs().influence) families.influence()->evaluate(r, omega);
-  std::copy(omega.begin(), omega.end(), family.omega.begin());
-  return family;
-}
-
-}  // namespace
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
@@ -88,7 +32,7 @@ PairForces<D>::PairForces(const PairParts& parts)
   } else {
     fields_.modulus = std::move(modulus);
   }
-  if (formulation_.pair_traits.surface_correction) set_correction();
+  if (formulation_.pair_traits.surface_correction) fields_.correction = surface_correction<D>(families_, law_, laws_);
   if (interfaces_) set_sides();
 }
 
@@ -267,36 +211,6 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
         samples.add({own, family.far[k], 0.0, energy});
         if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy});
       }
-    }
-  });
-}
-
-template <int D>
-void PairForces<D>::set_correction() {
-  fields_.correction = body_.make_field(D);
-  const FamilyArrays regular = regular_family<D>(families_);
-  FamilyArrays family;
-  // Pre-cracks weaken a body on purpose: the correction is that of the uncut family.
-  families_.each_class([&](std::span<const std::int32_t> points) {
-    families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
-    const auto stiffness = [&](const FamilyArrays& of, PairPoint x) {
-      x.weighted_volume = weighted_volume(of, true);
-      return axial_stiffness<D>(law_, law_.moduli(x).bond, of);
-    };
-    std::array<double, D> G;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const auto p = static_cast<std::size_t>(points[k]);
-      if (k == 0 || !laws_.single()) {
-        G.fill(1.0);
-        if (!family.far.empty()) {
-          PairPoint x = point(p);
-          if (!(x.bulk() > 0)) x.moduli = {1, 1};   // ghosts: the correction is one of shape
-          const auto own = stiffness(family, x), exact = stiffness(regular, x);
-          for (std::size_t a = 0; a < D; ++a)
-            if (own[a] > 0) G[a] = exact[a] / own[a];
-        }
-      }
-      for (int a = 0; a < D; ++a) fields_.correction.component(a)[p] = G[static_cast<std::size_t>(a)];
     }
   });
 }

@@ -51,7 +51,6 @@ class PairForces final : public Term {
   /// Moduli of points with the same family, loaded without cuts.
   void set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus);
   void warn(const PairPoint& point, const MaterialRecord& record);
-  void set_correction();
   void set_sides();
   void renew_sides();
   PairPoint point(std::size_t p) const;

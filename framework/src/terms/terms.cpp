@@ -112,6 +112,7 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     terms_.push_back(std::move(mechanics));
   }
   if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
+  for (const TermMaker& make : parts_.further) terms_.push_back(make(parts_));
   if (!parts_.damage) return;
   const NearestFailure* known = nullptr;
   for (const auto& term : terms_) {

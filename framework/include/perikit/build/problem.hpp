@@ -12,9 +12,9 @@
 namespace perikit {
 
 /// Builds everything that the scene describes, by parts from `factory`, for an integrator with these traits. Where the communicator
-/// has several ranks: this rank's part of it. steps: where it is told what takes time. Throws InputError for what only building
-/// can show.
+/// has several ranks: this rank's part of it. steps: where it is told what takes time. further: what acts beside what the scene
+/// names. Throws InputError for what only building can show.
 std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
-                                           WorkSteps& steps);
+                                           WorkSteps& steps, std::vector<TermMaker> further = {});
 
 }  // namespace perikit

@@ -2,6 +2,7 @@
 /// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to them. Their sum
 /// as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds that fail.
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -27,6 +28,10 @@ struct Interfaces;
 class Term;
 class VolumetricRows;
 
+struct TermParts;
+/// Makes a term (terms/term.hpp) of what those of the formulation are made of.
+using TermMaker = std::function<std::unique_ptr<Term>(const TermParts&)>;
+
 /// What the terms of a formulation are made of. families, laws and damage must outlive them.
 struct TermParts {
   Families* families = nullptr;
@@ -38,6 +43,7 @@ struct TermParts {
   const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
   std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
   std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
+  std::vector<TermMaker> further;                      ///< what acts beside the formulation
 };
 
 class Terms {

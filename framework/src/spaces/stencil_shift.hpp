@@ -1,0 +1,39 @@
+#pragma once
+#include "families/family_arrays.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+/// What a balanced cloud adds to the gradients of a family (spaces/shift.hpp): d_qk of its first evaluation points, H_q += sum_k u_k
+/// (x) d_qk, and t_k += sum_q P_q d_qk.
+template <int D>
+class StencilShift {
+ public:
+  /// No evaluation point is shifted.
+  void clear() noexcept { points_ = 0; }
+  bool empty() const noexcept { return points_ == 0; }
+  /// d = 0 for so many evaluation points.
+  void begin(int points, const FamilyArrays& family);
+  /// d_qk <- omega_k V_k (lambda_k - G xi_k), G = sum_k lambda_k (x) g_k, with the influence omega[k] of the evaluation point, its
+  /// gradient g[k * D + e] and components first ... of lambda, by point.
+  void set(int q, const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first);
+  /// Takes the fields (local_stencil.hpp).
+  void gradients(int fields, const double* const (*u)[D]);
+
+  // As those of LocalStencil.
+  void add_gradient(int field, int first, int n, double* H, std::size_t stride) const noexcept;
+  void add_stress(int first, int n, const double* P, std::size_t stride) noexcept;
+  void add_adjoint(double* const (&t)[D]) const noexcept;
+  double d(int q, std::size_t k, std::size_t e) const noexcept { return row(q, e)[k]; }
+  int points() const noexcept { return points_; }
+
+ private:
+  const double* row(int q, std::size_t e) const noexcept { return d_.data() + (static_cast<std::size_t>(q) * D + e) * row_; }
+
+  int points_ = 0;
+  std::size_t bonds_ = 0, row_ = 0;
+  AlignedVector<double> d_;       ///< [(q D + e) row + k]
+  AlignedVector<double> H_, P_;   ///< of the fields: [((field points + q) D + c) D + e], and of stresses: [(q D + c) D + e]
+};
+
+}  // namespace perikit

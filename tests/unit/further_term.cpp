@@ -1,0 +1,214 @@
+/// A term that no other file knows: springs that hold every point where it was, stiffer the farther it has gone. It is part of
+/// energies, forces, tangent actions, assembled tangents, samples, and of equilibria, with bonds that fail, too.
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "perikit/build/problem.hpp"
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/field_operations.hpp"
+#include "perikit/core/work_steps.hpp"
+#include "perikit/plugin/registry.hpp"
+#include "perikit/scene/scene.hpp"
+#include "terms/term.hpp"
+
+using namespace perikit;
+
+namespace {
+
+constexpr double stiffness = 0.3, length = 0.5;  // k [N/m^4], and how far a spring goes until it is twice as stiff
+
+/// Adds its blocks to the diagonal.
+class FoundationAssembly final : public Assembly {
+ public:
+  explicit FoundationAssembly(const BlockRows& rows) : rows_(rows) {}
+  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  void bonds_changed() override {}
+  std::size_t bytes() const noexcept override { return 0; }
+
+ private:
+  const BlockRows& rows_;
+};
+
+/// E = sum_i V_i k (|u_i|^2 / 2 + |u_i|^4 / (4 l^2)).
+class Foundation final : public Term {
+ public:
+  explicit Foundation(const TermParts& parts) : body_(parts.families->body()) {}
+
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
+    for (const std::int32_t p : body_.internal()) {
+      const double k = stiffness * body_.volume(static_cast<std::size_t>(p)), square = square_of(u, p);
+      for (int c = 0; c < u.components; ++c) force.component(c)[p] -= k * (1 + square / (length * length)) * u.component(c)[p];
+      if (energy) energy->add(k * (square / 2 + square * square / (4 * length * length)));
+    }
+    return -1;
+  }
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    for (const std::int32_t p : body_.internal())
+      for (int c = 0; c < u.components; ++c)
+        for (int e = 0; e < u.components; ++e) Kw.component(c)[p] += body_.volume(static_cast<std::size_t>(p)) * entry(u, p, c, e) * w.component(e)[p];
+    return -1;
+  }
+  std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override {
+    for (const std::int32_t p : body_.internal()) {
+      const double square = square_of(u, p);
+      samples.strain_energy_density.data()[p] += stiffness * (square / 2 + square * square / (4 * length * length));
+    }
+    return -1;
+  }
+  int steps() const noexcept override { return 1; }
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override { return std::make_unique<FoundationAssembly>(rows); }
+  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum* energy) override {
+    return add_forces(u, force, energy);
+  }
+  void add_bonds(ConstFieldView, const GroupMarks&, const GroupMarks&, BondSamples&) override {}
+  void bonds_changed(std::span<const std::int32_t>) override {}
+  const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
+  void screen(BondScreen*) override {}
+  void report(ModelReport& report) const override { report.notes.emplace_back("foundation", "springs at all points"); }
+  QuietCounts quiet_counts() const noexcept override { return {}; }
+
+  /// d2E/du_c du_e of a unit of volume.
+  static double entry(ConstFieldView u, std::int32_t p, int c, int e) {
+    const double along = 2 * u.component(c)[p] * u.component(e)[p] / (length * length);
+    return stiffness * ((c == e ? 1 + square_of(u, p) / (length * length) : 0.0) + along);
+  }
+
+ private:
+  static double square_of(ConstFieldView u, std::int32_t p) {
+    double square = 0;
+    for (int c = 0; c < u.components; ++c) square += u.component(c)[p] * u.component(c)[p];
+    return square;
+  }
+
+  const Body& body_;
+};
+
+std::int64_t FoundationAssembly::add(ConstFieldView u, BlockMatrix& K) {
+  const auto d = static_cast<std::size_t>(u.components);
+  for (std::size_t r = 0; r < rows_.size(); ++r)
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+      for (std::size_t c = 0; c < d && K.column[b] == static_cast<std::int32_t>(r); ++c)
+        for (std::size_t e = 0; e < d; ++e)
+          K.values[(b * d + c) * d + e] +=
+              rows_.volume(r) * Foundation::entry(u, static_cast<std::int32_t>(rows_.point(r)), static_cast<int>(c), static_cast<int>(e));
+  return -1;
+}
+
+Registry& parts() {
+  static Registry registry;
+  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  return registry;
+}
+
+/// A plate of 9 x 7 points of E = 2, nu = 0.25.
+std::string plate(const std::string& kinematics, const std::string& further, const std::string& integrator = "evaluate") {
+  return "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 1\nlower = [0, 0]\nupper = [9, 7]\n"
+         "[family]\nhorizon_ratio = 2.515\n[kinematics]\n" +
+         kinematics + "\n[material]\ntype = \"neo_hookean\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.25\ndensity = 1\n" + further +
+         "\n[integrator]\ntype = \"" + integrator + "\"\n";
+}
+
+std::unique_ptr<BodyProblem> with_foundation(const std::string& scene) {
+  WorkSteps steps({});
+  const Scene read = parse_scene(scene, "plate.toml", parts());
+  return build_problem(read, parts(), parts().integrator(*read.integrator)->traits(), steps,
+                       {[](const TermParts& of) { return std::make_unique<Foundation>(of); }});
+}
+
+void fill(const BodyProblem& problem, FieldView u, double scale) {
+  for (const std::int32_t p : problem.body().internal()) {
+    const Point x = problem.body().position(static_cast<std::size_t>(p));
+    u.component(0)[p] = scale * std::sin(0.4 * x[0] + 0.7 * x[1]);
+    u.component(1)[p] = scale * std::cos(0.9 * x[0] - 0.3 * x[1]);
+  }
+}
+
+struct Nobody final : Observer {
+  bool wants_sample(std::int64_t, double) override { return false; }
+  void step_done(const StepReport&) override {}
+  void log(std::string_view) override {}
+};
+
+double product(const BodyProblem& problem, ConstFieldView a, ConstFieldView b) {
+  double sum = 0;
+  for (int c = 0; c < a.components; ++c)
+    for (const std::int32_t p : problem.body().internal()) sum += a.component(c)[p] * b.component(c)[p];
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("a further term: force = -dE/du, tangent = dF/du, the same assembled, beside every kind of formulation") {
+  for (const char* kinematics : {"type = \"baqp\"", "type = \"conventional\"\nstabilization = \"silling\"", "type = \"bond_based\"", "type = \"sub_horizon\""}) {
+    INFO(kinematics);
+    const std::unique_ptr<BodyProblem> problem = with_foundation(plate(kinematics, ""));
+    Field u = problem->make_field(), w = u, f = u, other = u, Kw = u;
+    fill(*problem, u, 0.12);
+    fill(*problem, w, 0.3);
+    for (double& x : std::span(w.data(), w.size())) x = x * x - 0.04;
+    const double h = 1e-4;
+    const auto at = [&](double s, FieldView force) {
+      Field moved = problem->make_field();
+      combine(1, u, s, w, moved);
+      double energy = 0;
+      REQUIRE(problem->evaluate_forces(moved, force, &energy).ok());
+      return energy;
+    };
+    const double slope = (8 * (at(h, other) - at(-h, other)) - (at(2 * h, other) - at(-2 * h, other))) / (12 * h);
+    at(0, f);
+    CHECK(std::abs(slope + product(*problem, f, w)) <= 1e-8 * std::abs(slope));
+    REQUIRE(problem->tangent_action(u, w, Kw).ok());
+    const auto along = [&](double s) {
+      at(s, other);
+      return -product(*problem, other, w);
+    };
+    const double curvature = (8 * (along(h) - along(-h)) - (along(2 * h) - along(-2 * h))) / (12 * h);
+    CHECK(std::abs(curvature - product(*problem, Kw, w)) <= 1e-7 * std::abs(curvature));
+    BlockMatrix K;
+    REQUIRE(problem->assemble_tangent(u, K).ok());
+    double worst = 0, most = 0;
+    for (std::size_t r = 0; r < K.rows(); ++r)
+      for (std::size_t a = 0; a < 2; ++a) {
+        double sum = 0;
+        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+          for (std::size_t e = 0; e < 2; ++e)
+            sum += K.values[(b * 2 + a) * 2 + e] * w.component(static_cast<int>(e))[K.point[static_cast<std::size_t>(K.column[b])]];
+        worst = std::max(worst, std::abs(sum - Kw.component(static_cast<int>(a))[K.point[r]]));
+        most = std::max(most, std::abs(sum));
+      }
+    CHECK(worst <= 1e-12 * most);
+  }
+}
+
+TEST_CASE("a further term: equilibrium under a body force, which the springs alone balance") {
+  // A uniform displacement strains nothing: k V u (1 + u^2/l^2) = b V.
+  const std::string scene = plate("type = \"baqp\"", "[[load]]\nset = \"all\"\nbody_force = [0.4, 0]", "newton");
+  const Scene read = parse_scene(scene, "plate.toml", parts());
+  const std::unique_ptr<BodyProblem> problem = with_foundation(scene);
+  Nobody observer;
+  parts().integrator(*read.integrator)->run(*problem, observer);
+  double root = 1;
+  for (int k = 0; k < 50; ++k)
+    root -= (stiffness * root * (1 + root * root / (length * length)) - 0.4) / (stiffness * (1 + 3 * root * root / (length * length)));
+  const ConstFieldView u = problem->state().displacement();
+  for (const std::int32_t p : problem->body().internal()) {
+    CHECK(std::abs(u.component(0)[p] - root) < 1e-8);
+    CHECK(std::abs(u.component(1)[p]) < 1e-8);
+  }
+}
+
+TEST_CASE("a further term: the account of energies holds where bonds fail") {
+  const std::unique_ptr<BodyProblem> problem =
+      with_foundation(plate("type = \"bond_based\"", "[damage]\ntype = \"critical_stretch\"\nstretch = 0.05"));
+  Field u = problem->make_field(), f = u;
+  fill(*problem, u, 0.1);
+  copy(u, problem->state().displacement());
+  double before = 0, after = 0;
+  REQUIRE(problem->evaluate_forces(u, f, &before).ok());
+  const BondUpdate update = problem->terms().update_bonds(u);
+  REQUIRE(update.changed > 0);
+  REQUIRE(problem->evaluate_forces(u, f, &after).ok());
+  CHECK(std::abs(before - after - update.dissipated) <= 1e-12 * before);
+}
