@@ -7,6 +7,7 @@
 #include <random>
 
 #include "body/positions_file.hpp"
+#include "build/partial_cells.hpp"
 #include "build/sets.hpp"
 #include "build/size_check.hpp"
 #include "build/volumes.hpp"
@@ -62,9 +63,6 @@ std::vector<std::int32_t> kept_cells(const LatticeDescription& description, cons
   return kept;
 }
 
-/// Cells of a lattice with less of their volume inside have no point.
-constexpr double least_share = 0.5;
-
 /// The cells as a cloud, moved at random by at most `jitter` spacings along each axis.
 Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std::int32_t>& cells) {
   const LatticeDescription& description = *scene.body.lattice;
@@ -94,31 +92,18 @@ Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std:
   return Body(frame(scene, description.spacing), positions, volumes);
 }
 
-/// The cells of a lattice that lie inside at least in part, as a cloud on its places, with what lies inside as their volumes.
+/// The cells of a lattice that lie inside at least in part, as a cloud.
 Body partial_cells(const Scene& scene, const Lattice& lattice) {
   const LatticeDescription& description = *scene.body.lattice;
-  const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
-  const std::array<std::int64_t, 3> cells = input_cells(lattice);
-  std::vector<Point> positions;
-  std::vector<double> volumes;
-  std::array<std::int64_t, 3> k{};
-  for (k[2] = 0; k[2] < cells[2]; ++k[2])
-    for (k[1] = 0; k[1] < cells[1]; ++k[1])
-      for (k[0] = 0; k[0] < cells[0]; ++k[0]) {
-        std::array<std::int64_t, 3> inner{};
-        for (std::size_t a = 0; a < 3; ++a) inner[a] = k[static_cast<std::size_t>(lattice.axis[a])];
-        const Point x = lattice.position(lattice.index(inner[0], inner[1], inner[2]));
-        const double share = share_inside(*description.inside, x, description.spacing, scene.body.dimension);
-        if (share < least_share) continue;
-        positions.push_back(x);
-        volumes.push_back(share * whole);
-      }
-  if (positions.empty()) {
+  PartialCells cells = cells_inside(*description.inside, lattice, input_cells(lattice));
+  if (cells.position.empty()) {
     throw InputError(
         description.position, "body.lattice.inside",
         "found an expression that keeps no cell of the lattice; allowed: one that is true in a part of one cell or more");
   }
-  return Body(frame(scene, description.spacing), positions, volumes);
+  const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
+  for (double& volume : cells.volume) volume *= whole;
+  return Body(frame(scene, description.spacing), cells.position, cells.volume);
 }
 
 Body lattice_body(const Scene& scene) {

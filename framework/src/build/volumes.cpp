@@ -37,13 +37,19 @@ double squared_distance(const Point& a, const Point& b) {
 
 }  // namespace
 
-double share_inside(const Expression& inside, const Point& centre, double spacing, int dimension) {
+PartOfCell part_inside(const Expression& inside, const Point& centre, double spacing, int dimension) {
   int all = 0, in = 0;
+  Point sum{};  // of distances from the centre, which is exact where all of the cell is inside
   over_grid(centre, 0.5 * spacing, samples(dimension), dimension, [&](const Point& x) {
     ++all;
-    in += inside(x) != 0;
+    if (inside(x) == 0) return;
+    ++in;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += x[c] - centre[c];
   });
-  return static_cast<double>(in) / all;
+  PartOfCell part{static_cast<double>(in) / all, centre};
+  if (in > 0 && in < all)
+    for (std::size_t c = 0; c < 3; ++c) part.centroid[c] += sum[c] / in;
+  return part;
 }
 
 std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,

@@ -13,7 +13,11 @@ namespace perikit {
 std::vector<double> voronoi_volumes(std::span<const Point> points, int dimension, const Point& lower, const Point& upper,
                                     const Expression* inside);
 
-/// Share of the cell of a lattice around a place that is inside.
-double share_inside(const Expression& inside, const Point& centre, double spacing, int dimension);
+/// What of the cell of a lattice around a place is inside: its share of the cell and its centroid.
+struct PartOfCell {
+  double share = 0;
+  Point centroid{};
+};
+PartOfCell part_inside(const Expression& inside, const Point& centre, double spacing, int dimension);
 
 }  // namespace perikit

@@ -97,7 +97,7 @@ ParameterTable family_parameters() {
   table.number("horizon_ratio", "-", "Horizon over the spacing of the points.").at_least(1);
   table.number("horizon", "m", "Horizon as a length.").positive();
   table.part("influence", Kind::influence, "Influence function.").by_default("\"constant\"");
-  table.boolean("partial_volume", "Lattices: cells that `inside` cuts count with the share of their volume that lies inside.")
+  table.boolean("partial_volume", "Lattices: points of cells that `inside` cuts stand for what of these lies inside, at its centroid.")
       .by_default("false");
   table.boolean(
       "consistent",
