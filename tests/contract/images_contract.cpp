@@ -22,7 +22,16 @@ std::string held(const char* face, const char* displacement) {
 std::string symmetric(char axis) { return fmt::format("[[symmetry]]\naxis = \"{}\"\n", axis); }
 std::string periodic(char axis) { return fmt::format("[[periodic]]\naxis = \"{}\"\n", axis); }
 
+/// A hole of radius 20 beside the body, whose rim is held, and a plane that meets it.
+std::string held_surface(int dimension) {
+  const char* const level[]{"-0.1 - x", "20 - sqrt((x + 20.1)^2 + (y - 4)^2)", "20 - sqrt((x + 20.1)^2 + (y - 2)^2 + (z - 1)^2)"};
+  const char* const displacement[]{"[0.1]", "[0.1, \"0.1*y\"]", "[0.1, \"0.1*y\", \"0.1*x\"]"};
+  return fmt::format("[[boundary]]\nsurface = \"{}\"\ndisplacement = {}\n", level[dimension - 1], displacement[dimension - 1]) +
+         (dimension > 1 ? symmetric('y') : "");
+}
+
 /// Every kinematics between faces of all sorts, on lattices and clouds, in two mixtures a dimension; a cracked body of two materials among them.
+/// On clouds there is a curved surface, too.
 std::vector<Case> cases_with_images() {
   const std::array<std::array<std::string, 2>, 3> mixtures{{
       {held("-x", "[0.0]"), periodic('x')},
@@ -31,7 +40,7 @@ std::vector<Case> cases_with_images() {
   }};
   std::vector<Case> all;
   for (const Example& example : kinematics_examples())
-    for (int d = 1; d <= 3; ++d)
+    for (int d = 1; d <= 3; ++d) {
       for (int k = 0; k < 2; ++k)
         for (const bool cloud : {false, true}) {
           if (d == 3 && cloud == (k == 0)) continue;   // in 3D, where they take the longest, one of each
@@ -45,6 +54,14 @@ std::vector<Case> cases_with_images() {
           body.conditions = mixtures[static_cast<std::size_t>(d - 1)][static_cast<std::size_t>(k)];
           all.push_back({example, body});
         }
+      BodyOptions body;
+      body.dimension = d;
+      body.cloud = body.two_materials = true;
+      body.material = "type = \"neo_hookean\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
+      body.cells = d == 3 ? 6 : d == 2 ? 9 : 20;
+      body.conditions = held_surface(d);
+      all.push_back({example, body});
+    }
   return all;
 }
 

@@ -67,6 +67,11 @@ def with_face(text):
     return text[:begin] + '[[boundary]]\nset = "all"\nface = "-x"\n' + motion + text[end:]
 
 
+def with_surface(text):
+    """The face is the rim of a large hole."""
+    return with_face(text).replace('set = "all"\nface = "-x"', 'surface = "200 - sqrt((x + 200.2)^2 + (y - 12)^2)"', 1)
+
+
 SYMMETRY = '[[symmetry]]\naxis = "y"\n'
 BEYOND = {
     "face": with_face,
@@ -89,11 +94,14 @@ def beyond(everything):
         yield "baqp, max_stress, cloud", torn(KINEMATICS["baqp"], DAMAGE["max_stress"], True)
         yield "silling, order 2, lattice", scene(KINEMATICS["silling, order 2"], 2)
         yield "baqp, face and symmetry, cloud", BEYOND["face and symmetry"](scene(KINEMATICS["baqp"], 2, True))
+        yield "baqp, surface and symmetry, cloud", with_surface(scene(KINEMATICS["baqp"], 2, True)) + SYMMETRY
         yield "bond_based, torn, periodic", BEYOND["periodic"](torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], False))
         yield "projection, pressure, symmetry", pressed(scene(KINEMATICS["projection"], 2), 'set = "all"', True) + SYMMETRY
         return
     for (name, kinematics), (plane, change), cloud in itertools.product(KINEMATICS.items(), BEYOND.items(), (False, True)):
         yield "%s, %s, %s" % (name, plane, "cloud" if cloud else "lattice"), change(scene(kinematics, 2, cloud))
+    for name, kinematics in KINEMATICS.items():
+        yield "%s, surface and symmetry, cloud" % name, with_surface(scene(kinematics, 2, True)) + SYMMETRY
     for (plane, change), cloud in itertools.product(BEYOND.items(), (False, True)):
         kind = "%s, %s" % (plane, "cloud" if cloud else "lattice")
         for name in ("bond_based", "silling", "baqp"):

@@ -60,6 +60,8 @@ struct Fault {
 #define REGION \
   "[[region]]\nset = \"left\"\nmaterial = { type = \"neo_hookean\", density = 1, shear_modulus = 1, bulk_modulus = 2 }\n"
 
+#define SURFACE(level) "[[boundary]]\nsurface = \"" level "\"\ndisplacement = [0, 0]\n"
+
 const Fault faults[]{
     {"sets", "left", "\"x < 0\"", "", 0, "sets.left", "found a condition that holds at no point",
      "one that holds at one point or more"},
@@ -165,6 +167,18 @@ const Fault faults[]{
      "boundary.1.velocity", "found a face with a velocity beside one with a displacement", "the same key for both"},
     {"integrator", "type", "\"newton\"\n[constants]", "[[boundary]]\nface = \"+x\"\nvelocity = [0, 0]\n", 1003,
      "boundary.1.velocity", "found in a quasi-static run", "displacement"},
+    // held surfaces
+    {"", "format", "1", SURFACE("x - 6"), 1002, "boundary.1.surface", "found it on a lattice, which has no places", "family.partial_volume = true"},
+    {"body.lattice", "jitter", "0.1", SURFACE("x - 16"), 1002, "boundary.1.surface", "found a surface that no point touches", "zero on a side of the body"},
+    {"body.lattice", "jitter", "0.1", SURFACE("x - 4.2"), 1002, "boundary.1.surface", "found a surface in front of the point at (", "negative at all points"},
+    {"body.lattice", "jitter", "0.1", SURFACE("abs(y - 2) - 2.1"), 1002, "boundary.1.surface", "that another part of itself comes near", "for each of two sides"},
+    {"body.lattice", "jitter", "0.1", SURFACE("sqrt(4 - x) - 9"), 1002, "boundary.1.surface", "is nan at x = (", "finite values"},
+    {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") SURFACE("2*x - 12.4"), 1005, "boundary.2.surface", "found a surface that boundary.1.surface has too", "one of the two"},
+    {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") "[[symmetry]]\naxis = \"x\"\nat = 6.2\n", 1002, "boundary.1.surface",
+     "found a surface that symmetry.0.axis has too", "one of the two"},
+    {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") "[[crack]]\nsegment = [[3, 2], [9, 2]]\n", 1002, "boundary.1.surface",
+     "found crack.0 within two horizons of the surface", "cracks that end farther away"},
+    {"body.lattice", "jitter", "0.1", SURFACE("-0.3 - x"), 24, "boundary.0", "held in x, and its face by another", "one of them"},
     {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"cauchy\"\ncomponent = \"xx\"\n",
      1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
 };

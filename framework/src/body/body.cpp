@@ -82,7 +82,7 @@ Body::Body(const Body& whole, const Images& images, std::uint16_t image_material
   } else {
     std::vector<double> volumes;
     for (const std::int32_t p : whole.internal_) volumes.push_back(whole.volume(static_cast<std::size_t>(p)));
-    for (const std::int32_t source : images.source) volumes.push_back(volumes[static_cast<std::size_t>(source)]);
+    for (std::size_t k = 0; k < images.size(); ++k) volumes.push_back(images.volume[k] * volumes[static_cast<std::size_t>(images.source[k])]);
     place_cloud(positions, volumes);
   }
   std::vector<std::int32_t> place(whole.stride_, -1);

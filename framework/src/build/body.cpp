@@ -7,6 +7,7 @@
 #include <random>
 
 #include "body/positions_file.hpp"
+#include "build/held_surfaces.hpp"
 #include "build/partial_cells.hpp"
 #include "build/sets.hpp"
 #include "build/size_check.hpp"
@@ -75,6 +76,7 @@ Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std:
       x[static_cast<std::size_t>(a)] += description.jitter * description.spacing * centred(random);
     positions.push_back(x);
   }
+  keep_off_surfaces(scene, description.spacing, positions);
   std::vector<double> volumes(positions.size(), std::pow(description.spacing, scene.body.dimension));
   if (scene.body.voronoi) {
     // The box of the cells that there are: jittered points may leave it by no more than half a spacing.
@@ -103,6 +105,7 @@ Body partial_cells(const Scene& scene, const Lattice& lattice) {
   }
   const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
   for (double& volume : cells.volume) volume *= whole;
+  keep_off_surfaces(scene, description.spacing, cells.position);
   return Body(frame(scene, description.spacing), cells.position, cells.volume);
 }
 

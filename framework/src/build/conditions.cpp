@@ -95,7 +95,7 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
       throw InputError(boundary.position, fmt::format("boundary.{}.velocity", k),
                        "found in a quasi-static run; allowed: displacement");
     refuse_ramp(boundary.ramp, fmt::format("boundary.{}", k), quasi_static);
-    if (!boundary.face.empty()) continue;  // the images have it
+    if (boundary.holds_side()) continue;  // the images have it
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
       prescriptions.push_back({boundary.velocity, static_cast<int>(c),
@@ -109,7 +109,7 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
     return Constraints(body, std::move(prescriptions), images, std::move(motions));
   } catch (const std::domain_error& error) {
     for (std::size_t k = 0; k < scene.boundaries.size(); ++k)
-      if (scene.boundaries[k].velocity && !scene.boundaries[k].face.empty()) throw InputError(scene.boundaries[k].position, fmt::format("boundary.{}.velocity", k), error.what());
+      if (scene.boundaries[k].velocity && scene.boundaries[k].holds_side()) throw InputError(scene.boundaries[k].position, fmt::format("boundary.{}.velocity", k), error.what());
     throw;
   }
 }
@@ -142,7 +142,7 @@ void start_from(const std::filesystem::path& results, const Body& body, State& s
 
 void set_initial_state(const Scene& scene, const Body& body, const Constraints& constraints, bool quasi_static, State& state) {
   for (const BoundaryDescription& boundary : scene.boundaries)
-    if (scene.initial_from && (boundary.velocity || quasi_static) && !boundary.face.empty())
+    if (scene.initial_from && (boundary.velocity || quasi_static) && boundary.holds_side())
       throw InputError(boundary.position, "boundary",
                        "found a face together with initial.from, whose results do not say where the face was; allowed: in "
                        "explicit runs a face with a displacement");

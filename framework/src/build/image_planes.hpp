@@ -1,5 +1,5 @@
 #pragma once
-/// From [[boundary]] with face, [[symmetry]] and [[periodic]] to the planes that points have images behind.
+/// From [[boundary]] with face or surface, [[symmetry]] and [[periodic]] to the planes and surfaces that points have images behind.
 
 #include <string>
 #include <vector>
@@ -17,7 +17,8 @@ struct ScenePlanes {
   };
   std::vector<ImagePlane> planes;
   std::vector<Origin> origins;           ///< of the planes
-  std::vector<FaceMotion> motions;       ///< what ImagePlane::motion numbers
+  std::vector<ImageSurface> surfaces;
+  std::vector<FaceMotion> motions;       ///< what ImagePlane::motion and ImageSurface::motion number
 };
 
 /// Throws InputError for faces without points, planes through the body, faces held twice.

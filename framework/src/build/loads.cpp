@@ -60,9 +60,9 @@ void refuse_pressure(const Scene& scene, const LoadDescription& load, const Term
   if (!load.follower) return;
   if (parts.formulation.pairs)
     refuse("found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
-  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return !boundary.face.empty(); }))
+  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
     refuse(
-        "found with follower = true and a [[boundary]] with a face, whose images have no deformation gradient of their own; "
+        "found with follower = true and a [[boundary]] with a face or surface, whose images have no deformation gradient of their own; "
         "allowed: a boundary that holds a set");
 }
 

@@ -9,6 +9,7 @@
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
 #include "build/gradient_order.hpp"
+#include "build/held_surfaces.hpp"
 #include "build/image_planes.hpp"
 #include "build/interfaces.hpp"
 #include "build/materials.hpp"
@@ -37,15 +38,15 @@ struct Beyond {
 
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   ScenePlanes planes = build_planes(scene, body, quasi_static);
-  if (planes.planes.empty()) return {};
-  const ScenePlanes::Origin& any = planes.origins.front();
-  Images images = make_images(body, planes.planes);
+  add_surfaces(scene, body, quasi_static, planes);
+  if (planes.planes.empty() && planes.surfaces.empty()) return {};
+  Images images = make_images(body, planes.planes, planes.surfaces);
   try {
     body = Body(body, images, image_material(scene));
   } catch (const std::domain_error& error) {
-    // Only sides of parts of a body can have something beyond them.
+    // Only sides of parts of a lattice can have something beyond them.
     const auto of_part = std::ranges::find_if(planes.origins, [](const auto& origin) { return origin.set != "all"; });
-    const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? any : *of_part;
+    const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? planes.origins.front() : *of_part;
     throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
   }
   return {std::move(images), {}, std::move(planes.motions), nullptr};
@@ -141,7 +142,9 @@ std::optional<Unbalanced> unbalanced(const Scene& scene, const ProblemParts& par
 /// can be, a scene that says true is refused, and others get a warning.
 std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const ProblemParts& parts, const Formulation& formulation,
                                                     std::vector<std::string>& warnings) {
-  if (!scene.consistent.value_or(scene.random_points())) return nullptr;
+  // Cells that a held surface cuts, and images behind it, lie at random to each other.
+  const bool surfaces = std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); });
+  if (!scene.consistent.value_or(scene.random_points() || surfaces)) return nullptr;
   if (const auto reason = unbalanced(scene, parts, formulation)) {
     if (scene.consistent)
       throw InputError(scene.consistent_position, "family.consistent",

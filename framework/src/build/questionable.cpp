@@ -69,7 +69,7 @@ void find_jumps(const Scene& scene, const Body& body, bool quasi_static, State& 
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
     const BoundaryDescription& boundary = scene.boundaries[k];
     // A velocity from rest is a plain impact.
-    if (!boundary.face.empty() || (boundary.velocity && !given)) continue;
+    if (boundary.holds_side() || (boundary.velocity && !given)) continue;
     const ConstFieldView start = boundary.velocity ? state.velocity() : state.displacement();
     bool told = false;
     for (std::size_t c = 0; c < boundary.components.size() && !told; ++c) {

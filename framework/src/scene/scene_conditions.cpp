@@ -41,8 +41,11 @@ void SceneReader::read_boundaries(const toml::table& root) {
       check_axis(description.face[1], values, "face");
       description.face_position = values.position(values.has("at") ? "at" : "face");
       if (!values.has("set")) description.set = "all";
-    } else if (!values.has("set")) {
-      reader_.errors.add(reader_.position(*boundary), values.path() + ".set", "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face of the body");
+    } else if (values.has("surface")) {
+      description.set = "all";
+      description.face_position = values.position("surface");
+    } else if (!values.has("set") && !boundary->contains("surface")) {
+      reader_.errors.add(reader_.position(*boundary), values.path() + ".set", "found nothing; allowed: " + allowed(*table.find("set")) + ", or a face or surface of the body");
     }
     if (values.has("at")) {
       description.at = values.number("at");
@@ -53,9 +56,23 @@ void SceneReader::read_boundaries(const toml::table& root) {
       if (values.has(key)) description.components = components(values, key);
     }
     description.position = values.position(description.velocity ? "velocity" : "displacement");
+    if (values.has("surface")) read_surface(values, description);
     description.ramp = ramp_of(values, description.components);
     scene_.boundaries.push_back(std::move(description));
   }
+}
+
+void SceneReader::read_surface(const ParameterValues& values, BoundaryDescription& boundary) {
+  const std::string key = values.path() + ".surface";
+  for (const char* other : {"set", "face"})
+    if (values.has(other))
+      reader_.errors.add(values.position("surface"), key, fmt::format("found it together with {}; allowed: one of the two, each in its own [[boundary]]", other));
+  boundary.surface.emplace(values.expression("surface"), scene_.constants, false, values.position("surface"), key);
+  for (std::size_t c = 0; c < boundary.components.size(); ++c)
+    if (!boundary.components[c])
+      reader_.errors.add(boundary.position, fmt::format("{}.{}.{}", values.path(), boundary.velocity ? "velocity" : "displacement", c),
+                         "found \"free\" on a surface, whose normal is no axis, so that what is free and what is held would depend on each other; "
+                         "allowed: a number or an expression, or a face across an axis");
 }
 
 RampDescription SceneReader::ramp_of(const ParameterValues& values, const std::vector<std::optional<Expression>>& components) {

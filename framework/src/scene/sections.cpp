@@ -160,6 +160,7 @@ ParameterTable boundary_parameters() {
   table.string("set", "The points whose motion is prescribed; with `face` those whose side it is, default: all. Needed without `face`.");
   table.choice("face", faces(), "Prescribe the motion of this side of the set instead of that of its points.");
   table.number("at", "m", "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
+  table.expression("surface", "-", "Prescribe the motion of the surface where this expression of x, y, z is zero; it is negative in the body, a cloud.");
   table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
   table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
   add_ramp(table);

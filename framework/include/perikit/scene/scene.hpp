@@ -78,10 +78,14 @@ struct BoundaryDescription {
   std::string set;
   std::string face;                          ///< "+x" ... "-z": of the set, is held; empty: the points of the set are
   std::optional<double> at;                  ///< where the face lies [m]
+  std::optional<Expression> surface;         ///< zero on the surface that is held, negative in the body
   bool velocity = false;                     ///< else displacement
   std::vector<std::optional<Expression>> components;
   RampDescription ramp;
-  SourcePosition position, face_position;  ///< of the displacement or velocity; of `at`, else of the face
+  SourcePosition position, face_position;  ///< of the displacement or velocity; of `at`, of the surface, else of the face
+
+  /// Whether a side of the body is held, by images, and not points.
+  bool holds_side() const noexcept { return !face.empty() || surface; }
 };
 
 struct SymmetryDescription {

@@ -1,0 +1,87 @@
+#include "body/image_list.hpp"
+
+#include <algorithm>
+
+namespace perikit {
+
+namespace {
+
+/// The part of a crack in front of a plane (Sutherland and Hodgman); fewer than two vertices: nothing.
+std::vector<Point> in_front(const ImagePlane& plane, const std::vector<Point>& vertices) {
+  const bool closed = vertices.size() > 2;
+  std::vector<Point> kept;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Point& a = vertices[i];
+    const double da = depth(plane, a);
+    if (da >= 0) kept.push_back(a);
+    if (!closed && i + 1 == vertices.size()) break;
+    const Point& b = vertices[(i + 1) % vertices.size()];
+    const double db = depth(plane, b);
+    if ((da >= 0) == (db >= 0)) continue;
+    const double s = da / (da - db);
+    kept.push_back({a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])});
+  }
+  return kept;
+}
+
+}  // namespace
+
+double depth(const ImagePlane& plane, const Point& x) {
+  const double coordinate = x[static_cast<std::size_t>(plane.axis)];
+  return plane.period > 0 ? plane.outward * (coordinate - plane.at) + plane.period : plane.outward * (plane.at - coordinate);
+}
+
+Point image_of(const ImagePlane& plane, Point x) {
+  double& coordinate = x[static_cast<std::size_t>(plane.axis)];
+  coordinate = plane.period > 0 ? coordinate + plane.outward * plane.period : 2 * plane.at - coordinate;
+  return x;
+}
+
+ImageList::ImageList(const Body& body) : dimension_(body.dimension()), real_(body.points()), first_(real_ + 1, 0) {
+  for (const std::int32_t p : body.internal()) position_.push_back(body.position(static_cast<std::size_t>(p)));
+  images_.cracks = body.cracks();
+}
+
+void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
+  const auto number = static_cast<std::int32_t>(images_.size());
+  const std::array<std::int8_t, 3> of = real(n) ? std::array<std::int8_t, 3>{1, 1, 1} : images_.sign[n - real_];
+  std::array<std::int8_t, 3> sign = of;
+  for (int c = 0; c < dimension_; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    if (odd[i]) {
+      sign[i] = static_cast<std::int8_t>(-of[i]);
+      images_.terms.push_back({number, c, motion[i], 2.0, image.foot, image.surface});
+    }
+    for (std::size_t k = first_[n]; k < first_[n + 1]; ++k) {
+      ImageTerm term = images_.terms[k];
+      if (term.component != c) continue;
+      term.image = number;
+      if (odd[i]) term.factor = -term.factor;
+      images_.terms.push_back(term);
+    }
+  }
+  const double volume = real(n) ? 1.0 : images_.volume[n - real_];
+  images_.source.push_back(source(n));
+  images_.sign.push_back(sign);
+  images_.volume.push_back(image.volume * volume);
+  position_.push_back(image.at);
+  first_.push_back(images_.terms.size());
+}
+
+void ImageList::mirror_cracks(const ImagePlane& plane) {
+  const std::size_t n = images_.cracks.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    std::vector<Point> part = in_front(plane, images_.cracks[k].vertices());
+    if (part.size() < std::min<std::size_t>(images_.cracks[k].vertices().size(), 3)) continue;
+    if (part.size() > 1 && part.size() < 3 && part[0] == part[1]) continue;
+    for (Point& x : part) x = image_of(plane, x);
+    images_.cracks.emplace_back(std::move(part));
+  }
+}
+
+Images ImageList::take() {
+  images_.position.assign(position_.begin() + static_cast<std::ptrdiff_t>(real_), position_.end());
+  return std::move(images_);
+}
+
+}  // namespace perikit

@@ -1,0 +1,137 @@
+// Mirrors that meet at any angle. A place beyond several of them belongs to that behind which it lies deepest: around an edge of
+// 150 degrees, where single mirror images would overlap, the seam is the bisector; at one of 90 degrees, where an image of an
+// image is found on two ways, each way has its half; at sharper ones images of images of images fill the rest.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "body/image_list.hpp"
+#include "body/level_surface.hpp"
+#include "body/points_at_surface.hpp"
+
+namespace perikit {
+
+namespace {
+
+class Mirror {
+ public:
+  struct Reflected {
+    ImagePlace place;
+    double depth;
+  };
+  Mirror(const std::array<bool, 3>& odd, const std::array<int, 3>& motion) : odd_(odd), motion_(motion) {}
+  virtual ~Mirror() = default;
+  /// nullopt: place n lies behind, or too far in front, or its image would lie nearer to another part of the mirror.
+  virtual std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const = 0;
+  /// How far a place lies behind the mirror; 0 in front of it.
+  virtual double behind(const Point& x) const = 0;
+  const std::array<bool, 3>& odd() const noexcept { return odd_; }
+  const std::array<int, 3>& motion() const noexcept { return motion_; }
+
+ private:
+  std::array<bool, 3> odd_;
+  std::array<int, 3> motion_;
+};
+
+class PlaneMirror final : public Mirror {
+ public:
+  PlaneMirror(const ImagePlane& plane, double reach) : Mirror(plane.odd, plane.motion), plane_(plane), reach_(reach) {}
+
+  std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
+    const Point& x = list.position(n);
+    const double d = depth(plane_, x);
+    const std::int32_t surface = plane_.surface[static_cast<std::size_t>(list.source(n))];
+    if (!(d >= 0) || d > reach_ || surface < 0) return std::nullopt;
+    Point foot = x;
+    foot[static_cast<std::size_t>(plane_.axis)] = plane_.at;
+    return Reflected{{image_of(plane_, x), foot, 1.0, surface}, d};
+  }
+  double behind(const Point& x) const override { return std::max(0.0, -depth(plane_, x)); }
+
+ private:
+  const ImagePlane& plane_;
+  double reach_;
+};
+
+class SurfaceMirror final : public Mirror {
+ public:
+  SurfaceMirror(const Body& body, const ImageSurface& surface, double reach)
+      : Mirror({true, true, true}, surface.motion),
+        surface_(surface.level, body.dimension(), body.spacing()),
+        points_(body, surface_),
+        spacing_(body.spacing()),
+        reach_(reach) {}
+
+  std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
+    const Point& x = list.position(n);
+    if (!(surface_.level(x) < 0) || surface_.estimate(x) > far * reach_) return std::nullopt;
+    const std::optional<Foot> foot = surface_.foot(x);
+    if (!foot || !(foot->depth > 0) || foot->depth > reach_ || !(foot->stretch > 0)) return std::nullopt;
+    Point image{};
+    for (std::size_t c = 0; c < 3; ++c) image[c] = 2 * foot->at[c] - x[c];
+    if (!(surface_.level(image) > 0)) return std::nullopt;
+    // In a narrow hole the opposite side may be nearer: its images are there.
+    const std::optional<Foot> back = surface_.foot(image);
+    constexpr double same = 0.01;  // spacings
+    if (!back) return std::nullopt;
+    double square = 0;
+    for (std::size_t c = 0; c < 3; ++c) square += (back->at[c] - foot->at[c]) * (back->at[c] - foot->at[c]);
+    if (square > same * same * spacing_ * spacing_) return std::nullopt;
+    return Reflected{{image, foot->at, foot->stretch, points_.nearest(foot->at, list.source(n))}, foot->depth};
+  }
+  double behind(const Point& x) const override {
+    if (!(surface_.level(x) > 0)) return 0;
+    const double guess = -surface_.estimate(x);
+    if (guess > far * reach_) return std::numeric_limits<double>::infinity();
+    const std::optional<Foot> foot = surface_.foot(x);
+    return foot && foot->depth < 0 ? -foot->depth : guess;
+  }
+
+ private:
+  /// Estimates of distances are off where surfaces are bent.
+  static constexpr double far = 3;
+
+  LevelSurface surface_;
+  PointsAtSurface points_;
+  double spacing_, reach_;
+};
+
+}  // namespace
+
+void mirror_in_turn(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces,
+                    ImageList& list) {
+  const double reach = halo(body), even = 1e-6 * body.spacing();
+  std::vector<std::unique_ptr<Mirror>> mirrors;
+  for (const ImageSurface& surface : surfaces) mirrors.push_back(std::make_unique<SurfaceMirror>(body, surface, reach));
+  for (const ImagePlane& plane : planes) {
+    if (plane.period > 0) continue;
+    list.mirror_cracks(plane);
+    mirrors.push_back(std::make_unique<PlaneMirror>(plane, reach));
+  }
+  const auto deepest = [&](std::size_t own, const Point& x, double depth) {
+    for (std::size_t k = 0; k < mirrors.size(); ++k) {
+      if (k == own) continue;
+      const double other = mirrors[k]->behind(x);
+      if (other > 0 && (other > depth + even || (k < own && other >= depth - even))) return false;
+    }
+    return true;
+  };
+  std::vector<std::size_t> done(mirrors.size(), 0);
+  for (bool more = true; more;) {
+    more = false;
+    for (std::size_t k = 0; k < mirrors.size(); ++k) {
+      const std::size_t end = list.size();
+      for (std::size_t n = done[k]; n < end; ++n) {
+        const auto reflected = mirrors[k]->reflect(list, n);
+        if (!reflected || !deepest(k, reflected->place.at, reflected->depth)) continue;
+        list.add(n, reflected->place, mirrors[k]->odd(), mirrors[k]->motion());
+        more = true;
+      }
+      done[k] = end;
+    }
+  }
+}
+
+}  // namespace perikit
