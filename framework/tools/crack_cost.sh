@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What a crack costs by critical_energy, bonds that break at once and bonds that weaken, by the energy that they hold and the one that they
-# set free: the double cantilever beam under eight kinematics. A Markdown table is printed: that of framework/docs/fracture.md, "What a crack
-# costs". About an hour on one core; part of `ninja fracture`.
+# set free: the double cantilever beam under eight kinematics, three more at twice the spacing; and by a stretch and a strength, at two spacings. Three Markdown tables are
+# printed: those of framework/docs/fracture.md, "What a crack costs". About an hour and a half on one core; part of `ninja fracture`.
 #   crack_cost.sh PERIKIT OUT
 # Runs that are done are kept.
 set -euo pipefail
@@ -22,14 +22,39 @@ all=(
   silling '`conventional` with `silling`, 1' '{type="conventional",stabilization={type="silling",coefficient=1.0}}' 2e-3 4e-3
   wan '`conventional` with `wan`' '{type="conventional",stabilization="wan"}' 2e-3 4e-3
 )
+# At twice the spacing, and plane strain for the selective map, which needs it.
+coarse=(
+  baqp '`baqp`' baqp stress
+  baqp_strain '`baqp`, plane strain' baqp strain
+  selective '`selective` over `baqp`, plane strain' '{type="selective",base="baqp"}' strain
+  bond_associated '`bond_associated`' bond_associated stress
+  non_spherical '`non_spherical`' non_spherical stress
+  sub_horizon '`sub_horizon`' sub_horizon stress
+)
+# By other criteria, with the settings that they need.
+others=(
+  bond_based '`bond_based`' bond_based false
+  baqp '`baqp`' baqp true
+  wan '`conventional` with `wan`' '{type="conventional",stabilization="wan"}' true
+  bond_associated '`bond_associated`' bond_associated true
+)
 
-# One cell: energy per area, G, load over LEFM's.   cell FOLDER KINEMATICS OPENING SOFTENING ENERGY
+# One cell: energy per area, G, load over LEFM's.   cell FOLDER SETTING...
 cell() {
-  local folder=$out/$1_$4_$5
-  [ -s "$folder.txt" ] || { rm -rf "$folder"; framework/tools/double_cantilever.sh "$perikit" "$folder" --set kinematics="$2" --set constants.w="$3" \
-    --set damage.softening="$4" --set interface.0.damage.softening="$4" --set damage.energy="$5" --set interface.0.damage.energy="$5" > "$folder.part"
+  local folder=$out/$1 settings=()
+  for setting in "${@:2}"; do settings+=(--set "$setting"); done
+  [ -s "$folder.txt" ] || { rm -rf "$folder"; framework/tools/double_cantilever.sh "$perikit" "$folder" "${settings[@]}" > "$folder.part" || echo 'the run ends early' > "$folder.part"
     mv "$folder.part" "$folder.txt"; }
   awk 'NF == 6 && $1 + 0 > 0 { printf " %.2f, %.2f, %.2f |", $1, $2, $4; next } { printf " %s |", $0 }' "$folder.txt"
+}
+# by_energy FOLDER KINEMATICS OPENING SOFTENING ENERGY
+by_energy() {
+  cell "$1_$4_$5" kinematics="$2" constants.w="$3" damage.softening="$4" interface.0.damage.softening="$4" damage.energy="$5" interface.0.damage.energy="$5" "${@:6}"
+}
+# by_other FOLDER KINEMATICS CRITERION LIMIT OF_ARMS OF_INTERFACE MORE SPACING
+by_other() {
+  cell "$1_$3_$8" kinematics="$2" damage="{type=\"$3\",$4=$5$7}" interface.0.damage="{type=\"$3\",$4=$6$7}" body.lattice.spacing="$8" constants.dx="$8" \
+    integrator.steps=40 constants.w=2.5e-3
 }
 
 printf '| kinematics | at once | softening 4 | held, at once | held, softening 4 |\n|---|---|---|---|---|\n'
@@ -39,8 +64,31 @@ for ((k = 0; k < ${#all[@]}; k += 5)); do
     opening=${all[k + 3]}
     [ "$energy" = held ] && opening=${all[k + 4]}
     for softening in 1 4; do
-      if [ -n "$opening" ]; then cell "${all[k]}" "${all[k + 2]}" "$opening" "$softening" "$energy"; else printf ' the same |'; fi
+      if [ -n "$opening" ]; then by_energy "${all[k]}" "${all[k + 2]}" "$opening" "$softening" "$energy"; else printf ' the same |'; fi
     done
+  done
+  printf '\n'
+done
+
+printf '\n| kinematics | at once | softening 4 | held, at once | held, softening 4 |\n|---|---|---|---|---|\n'
+for ((k = 0; k < ${#coarse[@]}; k += 4)); do
+  printf '| %s |' "${coarse[k + 1]}"
+  for energy in released held; do
+    for softening in 1 4; do
+      if [ "${coarse[k]} $energy" = 'sub_horizon released' ]; then printf ' not known |'; continue; fi
+      by_energy "coarse_${coarse[k]}" "${coarse[k + 2]}" 2.5e-3 $softening $energy body.lattice.spacing=2e-3 constants.dx=2e-3 integrator.steps=40 body.plane="${coarse[k + 3]}"
+    done
+  done
+  printf '\n'
+done
+printf '\n| kinematics | `critical_stretch`, 2 mm | 1 mm | `max_stress`, 2 mm | 1 mm |\n|---|---|---|---|---|\n'
+for ((k = 0; k < ${#others[@]}; k += 4)); do
+  printf '| %s |' "${others[k + 1]}"
+  for spacing in 2e-3 1e-3; do
+    by_other "${others[k]}" "${others[k + 2]}" critical_stretch energy_release_rate 1e9 500.0 ",consistent=${others[k + 3]}" $spacing
+  done
+  for spacing in 2e-3 1e-3; do
+    if [ "${others[k]}" = bond_based ]; then printf ' has no stress |'; else by_other "${others[k]}" "${others[k + 2]}" max_stress strength 1e12 1.2e7 '' $spacing; fi
   done
   printf '\n'
 done

@@ -4,12 +4,17 @@
 # opening: mean, least, largest. a: by what the rows beside the crack have lost, from the line of the load, and 0.64 h for the rotation of
 # the clamped end. G = 12 P^2 a^2/(E h^3), with the E at which P = E h^3 w/(4 a^3) holds before the crack grows; without a, G = Gc gives
 # P = (Gc E h^3/12)^(3/4) (4/(E h^3 w))^(1/2).
-#   double_cantilever.sh PERIKIT OUT [--set KEY=VALUE]...
+#   double_cantilever.sh [--scene FILE] PERIKIT OUT [--set KEY=VALUE]...
 set -euo pipefail
+scene=configs/fracture/double_cantilever.toml
+if [ "$1" = --scene ]; then
+  scene=$(realpath "$2")
+  shift 2
+fi
 perikit=$1 out=$2
 shift 2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-"$perikit" run configs/fracture/double_cantilever.toml -o "$out" --threads 1 --quiet "$@"
+"$perikit" run "$scene" -o "$out" --threads 1 --quiet "$@"
 opening=$(awk '$1 == "w" && $2 == "=" { print $3 + 0; exit }' "$out/scene.toml")
 awk -F, -v opening="$opening" '
   NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }

@@ -18,6 +18,8 @@ import subprocess
 import h5py
 import numpy
 
+import turned_lattice
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/kalthoff_winkler.toml"
 KINEMATICS = {  # by name: settings
@@ -29,17 +31,6 @@ KINEMATICS = {  # by name: settings
 KERNELS = {"bond_based": ["constant"]}  # which the influence function does not change
 
 
-def turned_lattice(file, spacing, degrees):
-    """Points of a lattice that is turned, within the plate."""
-    turn = math.radians(degrees)
-    n = int(0.3 / spacing)
-    i, j = numpy.meshgrid(numpy.arange(-n, n) + 0.5, numpy.arange(-n, n) + 0.5)
-    x = spacing * (math.cos(turn) * i - math.sin(turn) * j).ravel()
-    y = spacing * (math.sin(turn) * i + math.cos(turn) * j).ravel()
-    inside = (x > 0) & (x < 0.1) & (abs(y) < 0.1)
-    numpy.savetxt(file, numpy.column_stack([x[inside], y[inside], numpy.full(inside.sum(), spacing**2)]), delimiter=",", header="x,y,volume", comments="")
-
-
 def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
     log = folder / "run.log"
     if log.exists() and ("speed  " in log.read_text() or "failed: " in log.read_text()):
@@ -48,9 +39,8 @@ def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
     text = SCENE.read_text()
     if degrees:
         points = folder.with_suffix(".csv")
-        turned_lattice(points, spacing, degrees)
-        begin, end = text.index("[body.lattice]"), text.index("[sets]")
-        text = text[:begin] + '[body.points]\nfile = "%s"\n\n' % points.name + text[end:]
+        turned_lattice.write(points, spacing, degrees, (0, -0.1), (0.1, 0.1))
+        text = turned_lattice.put_in(text, points.name)
     scene = folder.with_suffix(".toml")
     scene.write_text(text)
     settings = kinematics + ["family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
