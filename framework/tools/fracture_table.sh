@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
 # The boundary tension test while bonds fail, at once and gradually, under every kinematics and kernel: 100 x 40 x 4 points until 80 us,
-# damage.consistent = true. A Markdown table is printed: that of framework/docs/fracture.md, "Every kinematics and kernel".
+# damage.consistent = true, second_law = false. A Markdown table is printed: that of framework/docs/fracture.md, "Every kinematics and kernel".
 #   fracture_table.sh PERIKIT OUT
+# With --second-law as third argument that of "Bonds that stay": the kinematics whose updates of bonds would create energy, with and without the
+# second law, on 100 x 40 points in plane strain. Minutes.
 # Runs that are done are kept, and the cheap ones come first: a stopped command prints what is there and goes on where it was.
 # A run that stops early is a result too, and is kept.
 set -euo pipefail
 perikit=$(realpath "$1")
 out=$(realpath -m "$2")
+compare=${3:-}
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 export OMP_WAIT_POLICY=passive LC_ALL=C
 mkdir -p "$out"
@@ -33,6 +36,9 @@ all=(
   selective_non_spherical '`selective` over `non_spherical`' "$(selective non_spherical)"
 )
 
+# By default bonds of these stay where their failure would raise the energy.
+lawful=(conventional bond_augmented sub_horizon selective_non_spherical)
+seconds() { sed -n 's/^time .* set-up, \([0-9.]*\) s steps.*/\1/p' "$out/$1/run.log"; }
 done_with() { grep -qsE '^(speed  |failed: )' "$out/$1/run.log" && ! grep -q '^stopped by a signal' "$out/$1/run.log"; }
 
 # run NAME KINEMATICS KERNEL GRADUAL
@@ -42,8 +48,18 @@ run() {
   local status=0
   "$perikit" run configs/partmann/boundary_tension.toml -o "$out/$1" --threads 1 --quiet \
     --set kinematics="$2" --set family.influence="$3" --set damage.gradual="$4" --set damage.consistent=true \
-    --set body.lattice.spacing=1e-3 --set constants.dx=1e-3 --set integrator.end_time=$end --set output.frames=1 || status=$?
+    --set body.lattice.spacing=1e-3 --set constants.dx=1e-3 --set integrator.end_time=$end --set output.frames=1 --set damage.second_law=false || status=$?
   [ "$status" -le 1 ] || exit "$status"   # refused: no result
+}
+# run_plane NAME KINEMATICS KERNEL SECOND_LAW
+run_plane() {
+  done_with "$1" && return
+  rm -rf "${out:?}/$1"
+  local status=0
+  "$perikit" run configs/fracture/branching.toml -o "$out/$1" --threads 1 --quiet --set body.plane=strain \
+    --set damage="{type=\"critical_stretch\",energy_release_rate=0.75,consistent=true,no_fail=[\"top\",\"bottom\"],second_law=$4}" \
+    --set kinematics="$2" --set family.influence="$3" --set constants.sigma=1e6 --set integrator.end_time=$end --set output.frames=1 || status=$?
+  [ "$status" -le 1 ] || exit "$status"
 }
 
 # Five cells of one run, from what it reports at its end and from its history: failed bonds, dissipated, raised by updates, share of what the
@@ -115,11 +131,36 @@ table() {
   done
 }
 
-trap table EXIT
+comparison() {
+  local what='failed bonds | dissipated | raised by updates | share of what the others took | balance off |'
+  printf '| kinematics | kernel | %s with the second law: %s bonds that stayed | time, times as long |\n' "$what" "$what"
+  printf '|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n'
+  local name kernel k
+  for name in "${lawful[@]}"; do
+    for kernel in "${kernels[@]}"; do
+      done_with "${name}_${kernel}_lawful" || continue
+      for ((k = 0; k < ${#all[@]}; k += 3)); do
+        if [ "${all[k]}" = "$name" ]; then printf '| %s | `%s` |' "${all[k + 1]}" "$kernel"; fi
+      done
+      cells "${name}_${kernel}_lawless"
+      cells "${name}_${kernel}_lawful"
+      printf ' %s | %.2g |\n' "$(awk '/^bonds held/ { print $3 }' "$out/${name}_${kernel}_lawful/run.log")" \
+        "$(awk -v a="$(seconds "${name}_${kernel}_lawful")" -v b="$(seconds "${name}_${kernel}_lawless")" 'BEGIN { print a/b }')"
+    done
+  done
+}
+
+if [ "$compare" = --second-law ]; then trap comparison EXIT; else trap table EXIT; fi
 trap 'exit 130' INT
 trap 'exit 143' TERM
 for ((k = 0; k < ${#all[@]}; k += 3)); do
   for kernel in "${kernels[@]}"; do
+    if [ "$compare" = --second-law ]; then
+      [[ " ${lawful[*]} " != *" ${all[k]} "* ]] || for law in false true; do
+        run_plane "${all[k]}_${kernel}_law$([ $law = true ] && echo ful || echo less)" "${all[k + 2]}" "$kernel" $law
+      done
+      continue
+    fi
     run "${all[k]}_$kernel" "${all[k + 2]}" "$kernel" false
     run "${all[k]}_${kernel}_gradual" "${all[k + 2]}" "$kernel" true
   done

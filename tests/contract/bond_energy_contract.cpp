@@ -18,7 +18,7 @@ using namespace perikit::contract;
 
 namespace {
 
-const char* const limit = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.6\n";
+const char* const limit = "[damage]\ntype = \"critical_stretch\"\nsecond_law = false\nstretch = 0.6\n";
 
 /// Deforms the body with noise so that every direction grows; its energy.
 double respond(BodyProblem& problem, std::uint64_t seed) {
@@ -99,7 +99,8 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
         CHECK(std::abs(sum - whole) <= 1e-12 * whole);
         std::sort(densities.begin(), densities.end());
         options.conditions = fmt::format(
-            "[damage]\ntype = \"critical_energy\"\nenergy = \"held\"\nlimit = \"equal\"\nno_fail = [\"part\"]\nenergy_release_rate = {:.17g}\n",
+            "[damage]\ntype = \"critical_energy\"\nsecond_law = false\nenergy = \"held\"\nlimit = \"equal\"\nno_fail = "
+            "[\"part\"]\nenergy_release_rate = {:.17g}\n",
             crossing(body) * densities[densities.size() * 9 / 10]);
         const std::set<std::pair<std::int32_t, std::int32_t>> failed = fail_screened_or_not(options, kinematics_table(example), shares.size());
         if (plain->problem().terms().has_gradients()) continue;  // fragments lose all of their bonds
@@ -131,7 +132,8 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         if (points == Points::consistent_cloud && (formulation.pairs || formulation.order > 1 || (formulation.selective() && !formulation.bond))) continue;
         BodyOptions options{.dimension = d, .cloud = points != Points::lattice, .consistent = points == Points::consistent_cloud};
         const char* const weakening =
-            "[damage]\ntype = \"critical_energy\"\nenergy = \"{}\"\nsoftening = {}\nenergy_release_rate = {:.17g}\n";
+            "[damage]\ntype = \"critical_energy\"\nsecond_law = false\nenergy = \"{}\"\nsoftening = {}\nenergy_release_rate = "
+            "{:.17g}\n";
         options.conditions = fmt::format(fmt::runtime(weakening), "held", "2.0", 1e9);
         const auto simulation = build(scene_text(options, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
@@ -210,7 +212,8 @@ TEST_CASE("kinematics: bonds fail by the largest principal stress, that of the m
         const std::int32_t p = plain->problem().body().internal().front();
         const double most = samples.cauchy.component(0)[p];
         for (const double share : {1 + 1e-9, 1 - 1e-9}) {
-          options.conditions = fmt::format("[damage]\ntype = \"max_stress\"\nstrength = {:.17g}\n", share * most);
+          options.conditions =
+              fmt::format("[damage]\ntype = \"max_stress\"\nsecond_law = false\nstrength = {:.17g}\n", share * most);
           const auto simulation = build(scene_text(options, kinematics_table(example)));
           stretch(simulation->problem());
           const std::size_t bonds =

@@ -19,8 +19,8 @@ using namespace perikit::contract;
 namespace {
 
 constexpr double tolerance = 1e-10;
-const std::string brittle = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.04\n",
-                  gradual = "[damage]\ntype = \"smooth_degradation\"\nstretch_min = 0.02\nstretch = 0.06\n";
+const std::string brittle = "[damage]\ntype = \"critical_stretch\"\nsecond_law = false\nstretch = 0.04\n",
+                  gradual = "[damage]\ntype = \"smooth_degradation\"\nsecond_law = false\nstretch_min = 0.02\nstretch = 0.06\n";
 
 std::vector<Example> quasi_static_integrators() {
   return integrators([](const IntegratorTraits& traits) { return traits.quasi_static; },

@@ -52,6 +52,7 @@ type = "critical_stretch"
 stretch = 0.1
 no_fail = ["left"]
 gradual = true
+second_law = true
 [[interface]]
 between = ["left", "rest"]
 damage = { type = "critical_stretch", stretch = 0.05 }

@@ -57,3 +57,26 @@ TEST_CASE("gradual failure: bonds of fragments fade by the same factor in each s
   }
   CHECK(failure.let_go({}, 0.15).empty());
 }
+
+TEST_CASE("gradual failure: a bond that was not lowered goes on from where it is; a whole one must be found again") {
+  const Line line;
+  GradualFailure failure(line.body, line.crack_speed);
+  const BondChange found{line.bond(0, 1), 0.0};
+  failure.let_go({&found, 1}, 0.05);
+  failure.hold(found.bond, 1.0);
+  CHECK(failure.let_go({}, 0.05).empty());
+  CHECK(failure.let_go({&found, 1}, 0.05).front().integrity == doctest::Approx(0.75));
+  failure.let_go({}, 0.05);
+  failure.hold(found.bond, 0.75);
+  CHECK(failure.let_go({}, 0.05).front().integrity == doctest::Approx(0.5));
+  // One that was about to go altogether.
+  CHECK(failure.let_go({}, 0.5).front().integrity == 0);
+  failure.hold(found.bond, 0.5);
+  CHECK(failure.let_go({}, 0.05).front().integrity == doctest::Approx(0.25));
+  // A bond of a fragment fades on.
+  GradualFailure fading(line.body, line.crack_speed);
+  fading.fade({&found.bond, 1});
+  const double once = fading.let_go({}, 0.01).front().integrity;
+  fading.hold(found.bond, 1.0);
+  CHECK(fading.let_go({}, 0.01).front().integrity == once);
+}

@@ -155,6 +155,23 @@ TEST_CASE("partition: bonds fail on several ranks as on one, bit for bit, with t
       }
 }
 
+TEST_CASE("partition: bonds stay on several ranks as on one, bit for bit") {
+  for (const std::string kinematics : {"type = \"conventional\"", "type = \"baqp\"", "type = \"sub_horizon\""})
+    for (const std::string more : {"", "gradual = true\n"})
+      for (const bool cloud : {false, true}) {
+        INFO(kinematics, ", ", more, std::string(cloud ? "cloud" : "lattice"));
+        contract::BodyOptions body = body_of(2, cloud);
+        body.crack = true;
+        body.conditions +=
+            "[initial]\nvelocity = [\"0.15*(x - 12)/12\", \"0.1*sin(x/3)*(y - 9)/9\"]\n[damage]\ntype = "
+            "\"critical_stretch\"\nstretch = 0.02\n"
+            "second_law = true\n" +
+            more;
+        body.integrator = "type = \"verlet\"\nend_time = 3.0\ntime_step = 0.05";
+        compare(contract::scene_text(body, kinematics), {2, 3}, true);
+      }
+}
+
 TEST_CASE("partition: laws with history on several ranks are those on one, bit for bit") {
   for (const std::string& kinematics :
        {std::string("type = \"conventional\""), std::string("type = \"baqp\""), std::string("type = \"sub_horizon\"")})

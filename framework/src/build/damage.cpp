@@ -13,6 +13,7 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/problem/ghosts.hpp"
+#include "terms/failure_energy.hpp"
 
 namespace perikit {
 
@@ -131,6 +132,10 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   auto damage = std::make_unique<BodyDamage>();
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
+  const ParameterValues& values = scene.damage->values;
+  damage->second_law = values.has("second_law") ? values.boolean("second_law")
+                                                : creates_energy(parts.formulation, parts.stabilization != nullptr,
+                                                                 parts.families->body().dimension()) != nullptr;
   refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;

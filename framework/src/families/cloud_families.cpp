@@ -151,7 +151,7 @@ void CloudFamilies::renew(std::size_t p) {
   support_[p] = shape_support(D, K, uncut);
 }
 
-std::vector<std::int32_t> CloudFamilies::lower_bonds(std::span<const BondChange> changes) {
+std::vector<std::int32_t> CloudFamilies::set_bonds(std::span<const BondChange> changes) {
   std::vector<std::int32_t> ends;
   for (const auto& [bond, integrity] : changes) {
     for (const auto& [from, to] : {std::pair(bond.point, bond.far), std::pair(bond.far, bond.point)}) {
@@ -171,7 +171,7 @@ std::vector<std::int32_t> CloudFamilies::lower_bonds(std::span<const BondChange>
 std::vector<std::int32_t> CloudFamilies::mend_bonds() {
   std::vector<BondChange> whole = changed();
   for (BondChange& change : whole) change.integrity = 1;
-  return lower_bonds(whole);
+  return set_bonds(whole);
 }
 
 std::vector<BondChange> CloudFamilies::changed() const {

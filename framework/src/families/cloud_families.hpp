@@ -49,7 +49,7 @@ class CloudFamilies final : public Families {
   void load_broken(std::size_t p, BondsOf which, FamilyArrays& out) const;
   /// Takes the bonds that are marked as cut out of the lists.
   void compact();
-  std::vector<std::int32_t> lower_bonds(std::span<const BondChange> changes) override;
+  std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend_bonds() override;
   void make_room() override;
   double support(std::size_t p) const noexcept override { return support_[p]; }

@@ -15,7 +15,12 @@ std::unique_ptr<Families> Families::make(const Body& body, std::shared_ptr<const
 
 std::vector<std::int32_t> Families::lower(std::span<const BondChange> changes) {
   ++version_;
-  return lower_bonds(changes);
+  return set_bonds(changes);
+}
+
+std::vector<std::int32_t> Families::raise(std::span<const BondChange> before) {
+  ++version_;
+  return set_bonds(before);
 }
 
 std::vector<std::int32_t> Families::mend() {

@@ -63,6 +63,8 @@ class Families {
   virtual double integrity(BondId bond) const noexcept = 0;
   /// Lowers the integrity of bonds. Returns their ends, ascending.
   std::vector<std::int32_t> lower(std::span<const BondChange> changes);
+  /// Takes back what was lowered: each of these bonds has the integrity that it had before. Returns their ends, ascending.
+  std::vector<std::int32_t> raise(std::span<const BondChange> before);
   /// Every bond as it was at the set-up. Returns the points whose bonds had changed.
   std::vector<std::int32_t> mend();
   /// The bonds that are not as they were at the set-up, ascending.
@@ -90,7 +92,8 @@ class Families {
  protected:
   Families(const Body& body, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs)
       : body_(body), influence_(std::move(influence)), needs_(needs) {}
-  virtual std::vector<std::int32_t> lower_bonds(std::span<const BondChange> changes) = 0;
+  /// Their integrities, lower or higher than they were. Returns their ends, ascending.
+  virtual std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) = 0;
   virtual std::vector<std::int32_t> mend_bonds() = 0;
   virtual void make_room() = 0;
   /// What the bonds left to a point support of its uncut shape tensor: see shape_support.

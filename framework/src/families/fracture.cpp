@@ -1,8 +1,11 @@
 #include "families/fracture.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
+#include <limits>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -13,6 +16,14 @@ namespace {
 
 bool on_any_rank(bool here) {
   return communicator().largest(here ? 1 : 0) > 0;
+}
+
+constexpr double not_now = -1;
+
+/// Bonds that stay for the second law would be tried in vain in most steps: they are in one of eight, drawn by the bits of their
+/// value, which are the same on every rank and in a run that was resumed.
+bool drawn(double value) {
+  return (std::bit_cast<std::uint64_t>(value) * 0x9e3779b97f4a7c15u) >> 61 == 0;
 }
 
 }  // namespace
@@ -42,7 +53,10 @@ std::vector<double> Fracture::moments(std::span<const BondChange> changes, Const
       return first < last ? std::clamp((linear(limit) - first) / (last - first), 0.0, 1.0) : 0.0;
     };
     const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
-    moments.push_back(0.5 * (crossing(limits.onset) + crossing(limits.failure)));
+    if (damage_.second_law && start[k] > limits.failure && !drawn(end[k]))
+      moments.push_back(not_now);
+    else
+      moments.push_back(0.5 * (crossing(limits.onset) + crossing(limits.failure)));
   }
   if (!share) return moments;
   std::vector<BondChange> mine;
@@ -69,6 +83,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
       hastened_.hasten(changes, from);
     }
     fail(std::move(changes), u, 0, {}, body, update);
+    finish(update);
     return update;
   }
   const int d = u.components;
@@ -80,13 +95,16 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   reaction->impulse = families_.body().make_field(d);
   reaction->drift = families_.body().make_field(d);
   const std::vector<double> moments = this->moments(changes, before_, u);
+  for (std::size_t k = 0; k < changes.size(); ++k)
+    update.held += moments[k] == not_now && families_.body().owns(static_cast<std::size_t>(changes[k].bond.point));
   // Those of each half of the step at the mean of their moments.
   for (const bool early : {true, false}) {
     std::vector<BondChange> of_half;
     ExactSum sum;
     std::int64_t count = 0;  // each bond once, where its first point is
     for (std::size_t k = 0; k < changes.size(); ++k) {
-      if ((moments[k] < 0.5) != early || families_.integrity(changes[k].bond) <= changes[k].integrity) continue;
+      if (moments[k] == not_now || (moments[k] < 0.5) != early || families_.integrity(changes[k].bond) <= changes[k].integrity)
+        continue;
       of_half.push_back(changes[k]);
       if (!families_.body().owns(static_cast<std::size_t>(changes[k].bond.point))) continue;
       sum.add(moments[k]);
@@ -104,7 +122,14 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     fail(std::move(of_half), at_, owed, impulse, body, update);
     for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
   }
+  finish(update);
   return update;
+}
+
+void Fracture::finish(const BondUpdate& update) {
+  if (gradual_) gradual_->fade(fragments(update.ends));
+  // A monitor takes it that the bonds that it has named are gone.
+  if (damage_.second_law && on_any_rank(update.held > 0)) finder_->forget();
 }
 
 /// Groups that depend on the bonds of these points; on all ranks the same.
@@ -130,10 +155,94 @@ GroupMarks Fracture::widened(GroupMarks marks, std::span<const std::int32_t> end
   return marks;
 }
 
-/// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there. Between the first bonds
-/// and the last ones of fragments nothing is evaluated where that can be helped: points that are about to go may be turned inside out.
 void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
                     BondUpdate& update) {
+  if (damage_.second_law) {
+    std::vector<BondChange> lawful, before;
+    try_to_fail(std::move(changes), at, body, lawful, before, update);
+    // Once more, with forces, and together.
+    take_back(before, body);
+    changes = std::move(lawful);
+  }
+  lower(std::move(changes), at, owed, impulse, body, update);
+}
+
+/// Lowers bonds, and those of fragments, where the energy at `at` does not rise, and halves of them where it does. lawful: those
+/// that were; before: their integrities, and those of the fragments' bonds, in the order in which they fell. All ranks must call
+/// it.
+void Fracture::try_to_fail(std::vector<BondChange> changes, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+                           std::vector<BondChange>& before, BondUpdate& update) {
+  if (!on_any_rank(!changes.empty())) return;
+  const std::size_t known = before.size();
+  std::vector<std::int32_t> all;
+  const auto lower_all = [&] {
+    for (std::vector<BondChange> falling = changes; on_any_rank(!falling.empty());) {
+      for (const BondChange& change : falling) before.push_back({change.bond, families_.integrity(change.bond)});
+      const std::vector<std::int32_t> ends = families_.lower(falling);
+      body.changed(ends);
+      all.insert(all.end(), ends.begin(), ends.end());
+      falling.clear();
+      for (const BondId bond : gradual_ ? std::vector<BondId>() : fragments(ends)) falling.push_back({bond, 0.0});
+    }
+  };
+  lower_all();
+  GroupMarks marks(families_.body().stride() / padding, 0);
+  if (body.owners_alone) {
+    for (const std::int32_t p : all) marks[static_cast<std::size_t>(p) / padding] = 1;
+    shared_.mark(marks);
+  } else {
+    marks = dependent_on(all);
+  }
+  const double after = body.energy(at, marks);
+  std::vector<BondChange> tried(before.begin() + static_cast<std::ptrdiff_t>(known), before.end());
+  before.resize(known);
+  take_back(tried, body);
+  // Points that are inside out already say nothing.
+  if (const double now = body.energy(at, marks); after <= now || !std::isfinite(now)) {
+    lower_all();
+    lawful.insert(lawful.end(), changes.begin(), changes.end());
+    return;
+  }
+  std::vector<BondChange> rest = later_half(changes);
+  if (on_any_rank(!rest.empty())) {
+    try_to_fail(std::move(changes), at, body, lawful, before, update);
+    try_to_fail(std::move(rest), at, body, lawful, before, update);
+    return;
+  }
+  for (const BondChange& change : changes) {
+    update.held += families_.body().owns(static_cast<std::size_t>(change.bond.point));
+    if (gradual_) gradual_->hold(change.bond, families_.integrity(change.bond));
+  }
+}
+
+/// before: in the order in which they fell; a bond of a fragment that had weakened fell twice.
+void Fracture::take_back(std::vector<BondChange>& before, const Body& body) {
+  std::ranges::reverse(before);
+  body.changed(families_.raise(before));
+}
+
+/// Takes the later half of what all ranks have, by names in the whole body, out of `changes`; nothing of a single bond. All ranks
+/// must call it.
+std::vector<BondChange> Fracture::later_half(std::vector<BondChange>& changes) const {
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+  for (const BondChange& change : changes) {
+    first = std::min(first, shared_.name(change.bond));
+    last = std::max(last, shared_.name(change.bond));
+  }
+  first = -communicator().largest(-first);
+  last = communicator().largest(last);
+  const double middle = std::floor(0.5 * (first + last));
+  const auto rest =
+      std::ranges::stable_partition(changes, [&](const BondChange& change) { return shared_.name(change.bond) <= middle; });
+  std::vector<BondChange> later(rest.begin(), rest.end());
+  changes.erase(rest.begin(), rest.end());
+  return later;
+}
+
+/// Between the first bonds and the last ones of fragments nothing is evaluated where that can be helped: points that are about to
+/// go may be turned inside out.
+void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
+                     BondUpdate& update) {
   if (impulse.data && part_.size() == 0) part_ = families_.body().make_field(impulse.components);
   const FieldView part = impulse.data ? FieldView(part_) : FieldView{};
   GroupMarks marks;   // empty: no forces are waiting for those without the bonds
@@ -169,12 +278,8 @@ void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double o
     body.changed(ends);
     update.ends.insert(update.ends.end(), ends.begin(), ends.end());
     update.changed += std::max<std::size_t>(changes.size(), 1);
-    if (gradual_) {
-      settle();
-      gradual_->fade(fragments(ends));
-      break;
-    }
     changes.clear();
+    if (gradual_) break;  // bonds of fragments fade
     for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
   settle();

@@ -27,6 +27,10 @@ class Fracture {
     /// force += factor times the forces of the evaluation points of the marked groups and of some others, the same ones whatever the
     /// bonds are; without data nothing is added. Their energy, over all ranks; not a number, and nothing is added, where a point is inadmissible.
     std::function<double(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
+    /// The energy alone, as `forces` has it. owners_alone: the marks are those of the groups of points whose bonds change, as
+    /// nothing else depends on them.
+    std::function<double(ConstFieldView u, const GroupMarks&)> energy;
+    bool owners_alone = false;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
@@ -45,11 +49,22 @@ class Fracture {
  private:
   /// The bonds of fragments among the points that may fail. All ranks must call it.
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
-  /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u.
+  /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u; -1: they
+  /// stay this time.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
   GroupMarks dependent_on(std::span<const std::int32_t> ends) const;
   GroupMarks widened(GroupMarks marks, std::span<const std::int32_t> ends) const;
+  /// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there. With the
+  /// second law, those without which the energy does not rise: what was found is tried together, then in halves, down to single
+  /// bonds, which stay.
   void fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body, BondUpdate& update);
+  void lower(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
+             BondUpdate& update);
+  void try_to_fail(std::vector<BondChange> changes, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+                   std::vector<BondChange>& before, BondUpdate& update);
+  void take_back(std::vector<BondChange>& before, const Body& body);
+  std::vector<BondChange> later_half(std::vector<BondChange>& changes) const;
+  void finish(const BondUpdate& update);
 
   Families& families_;
   const BodyDamage& damage_;

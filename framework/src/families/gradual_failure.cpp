@@ -37,6 +37,16 @@ void GradualFailure::fade(std::span<const BondId> bonds) {
   }
 }
 
+void GradualFailure::hold(BondId bond, double integrity) {
+  // One that would have gone altogether is in neither of them.
+  if (const auto fading = fading_.find(bond); fading != fading_.end())
+    fading->second = integrity;
+  else if (integrity < 1)
+    letting_go_[bond] = integrity;
+  else
+    letting_go_.erase(bond);
+}
+
 void GradualFailure::restore(std::span<const BondChange> changes, std::span<const BondId> of_fragments) {
   letting_go_.clear();
   fading_.clear();

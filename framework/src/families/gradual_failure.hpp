@@ -27,6 +27,8 @@ class GradualFailure {
   /// The bonds of fragments begin to go, all by the same factor in each step: the gradients of fragments stay what they are
   /// meanwhile.
   void fade(std::span<const BondId> bonds);
+  /// A bond of the last `let_go` has not been lowered but has this integrity still. A whole one has to be found again.
+  void hold(BondId bond, double integrity);
   /// The bonds of a checkpoint that are not whole, and those of its fragments.
   void restore(std::span<const BondChange> changes, std::span<const BondId> of_fragments);
 

@@ -199,25 +199,26 @@ LatticePattern& LatticeFamilies::own_pattern(LatticeChunk& chunk) {
   return patterns[static_cast<std::size_t>(chunk.pattern)];
 }
 
-std::vector<std::int32_t> LatticeFamilies::lower_bonds(std::span<const BondChange> changes) {
+std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange> changes) {
   std::vector<std::int32_t> ends;
-  const auto lower = [&](std::int32_t point, std::size_t slot, double b) {
+  const auto set = [&](std::int32_t point, std::size_t slot, double b) {
     LatticePattern& p = own_pattern(tiles.chunks[static_cast<std::size_t>(tiles.chunk_of(point))]);
     const auto lane = static_cast<std::size_t>(point) % chunk_points;
     const auto bit = static_cast<std::uint8_t>(1u << lane);
     if (p.integrity.empty() && b > 0 && b < 1) {
       p.integrity.resize(slots.size() * chunk_points);
-      for (std::size_t s = 0; s < slots.size(); ++s) std::copy_n(lane_factors[p.mask[s]], chunk_points, p.integrity.data() + s * chunk_points);
+      for (std::size_t s = 0; s < slots.size(); ++s)
+        std::copy_n(lane_factors[p.mask[s]], chunk_points, p.integrity.data() + s * chunk_points);
     }
     if (!p.integrity.empty()) p.integrity[slot * chunk_points + lane] = b;
-    if (b == 0) p.mask[slot] &= static_cast<std::uint8_t>(~bit);
+    p.mask[slot] = static_cast<std::uint8_t>(b == 0 ? p.mask[slot] & ~bit : p.mask[slot] | bit);
     p.irregular |= bit;
     ends.push_back(point);
   };
   for (const auto& [bond, integrity] : changes) {
     const std::size_t slot = slots.with_shift(bond.far - bond.point);
-    lower(bond.point, slot, integrity);
-    lower(bond.far, slots.reverse(slot), integrity);
+    set(bond.point, slot, integrity);
+    set(bond.far, slots.reverse(slot), integrity);
   }
   std::sort(ends.begin(), ends.end());
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());

@@ -90,7 +90,7 @@ class LatticeFamilies final : public Families {
   /// Live cells of a chunk, and for each slot those whose far ends are live too.
   std::uint8_t live_masks(std::int64_t first, std::vector<std::uint8_t>& live_mask) const;
   LatticePattern& own_pattern(LatticeChunk& chunk);
-  std::vector<std::int32_t> lower_bonds(std::span<const BondChange> changes) override;
+  std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend_bonds() override;
   void make_room() override {}
   double support(std::size_t p) const noexcept override { return pattern_at(p).support[p % chunk_points]; }

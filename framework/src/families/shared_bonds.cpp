@@ -21,6 +21,12 @@ std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) co
   return all;
 }
 
+double SharedBonds::name(BondId bond) const noexcept {
+  const auto place = [&](std::int32_t p) { return part() ? body_.places().place[static_cast<std::size_t>(p)] : p; };
+  const std::size_t stride = part() ? body_.places().stride : body_.stride();
+  return static_cast<double>(place(bond.point)) * static_cast<double>(stride) + static_cast<double>(place(bond.far));
+}
+
 void SharedBonds::find_here() const {
   if (!here_.empty()) return;
   here_.assign(body_.places().stride, -1);

@@ -26,6 +26,8 @@ class SharedBonds {
   std::vector<BondChange> of_all(std::span<const BondChange> changes) const;
   /// Marks the groups of eight points that hold points of groups which any rank has marked. All ranks must call it.
   void mark(GroupMarks& marks) const;
+  /// A number for each bond that all ranks have for it, in the order of the bonds.
+  double name(BondId bond) const noexcept;
   /// Whether other ranks have bonds, too.
   bool part() const noexcept { return !body_.places().place.empty(); }
 

@@ -16,6 +16,7 @@ BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, 
     gained_ -= update.dissipated;
   }
   inside_out_ += update.inside_out;
+  held_ += static_cast<std::int64_t>(update.held);
   return update;
 }
 
@@ -34,6 +35,9 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
         fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n",
                     gains_, gained_, dissipated + gained_);
   }
+  if (held_ > 0)
+    text +=
+        fmt::format("bonds held    {} times a bond beyond its limit stayed, as its failure would have created energy\n", held_);
   if (inside_out_ > 0) {
     text += fmt::format("warning       {} times points were turned inside out where bonds failed: the energy and the impulse of these bonds are lost\n",
                         inside_out_);
@@ -45,6 +49,7 @@ void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   out.value(gains_);
   out.value(gained_);
   out.value(inside_out_);
+  out.value(held_);
   const std::vector<BondChange> bonds = terms.changed_bonds();
   out.value(static_cast<std::uint64_t>(bonds.size()));
   for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
@@ -80,6 +85,7 @@ void FractureRecord::read_account(ByteReader& in) {
   gains_ = in.value<std::int64_t>();
   gained_ = in.value<double>();
   inside_out_ = in.value<std::int64_t>();
+  held_ = in.value<std::int64_t>();
 }
 
 void FractureRecord::read(Terms& terms, ByteReader& in) {

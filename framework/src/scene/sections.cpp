@@ -253,6 +253,11 @@ ParameterTable common_part_parameters(Kind kind) {
   if (kind == Kind::damage) {
     table.add(ParameterType::texts, "no_fail", "-", "Sets of points whose bonds never fail.").by_default("[]");
     table.boolean("gradual", "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.").by_default("false");
+    table.boolean("second_law",
+                  "Bonds whose failure would raise the stored energy stay until it does not. Without it true where the "
+                  "kinematics creates energy as bonds "
+                  "fail: one gradient per point without a stabilization, bond_augmented, sub_horizon, selective over weighted "
+                  "bond gradients.");
   }
   return table;
 }

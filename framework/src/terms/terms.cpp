@@ -16,6 +16,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
+#include "terms/failure_energy.hpp"
 #include "terms/mechanics.hpp"
 #include "terms/pair_forces.hpp"
 #include "terms/zero_energy_penalty.hpp"
@@ -60,20 +61,21 @@ void warn_of_cost(const TermParts& parts, ModelReport& report) {
                                                 : "by the energy that bonds set free (energy = \"released\") they cost Gc"));
 }
 
-/// Formulations whose bonds create energy as they fail (framework/docs/fracture.md, "Every kinematics and kernel").
+/// Where bonds that fail would create energy: framework/docs/fracture.md, "Bonds that stay".
 void warn_of_energy(const TermParts& parts, ModelReport& report) {
-  const Formulation& f = parts.formulation;
-  const bool by_bond = f.weighted && f.parts(parts.families->body().dimension()) == 0;
-  const char* const what = f.point && !parts.stabilization ? "one gradient per point without a stabilization"
-                           : f.bond && f.far_share == 0    ? "bond gradients that rest on the gradient of one end alone"
-                           : by_bond && f.selective()      ? "a selective map over weighted gradients of bonds"
-                           : f.weighted && !by_bond        ? "gradients of parts of families"
-                                                           : nullptr;
+  const bool stabilized = parts.stabilization != nullptr;
+  const char* const what = creates_energy(parts.formulation, stabilized, parts.families->body().dimension());
   if (!what) return;
-  report.warnings.push_back(
-      fmt::format("{}: updates of bonds that fail create energy; which kinematics do not is measured in fracture.md, \"Every "
-                  "kinematics and kernel\"",
-                  what));
+  if (!parts.damage->second_law)
+    report.warnings.push_back(fmt::format(
+        "{}: updates of bonds that fail create energy, unless damage.second_law is true; how much is measured in fracture.md, "
+        "\"Every kinematics and kernel\"",
+        what));
+  else if (parts.formulation.point && !stabilized)
+    report.warnings.push_back(fmt::format(
+        "{}: most bonds beyond their limit stay, as their failure would raise the energy of zero-energy modes; cracks need a "
+        "stabilization (fracture.md, \"Bonds that stay\")",
+        what));
 }
 
 }  // namespace
@@ -288,8 +290,20 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBeg
     if (force.data) combine(1, force, factor, own, force);
     return total_over_ranks(energy);
   };
-  return failing_->fracture.update(u, time_step, begin, reaction,
-                                   {forces, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
+  const Formulation& f = parts_.formulation;
+  const bool owners_alone = !f.pairs && !(f.bond && f.far_share > 0);
+  const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
+    const GroupMarks of = owners_alone ? marks : families.around(marks), around = families.around(of);
+    if (failing_->force.size() == 0) failing_->cleared(at, families.body());
+    ExactSum sum;
+    std::int64_t bad = -1;
+    for (const auto& term : terms_) bad = std::max(bad, term->add_forces_of(at, of, around, failing_->force, &sum));
+    if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
+    return total_over_ranks(sum);
+  };
+  return failing_->fracture.update(
+      u, time_step, begin, reaction,
+      {forces, energy, owners_alone, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
 }
 
 std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {

@@ -28,6 +28,7 @@ struct BodyDamage {
   Field crack_speed;                ///< by point [m/s], where bonds let go in the course of several steps; else empty
   std::vector<std::uint16_t> side;  ///< by point, for interfaces; empty without
   std::vector<InterfaceDamage> interfaces;
+  bool second_law = false;  ///< bonds whose failure would raise the stored energy stay as they are
 
   const Field& last() const noexcept { return failure.size() > 0 ? failure : onset; }
   bool gradual() const noexcept { return crack_speed.size() > 0; }
@@ -77,6 +78,7 @@ struct BondUpdate {
   std::size_t changed = 0;  ///< bonds, each once
   double dissipated = 0;    ///< strain energy before less after, at the displacement where they failed [J]
   std::vector<std::int32_t> ends = {};  ///< points whose bonds have changed, some of them more than once
+  std::size_t held = 0;     ///< bonds that stay as they are, as their failure would have raised the energy
   int inside_out = 0;       ///< times that a point was inadmissible where bonds failed: no energy and no impulse is taken of them
 };
 

@@ -34,6 +34,7 @@ class FractureRecord {
   std::int64_t gains_ = 0;  ///< updates that raised the strain energy
   double gained_ = 0;       ///< what they added [J]
   std::int64_t inside_out_ = 0;  ///< see BondUpdate
+  std::int64_t held_ = 0;        ///< likewise, of all updates
 };
 
 }  // namespace perikit
