@@ -34,8 +34,8 @@ class SceneReader {
   void read_cracks(const toml::table& root);
   void read_initial(const toml::table& root);
   void read_boundaries(const toml::table& root);
-  /// [[symmetry]] and [[periodic]].
   void read_surface(const ParameterValues& values, BoundaryDescription& boundary);
+  /// [[symmetry]] and [[periodic]].
   void read_planes(const toml::table& root);
   void read_loads(const toml::table& root);
   void read_output(const toml::table& root);

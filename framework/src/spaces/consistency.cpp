@@ -190,13 +190,14 @@ class WeightSearch {
     AlignedVector<double>& f = out_.factors;
     f.assign(space_.factors(), 1.0);
     std::vector<double> residuals;
+    int whole_steps = 0;  // in a row: shorter ones come on slowly, too
     const int before = out_.weights.iterations;
     for (out_.rounds = 1;; ++out_.rounds) {
       space_.set_factors(f);
       const double residual = residuals.emplace_back(left());
       const int spent = out_.weights.iterations - before;
       if (effort_.ends(residual, spent) || out_.rounds > most_rounds) return true;
-      const bool stuck = residuals.size() > 3 && residual > 0.75 * residuals[residuals.size() - 4];
+      const bool stuck = whole_steps > 2 && residual > 0.75 * residuals[residuals.size() - 4];
       if (stuck && residual <= enough_residual) return true;  // rounding
       if (stuck) return let_go(residual) == 0;
       AlignedVector<double> slopes(f);
@@ -211,6 +212,7 @@ class WeightSearch {
       double longest = 0;
       for (const double s : step) longest = std::max(longest, std::abs(s));
       const double part = std::min(1.0, 2 / communicator().largest(longest));
+      whole_steps = part < 1 ? 0 : whole_steps + 1;
       for (std::size_t q = 0; q < y.size(); ++q) {
         y[q] += part * step[q];
         f[q] = factor_of(y[q]);
@@ -272,10 +274,11 @@ Field find_shifts(const SpaceParts& parts, const ClosedPoints& closed, CloudCons
   const auto take = [&](Field field, const Balanced& result) {
     found.push_back(std::move(field));
     const int iterations = out.gradients.iterations + result.iterations;
-    const double before = std::max(out.gradients.before, result.before);
+    const double before = std::max(out.gradients.before, result.before), moved = std::max(out.gradients.moved, result.moved);
     if (found.size() == 1 || result.after > out.gradients.after) out.gradients = result;
     out.gradients.iterations = iterations;
     out.gradients.before = before;
+    out.gradients.moved = moved;
   };
   Balanced result;
   if (formulation.point || formulation.selective()) take(find_shift<D>(parts, closed, out, result), result);
@@ -313,7 +316,7 @@ void CloudConsistency::report(ModelReport& report) const {
   report.bytes += factors.size() * sizeof(double) + shift.bytes();
   report.notes.emplace_back("consistency",
                             fmt::format("{} points balanced, {} more along surfaces; {:.2g} s", whole, at_surfaces, seconds));
-  if (shift.components() > 0) describe("", gradients, "point gradients moved", report);
+  if (shift.components() > 0) describe("", gradients, fmt::format("gradients moved by {:.2g} %", 100 * gradients.moved), report);
   if (!factors.empty())
     describe("", weights,
              fmt::format("weights in {} rounds, w/W {:.3g} to {:.3g}", rounds, smallest, largest),

@@ -27,6 +27,7 @@ struct Balanced {
   int iterations = 0;
   double before = 0, after = 0;  ///< largest |A_k| of closed components, over volume divided by spacing
   Point worst{};                 ///< where `after` is
+  double moved = 0;              ///< gradients: by how much, root mean square over what they were
 };
 
 struct CloudConsistency {

@@ -37,6 +37,16 @@ class ShiftSystem {
     show(x);
     return out_;
   }
+  /// sum_q W_q sum_j |g_qj|^2 / (omega V_j), of which of_point(p) is the share of an owned point.
+  template <class OfPoint>
+  double sum_of(OfPoint&& of_point) const {
+    Field shares = make(), ones = make();
+    for (const std::int32_t p : body_.owned()) {
+      shares.component(0)[p] = of_point(static_cast<std::size_t>(p));
+      ones.component(0)[p] = 1;
+    }
+    return dot(shares, ones);
+  }
 
  protected:
   /// W/V of a point with intact bonds, over the share of its evaluation point.
@@ -104,6 +114,15 @@ class PointShift : public ShiftSystem<D> {
       this->diagonal_.data()[p] = 2 * this->body_.volume(p) * this->families_.normaliser(p, BondWeight::kernel);
   }
 
+  /// sum_j omega V_j |K^-1 xi|^2 = tr K^-1.
+  double unmoved() const {
+    return this->sum_of([&](std::size_t p) {
+      double trace = 0;
+      for (int a = 0; a < D; ++a) trace += this->families_.inverse_shape(p)[symmetric_index(D, a, a)];
+      return this->position_[p][3] * weight_[p] * trace;
+    });
+  }
+
   /// y_k = - V_k sum_j omega V_j [W_k/V_k (x_kj - H_k xi_kj) + W_j/V_j (x_kj - H_j xi_kj)], H the gradient of x.
   void apply(const Field& x, Field& y) {
     this->show(x);
@@ -157,6 +176,15 @@ class PartShift : public ShiftSystem<D> {
       : ShiftSystem<D>(parts, closed, beyond), parts_(static_cast<std::size_t>(parts.formulation.parts(D))) {
     load_parts(parts);
     set_diagonal();
+  }
+
+  double unmoved() const {
+    return this->sum_of([&](std::size_t p) {
+      double sum = 0;
+      for (std::size_t q = 0; q < parts_; ++q)
+        for (std::size_t a = 0; a < D; ++a) sum += of_point(p, q).weight * of_point(p, q).entry(a, a);
+      return this->position_[p][3] * sum;
+    });
   }
 
   /// y_k = - V_k sum_j V_j sum of W_q/V omega_q (x_kj - H_q xi_kj) over the parts q of k and of j that see the bond.
@@ -311,6 +339,9 @@ class PartShift : public ShiftSystem<D> {
   AlignedVector<Row> gradients_;          ///< of x: [(point * parts + part) * D + e]
 };
 
+/// Gradients that move more than they were say nothing of the body any more.
+constexpr double most_moved = 1;
+
 template <int D, class System>
 Field solve_shift(System&& system, const SpaceParts& parts, Balanced& result) {
   Field x = system.make(), b = x, r = x;
@@ -319,10 +350,12 @@ Field solve_shift(System&& system, const SpaceParts& parts, Balanced& result) {
   combine(-1, b, 0, b, b);
   result.iterations = solve(system, b, rounding_residual, effort_of_balance(parts), x).iterations;
   system.apply(x, r);
+  result.moved = std::sqrt(dot(x, r) / system.unmoved());
   combine(1, b, -1, r, r);
   result.after = system.largest(r, &result.worst);
-  if (!(result.after <= result.before)) {  // the constraints contradict each other
+  if (!(result.after <= result.before) || !(result.moved <= most_moved)) {  // the constraints contradict each other
     x = system.make();
+    result.moved = 0;
     result.after = system.largest(b, &result.worst);
   }
   return system.shown(x);
