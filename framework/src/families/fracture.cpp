@@ -1,9 +1,7 @@
 #include "families/fracture.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <iterator>
 #include <limits>
 
@@ -20,10 +18,11 @@ bool on_any_rank(bool here) {
 
 constexpr double not_now = -1;
 
-/// Bonds that stay for the second law would be tried in vain in most steps: they are in one of eight, drawn by the bits of their
-/// value, which are the same on every rank and in a run that was resumed.
-bool drawn(double value) {
-  return (std::bit_cast<std::uint64_t>(value) * 0x9e3779b97f4a7c15u) >> 61 == 0;
+/// A bond that stayed for the second law would be tried in vain in most steps: it is where its value comes past another rung of a
+/// ladder with eight of them for a factor of two.
+bool past_a_rung(double from, double to, double limit) {
+  const auto rung = [&](double value) { return std::floor(8 * std::log2(value / limit)); };
+  return rung(from) != rung(to);
 }
 
 }  // namespace
@@ -53,7 +52,7 @@ std::vector<double> Fracture::moments(std::span<const BondChange> changes, Const
       return first < last ? std::clamp((linear(limit) - first) / (last - first), 0.0, 1.0) : 0.0;
     };
     const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
-    if (damage_.second_law && start[k] > limits.failure && !drawn(end[k]))
+    if (damage_.second_law && start[k] > limits.failure && !past_a_rung(start[k], end[k], limits.failure))
       moments.push_back(not_now);
     else
       moments.push_back(0.5 * (crossing(limits.onset) + crossing(limits.failure)));
