@@ -190,14 +190,13 @@ class WeightSearch {
     AlignedVector<double>& f = out_.factors;
     f.assign(space_.factors(), 1.0);
     std::vector<double> residuals;
-    int whole_steps = 0;  // in a row: shorter ones come on slowly, too
     const int before = out_.weights.iterations;
     for (out_.rounds = 1;; ++out_.rounds) {
       space_.set_factors(f);
       const double residual = residuals.emplace_back(left());
       const int spent = out_.weights.iterations - before;
       if (effort_.ends(residual, spent) || out_.rounds > most_rounds) return true;
-      const bool stuck = whole_steps > 2 && residual > 0.75 * residuals[residuals.size() - 4];
+      const bool stuck = residuals.size() > 3 && residual > 0.75 * residuals[residuals.size() - 4];
       if (stuck && residual <= enough_residual) return true;  // rounding
       if (stuck) return let_go(residual) == 0;
       AlignedVector<double> slopes(f);
@@ -212,7 +211,6 @@ class WeightSearch {
       double longest = 0;
       for (const double s : step) longest = std::max(longest, std::abs(s));
       const double part = std::min(1.0, 2 / communicator().largest(longest));
-      whole_steps = part < 1 ? 0 : whole_steps + 1;
       for (std::size_t q = 0; q < y.size(); ++q) {
         y[q] += part * step[q];
         f[q] = factor_of(y[q]);
