@@ -55,7 +55,7 @@ void BondAssembly<D>::read_bonds() {
     s.correction.assign(D * s.family.size, 0.0);
     formulation_.bond->correction(s.family.view(rows_.body().horizon()), s.correction.data(), s.family.size);
     point_gradient(s.family, rows_.body().horizon(), formulation_.order, s.gradient);
-    if (shift_.data) shift_gradient(s.family, rows_.point(i), shift_, s.gradient);
+    if (shift_.data) shift_gradient(s.family, shift_, s.gradient);
     const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
     volume_share_[i] = regular ? rows_.families().left(rows_.point(i)) : 0.0;
     const auto neighbours = rows_.neighbours(i);

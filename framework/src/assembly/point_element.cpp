@@ -67,7 +67,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
   const Formulation& formulation = shape.formulation;
   if (formulation.point) {
     point_gradient(s.family, horizon, formulation.order, s.gradient);
-    if (shape.shift.data) shift_gradient(s.family, p, shape.shift, s.gradient);
+    if (shape.shift.data) shift_gradient(s.family, shape.shift, s.gradient);
     out.g.assign(D * out.width, 0.0);
     write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
     out.points = 1;

@@ -101,7 +101,7 @@ class StoredRows final : public VolumetricState<D> {
   bool make_row(std::size_t i, ConstFieldView u, Memory& m) {
     rows_.load(i, m.family);
     point_gradient(m.family, rows_.body().horizon(), this->parts_.formulation.order, m.g);
-    if (this->parts_.shift.data) shift_gradient(m.family, rows_.point(i), this->parts_.shift, m.g);
+    if (this->parts_.shift.data) shift_gradient(m.family, this->parts_.shift, m.g);
     const std::size_t p = rows_.point(i), first = rows_.first(i);
     const auto neighbours = rows_.neighbours(i);
     T H{};

@@ -125,10 +125,14 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   return update;
 }
 
-void Fracture::finish(const BondUpdate& update) {
+void Fracture::finish(BondUpdate& update) {
   if (gradual_) gradual_->fade(fragments(update.ends));
+  if (!damage_.second_law) return;
+  auto held = static_cast<std::int64_t>(update.held);  // of this rank
+  communicator().sum({&held, 1});
+  update.held = static_cast<std::size_t>(held);
   // A monitor takes it that the bonds that it has named are gone.
-  if (damage_.second_law && on_any_rank(update.held > 0)) finder_->forget();
+  if (held > 0) finder_->forget();
 }
 
 /// Groups that depend on the bonds of these points; on all ranks the same.

@@ -64,7 +64,7 @@ class Fracture {
                    std::vector<BondChange>& before, BondUpdate& update);
   void take_back(std::vector<BondChange>& before, const Body& body);
   std::vector<BondChange> later_half(std::vector<BondChange>& changes) const;
-  void finish(const BondUpdate& update);
+  void finish(BondUpdate& update);
 
   Families& families_;
   const BodyDamage& damage_;

@@ -7,6 +7,7 @@
 #include "spaces/balance_solver.hpp"
 #include "spaces/cloud_gradient.hpp"
 #include "spaces/local_stencil.hpp"
+#include "spaces/stencil_shift.hpp"
 
 namespace perikit {
 
@@ -373,25 +374,9 @@ Field find_part_shift(const SpaceParts& parts, const ClosedPoints& closed, const
   return solve_shift<D>(PartShift<D>(parts, closed, beyond), parts, result);
 }
 
-void shift_gradient(const FamilyArrays& family, std::size_t p, ConstFieldView lambda, std::vector<double>& g) {
-  const auto d = static_cast<std::size_t>(family.dimension);
-  double H[9] = {};  // of lambda
-  const auto difference = [&](std::size_t k, std::size_t c) {
-    return lambda.component(static_cast<int>(c))[family.far[k]] - lambda.component(static_cast<int>(c))[p];
-  };
-  bool live = false;
-  for (std::size_t k = 0; k < family.far.size(); ++k)
-    for (std::size_t c = 0; c < d; ++c)
-      for (std::size_t e = 0; e < d; ++e) {
-        H[c * d + e] += difference(k, c) * g[k * d + e];
-        live = live || g[k * d + e] != 0;
-      }
-  for (std::size_t k = 0; k < family.far.size() && live; ++k)
-    for (std::size_t c = 0; c < d; ++c) {
-      double z = difference(k, c);
-      for (std::size_t e = 0; e < d; ++e) z -= H[c * d + e] * family.xi[e][k];
-      g[k * d + c] += family.omega[k] * family.volume[k] * z;
-    }
+void shift_gradient(const FamilyArrays& family, ConstFieldView lambda, std::vector<double>& g) {
+  const auto size = static_cast<std::size_t>(family.dimension);
+  each_shift(family, family.omega.data(), g.data(), lambda, 0, [&](std::size_t k, std::size_t e, double d) { g[k * size + e] += d; });
 }
 
 template Field find_shift<1>(const SpaceParts&, const ClosedPoints&, const CloudConsistency&, Balanced&);

@@ -25,6 +25,6 @@ template <int D>
 Field find_part_shift(const SpaceParts& parts, const ClosedPoints& closed, const CloudConsistency& beyond, Balanced& result);
 
 /// g of the bonds of a loaded family, without -> with lambda: g[k * dimension + e].
-void shift_gradient(const FamilyArrays& family, std::size_t p, ConstFieldView lambda, std::vector<double>& g);
+void shift_gradient(const FamilyArrays& family, ConstFieldView lambda, std::vector<double>& g);
 
 }  // namespace perikit

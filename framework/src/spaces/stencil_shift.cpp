@@ -16,23 +16,7 @@ void StencilShift<D>::begin(int points, const FamilyArrays& family) {
 
 template <int D>
 void StencilShift<D>::set(int q, const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first) {
-  const auto difference = [&](std::size_t k, std::size_t c) {
-    const double* const values = lambda.component(first + static_cast<int>(c));
-    return values[family.far[k]] - values[family.owner];
-  };
-  if (std::all_of(g, g + bonds_ * D, [](double x) { return x == 0; })) return;  // no gradient to move
-  double G[D * D] = {};
-  for (std::size_t k = 0; k < bonds_; ++k)
-    for (std::size_t c = 0; c < D; ++c)
-      for (std::size_t e = 0; e < D; ++e) G[c * D + e] += difference(k, c) * g[k * D + e];
-  for (std::size_t c = 0; c < D; ++c) {
-    double* const to = d_.data() + (static_cast<std::size_t>(q) * D + c) * row_;
-    for (std::size_t k = 0; k < bonds_; ++k) {
-      double z = difference(k, c);
-      for (std::size_t e = 0; e < D; ++e) z -= G[c * D + e] * family.xi[e][k];
-      to[k] = omega[k] * family.volume[k] * z;
-    }
-  }
+  each_shift(family, omega, g, lambda, first, [&](std::size_t k, std::size_t e, double d) { d_[(static_cast<std::size_t>(q) * D + e) * row_ + k] = d; });
 }
 
 template <int D>

@@ -1,8 +1,34 @@
 #pragma once
+#include <algorithm>
+
 #include "families/family_arrays.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
+
+/// visit(k, e, d) of what lambda moves the gradient g[k * d + e] of a loaded family by: d_k = omega_k V_k (lambda_k - G xi_k), G = sum_k
+/// lambda_k (x) g_k, with the influence omega[k] of the evaluation point, and lambda by point in components first ... Not where there is no
+/// gradient to move.
+template <class Visit>
+void each_shift(const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first, Visit&& visit) {
+  const std::size_t bonds = family.far.size();
+  const auto d = static_cast<std::size_t>(family.dimension);
+  if (std::all_of(g, g + bonds * d, [](double x) { return x == 0; })) return;
+  const auto difference = [&](std::size_t k, std::size_t c) {
+    const double* const values = lambda.component(first + static_cast<int>(c));
+    return values[family.far[k]] - values[family.owner];
+  };
+  double G[9] = {};
+  for (std::size_t k = 0; k < bonds; ++k)
+    for (std::size_t c = 0; c < d; ++c)
+      for (std::size_t e = 0; e < d; ++e) G[c * d + e] += difference(k, c) * g[k * d + e];
+  for (std::size_t k = 0; k < bonds; ++k)
+    for (std::size_t c = 0; c < d; ++c) {
+      double z = difference(k, c);
+      for (std::size_t e = 0; e < d; ++e) z -= G[c * d + e] * family.xi[e][k];
+      visit(k, c, omega[k] * family.volume[k] * z);
+    }
+}
 
 /// What a balanced cloud adds to the gradients of a family (spaces/shift.hpp): d_qk of its first evaluation points, H_q += sum_k u_k
 /// (x) d_qk, and t_k += sum_q P_q d_qk.
@@ -14,8 +40,7 @@ class StencilShift {
   bool empty() const noexcept { return points_ == 0; }
   /// d = 0 for so many evaluation points.
   void begin(int points, const FamilyArrays& family);
-  /// d_qk <- omega_k V_k (lambda_k - G xi_k), G = sum_k lambda_k (x) g_k, with the influence omega[k] of the evaluation point, its
-  /// gradient g[k * D + e] and components first ... of lambda, by point.
+  /// As each_shift has it.
   void set(int q, const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first);
   /// Takes the fields (local_stencil.hpp).
   void gradients(int fields, const double* const (*u)[D]);

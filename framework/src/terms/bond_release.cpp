@@ -189,7 +189,7 @@ void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m)
   m.z = m.u;
   for (std::size_t k = 0; k < n; ++k) subtract<D>(m.H, &m.xi[D * k], &m.z[D * k]);
   if (!parts_.shift.data) return;
-  shift_gradient(m.family, p, parts_.shift, m.gradient);
+  shift_gradient(m.family, parts_.shift, m.gradient);
   sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
 }
 
