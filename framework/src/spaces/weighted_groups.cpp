@@ -117,7 +117,7 @@ void Weighted<D>::prepare_cloud() {
 template <int D>
 void Weighted<D>::shift_gradients(ConstFieldView lambda) {
   rules_.shift = lambda;
-  make_cloud_stencils();
+  if (parts_ > 0) make_cloud_stencils();  // others make theirs when they need it
 }
 
 template <int D>
