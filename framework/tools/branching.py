@@ -17,11 +17,11 @@ the outermost cracked points above and below there to those 7 to 9 mm farther, w
 import argparse
 import math
 import pathlib
-import subprocess
 
 import h5py
 import numpy
 
+import kept_runs
 import turned_lattice
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -32,23 +32,12 @@ LATTICES = [("along", 0, 0.0), ("turned by 30 degrees", 30, 0.0), ("jittered by 
 
 
 def run(perikit, folder, spacing, kinematics, ratio, degrees, jitter, threads):
-    log = folder / "run.log"
-    if log.exists() and ("speed  " in log.read_text() or "failed: " in log.read_text()):
-        return
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    text = SCENE.read_text()
     settings = ["kinematics=" + kinematics, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
                 "constants.sigma=%g" % STRESS[kinematics]]
-    if degrees:
-        points = folder.with_suffix(".csv")
-        turned_lattice.write(points, spacing, degrees, (0, -0.02), (0.1, 0.02))
-        text = turned_lattice.put_in(text, points.name)
-    else:
+    if not degrees:
         settings += ["body.lattice.spacing=%g" % spacing] + (["body.lattice.jitter=%g" % jitter] if jitter else [])
-    scene = folder.with_suffix(".toml")
-    scene.write_text(text)
-    command = [perikit, "run", str(scene), "-o", str(folder), "--force", "--quiet", "--threads", str(threads)]
-    subprocess.run(command + [word for setting in settings for word in ("--set", setting)], check=False)
+    kept_runs.run(perikit, folder, settings, threads,
+                  lambda: turned_lattice.turned(SCENE.read_text(), folder, spacing, degrees, (0, -0.02), (0.1, 0.02)))
 
 
 def arms(y, spacing):

@@ -13,11 +13,11 @@ has 90 degrees), in the first frame in which the crack has come so far: later ot
 import argparse
 import math
 import pathlib
-import subprocess
 
 import h5py
 import numpy
 
+import kept_runs
 import turned_lattice
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -32,21 +32,10 @@ KERNELS = {"bond_based": ["constant"]}  # which the influence function does not 
 
 
 def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
-    log = folder / "run.log"
-    if log.exists() and ("speed  " in log.read_text() or "failed: " in log.read_text()):
-        return
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    text = SCENE.read_text()
-    if degrees:
-        points = folder.with_suffix(".csv")
-        turned_lattice.write(points, spacing, degrees, (0, -0.1), (0.1, 0.1))
-        text = turned_lattice.put_in(text, points.name)
-    scene = folder.with_suffix(".toml")
-    scene.write_text(text)
     settings = kinematics + ["family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
                 "output.frames=50"] + ([] if degrees else ["body.lattice.spacing=%g" % spacing])
-    command = [perikit, "run", str(scene), "-o", str(folder), "--force", "--quiet", "--threads", str(threads)]
-    subprocess.run(command + [word for setting in settings for word in ("--set", setting)], check=False)
+    kept_runs.run(perikit, folder, settings, threads,
+                  lambda: turned_lattice.turned(SCENE.read_text(), folder, spacing, degrees, (0, -0.1), (0.1, 0.1)))
 
 
 def measured(folder):

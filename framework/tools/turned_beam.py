@@ -26,11 +26,8 @@ def cell(perikit, folder, spacing, kinematics, degrees, softening):
     result = folder.with_suffix(".txt")
     if not result.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
-        text = SCENE.read_text()
-        points = folder.with_suffix(".csv")
-        turned_lattice.write(points, spacing, degrees, (0, -0.01), (0.1, 0.01))
         scene = folder.with_suffix(".toml")
-        scene.write_text(turned_lattice.put_in(text, points.name))
+        scene.write_text(turned_lattice.turned(SCENE.read_text(), folder, spacing, degrees, (0, -0.01), (0.1, 0.01)))
         settings = ["kinematics=" + kinematics, "constants.dx=%g" % spacing, "integrator.steps=40",
                     "damage.softening=%g" % softening, "interface.0.damage.softening=%g" % softening]
         command = [str(ROOT / "framework/tools/double_cantilever.sh"), "--scene", str(scene), perikit, str(folder), "--force"]

@@ -21,3 +21,12 @@ def put_in(text, name):
     """A scene with this point file in the place of its [body.lattice], which [sets] follows."""
     begin, end = text.index("[body.lattice]"), text.index("[sets]")
     return text[:begin] + '[body.points]\nfile = "%s"\n\n' % name + text[end:]
+
+
+def turned(text, folder, spacing, degrees, lower, upper):
+    """The scene, on such a lattice where there are degrees; its points stand beside the folder of its run."""
+    if not degrees:
+        return text
+    points = folder.with_suffix(".csv")
+    write(points, spacing, degrees, lower, upper)
+    return put_in(text, points.name)
