@@ -238,11 +238,11 @@ TEST_CASE("disk: a folder that may not be written is one clear error") {
 
 TEST_CASE("interruptions: a signal within a load step is heeded at once, and the run goes on to the same end") {
   std::string scene = load_steps("dynamic_relaxation", 2, "tolerance = 1e-9\nmax_iterations = 1000000");
-  scene = replaced(scene, "spacing = 1.0", "spacing = 0.1");  // seconds for a step
+  scene = replaced(scene, "spacing = 1.0", "spacing = 0.0625");  // half a second and more for a step
   const Desk desk(replaced(scene, "horizon_ratio = 2.015", "horizon_ratio = 3.015"));
   const pid_t child = desk.start({"run", "scene.toml", "--resume", "-o", "out"});
   const auto running = [&] { return fs::exists(desk.path("out/history.csv")) && lines(desk.text("out/history.csv")).size() > 1; };
-  while (!running()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  while (!running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   kill(child, SIGTERM);
   const auto asked = std::chrono::steady_clock::now();
@@ -250,7 +250,10 @@ TEST_CASE("interruptions: a signal within a load step is heeded at once, and the
   CHECK(std::chrono::steady_clock::now() - asked < std::chrono::seconds(5));
   REQUIRE(WIFEXITED(status));
   CHECK(WEXITSTATUS(status) == 1);
-  CHECK(contains(desk.text("out/run.log"), "stopped within step 1, which was given up"));
+  // In either step: the first is over in 0.2 s on a fast machine.
+  const std::string log = desk.text("out/run.log");
+  const bool within = contains(log, "stopped within step 1, which was given up") || contains(log, "stopped within step 2, which was given up");
+  CHECK_MESSAGE(within, log);
   const Result last = desk.perikit("run scene.toml --resume -o out");
   REQUIRE_MESSAGE(last.status == 0, last.err);
   REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);

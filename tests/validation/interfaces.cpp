@@ -39,6 +39,9 @@ const std::vector<Expected> all{{"\"baqp\"", 30, 8, 4},
                                 {"\"bond_augmented\"", 12, 8, 3.5},
                                 {"\"sub_horizon\"", 200, 20, 4.5},
                                 {"\"non_spherical\"", 20, 4, 5},
+                                // Volumes are those of points, which see both sides.
+                                {"{type=\"selective\",base=\"baqp\"}", 3.5, 3.8, 2},
+                                {"{type=\"selective\",base=\"bond_associated\"}", 5, 5.5, 2.5},
                                 // Stabilizations penalise the kink.
                                 {"{type=\"conventional\",stabilization=\"wan\"}", 1.6, 1.3, 1.6},
                                 {"{type=\"conventional\",stabilization=\"silling\"}", 1.9, 1.4, 1.8}};
@@ -102,7 +105,7 @@ TEST_CASE("interfaces: what cannot be a laminate says so") {
   };
   CHECK(note({}).find("are laminates of two materials") != std::string::npos);
   CHECK(note({"family.interfaces=\"parallel\""}).empty());
-  CHECK(note({"kinematics={type=\"selective\",base=\"baqp\"}"}).find("selective") != std::string::npos);
+  CHECK(note({"kinematics={type=\"selective\",base=\"baqp\"}"}).find("are laminates of two materials") != std::string::npos);
   // A layer of two points is seen from both sides.
   CHECK(note({"sets.stiff=\"abs(x - 0.5) < 0.05\""}).find("thin layers") != std::string::npos);
   // Regions of one material are one material.

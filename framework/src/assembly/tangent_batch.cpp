@@ -91,7 +91,7 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
   batch.A = A_.data();
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
-  if (const int bad = evaluate_laminates(first, n); bad >= 0) return bad;
+  if (const int bad = evaluate_laminates(first, n, &H(first, 0)); bad >= 0) return bad;
   const int all = laws_.components();
   for (int l = 0; l < n; ++l) {
     double* out = own_.data() + static_cast<std::size_t>(first + l) * entries;
@@ -105,7 +105,7 @@ int TangentBatch<D>::evaluate_plain(int first, int n) {
 
 /// The laminates among lanes first ... first + n - 1, in place of what one law gave there.
 template <int D>
-int TangentBatch<D>::evaluate_laminates(int first, int n) {
+int TangentBatch<D>::evaluate_laminates(int first, int n, const double* H) {
   const auto begin = std::ranges::lower_bound(laminates_, first, {}, &Laminate::lane);
   const auto end = std::ranges::lower_bound(laminates_, first + n, {}, &Laminate::lane);
   if (begin == end) return -1;
@@ -120,7 +120,8 @@ int TangentBatch<D>::evaluate_laminates(int first, int n) {
   }
   batch.lane = lane;
   batch.laminate = point;
-  batch.H = &H(first, 0);
+  batch.H = H;
+  batch.P = P_.data();
   batch.A = A_.data();
   return laminate_scratch_->evaluate(batch);
 }
@@ -140,6 +141,7 @@ int TangentBatch<D>::evaluate_selective(int first, int n) {
   batch.A = A_.data();
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
+  if (const int bad = evaluate_laminates(first, n, mapped_.data()); bad >= 0) return bad;
   for (int l = 0; l < n; ++l) {
     const auto at = static_cast<std::size_t>(first + l), lane = at * entries;
     const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)],

@@ -45,7 +45,7 @@ class TangentBatch {
   }
   int evaluate_plain(int first, int n);
   int evaluate_selective(int first, int n);
-  int evaluate_laminates(int first, int n);
+  int evaluate_laminates(int first, int n, const double* H);
   void remove_negative_curvature(int lane);
 
   const Laws& laws_;

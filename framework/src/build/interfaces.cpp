@@ -60,13 +60,7 @@ Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, cons
                      fmt::format("found \"{}\" {}; allowed: {}", *scene.laminates ? "laminate" : "parallel", found, allowed));
   };
   if (scene.laminates && scene.regions.empty()) refuse("in a body of one material", "with a [[region]]");
-  if (scene.laminates == true && formulation.selective())
-    refuse(fmt::format("with kinematics \"{}\", whose volume changes belong to points", scene.kinematics->type), "\"parallel\"");
   if (scene.regions.empty() || !scene.laminates.value_or(true)) return out;
-  if (formulation.selective()) {
-    out.notes.push_back("the selective map takes each law by its share of the weight");
-    return out;
-  }
   const auto parts = materials(scene);
   std::vector<std::uint16_t> same(parts.size());
   for (std::size_t id = 0; id < parts.size(); ++id) {

@@ -116,6 +116,19 @@ void BatchWork::merge_weights(BatchScratch& s, const LaminateLanes& lanes) const
   }
 }
 
+/// Laminates among bonds, for each of their ends whose owner stores something; the second ones' lanes follow `lanes` later.
+void BatchWork::repeat_for_ends(int lanes, const BatchScratch& s, int ends, LaminateLanes& of) const noexcept {
+  const LaminateLanes bonds = of;
+  of.n = 0;
+  for (int end = 0; end < ends; ++end)
+    for (int k = 0; k < bonds.n; ++k) {
+      const int l = bonds.lane[k];
+      if (laws_.record_of(static_cast<std::size_t>((end == 0 ? s.owner : s.far)[l])).silent) continue;
+      of.lane[of.n] = end * lanes + l;
+      of.point[of.n++] = bonds.point[k];
+    }
+}
+
 /// Laminates in place of what one law gave on their lanes.
 int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept {
   LaminateBatch batch;
@@ -167,8 +180,16 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* ene
     }
     s.first_number = -1;
   }
-  const int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
+  int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
   if (bad >= 0) return bad % lanes;
+  if (laminates_ && s.one_law < 0) {
+    // What is mapped for either end is a laminate of its own: their owners' volumes differ.
+    LaminateLanes laminates;
+    find_laminates(n, s, true, laminates);
+    repeat_for_ends(lanes, s, ends, laminates);
+    if (laminates.n > 0) bad = evaluate_laminates(s, s.P, tangent ? s.other : nullptr, laminates);
+    if (bad >= 0) return bad % lanes;
+  }
   if (!one_law) {
     // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks for them.
     const auto tidy = [](double* x, int lanes_of) {
@@ -223,7 +244,7 @@ void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept {
   if (finder_) {
-    finder_->add(n, s);
+    finder_->add(n, selective_ ? s.Ht : s.H, s);
     return -1;
   }
   if (balance_) return balance_pass(n, s, both_ends);

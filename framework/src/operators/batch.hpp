@@ -120,8 +120,8 @@ class BatchWork {
         screen_(screen),
         laminates_(laminates) {}
   /// Gradients are collected, and no law is evaluated.
-  BatchWork(const Laws& laws, LaminateFinder& finder)
-      : laws_(laws), work_(Work::sample), energy_(false), selective_(false), history_(nullptr), balance_(nullptr), screen_(nullptr), finder_(&finder) {}
+  BatchWork(const Laws& laws, LaminateFinder& finder, bool selective)
+      : laws_(laws), work_(Work::sample), energy_(false), selective_(selective), history_(nullptr), balance_(nullptr), screen_(nullptr), finder_(&finder) {}
 
   /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
   void pull_back() noexcept { pulled_back_ = true; }
@@ -166,6 +166,7 @@ class BatchWork {
            const LaminateLanes* laminates) const noexcept;
   void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
   void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;
+  void repeat_for_ends(int lanes, const BatchScratch& s, int ends, LaminateLanes& of) const noexcept;
   int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
   bool one_law(const BatchScratch& s) const noexcept { return laws_.single() || s.one_law >= 0; }
   bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }

@@ -48,7 +48,7 @@ bool find_laminate(int dimension, const double (&gradient)[interface_values][3],
 LaminateFinder::LaminateFinder(int dimension, bool once_for_both, int keep)
     : dimension_(dimension), keep_(keep), once_(once_for_both), of_thread_(static_cast<std::size_t>(thread_count())) {}
 
-void LaminateFinder::add(int n, const BatchScratch& s) {
+void LaminateFinder::add(int n, const double* H, const BatchScratch& s) {
   std::vector<Found>& found = of_thread_[static_cast<std::size_t>(thread_index())];
   for (int l = 0; l < n; ++l) {
     std::int64_t number = s.first_number >= 0 ? s.first_number + l : s.number[l];
@@ -59,7 +59,7 @@ void LaminateFinder::add(int n, const BatchScratch& s) {
     Found entry{number, s.owner[l], s.far[l], s.far_number > 0 ? number + s.far_number : -1, {}};
     bool kept = true;
     for (int c = 0; c < dimension_; ++c) {
-      for (int e = 0; e < dimension_; ++e) entry.gradient[c][e] = s.H[(c * dimension_ + e) * batch_points + l];
+      for (int e = 0; e < dimension_; ++e) entry.gradient[c][e] = H[(c * dimension_ + e) * batch_points + l];
       kept = kept && (c >= keep_ || sees(dimension_, entry.gradient[c]));
     }
     if (kept) found.push_back(entry);

@@ -59,7 +59,8 @@ class LaminateFinder {
   /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be
   /// there.
   LaminateFinder(int dimension, bool once_for_both, int keep);
-  void add(int n, const BatchScratch& s);
+  /// H: before the selective map.
+  void add(int n, const double* H, const BatchScratch& s);
   /// In ascending order of numbers.
   std::vector<Found> take();
 

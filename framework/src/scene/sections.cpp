@@ -105,7 +105,7 @@ ParameterTable family_parameters() {
       "lattice. true unless given for [body.points] and lattices with jitter, where the kinematics allow it.");
   // No default that would be written out: it is refused where there is nothing to choose.
   table.choice("interfaces", {"laminate", "parallel"},
-               "Evaluation points that two materials share: a laminate of both (unless given, where the kinematics allow it), or each law "
+               "Evaluation points that two materials share: a laminate of both (the default), or each law "
                "with its share of the weight.");
   table.exactly(1, {"horizon_ratio", "horizon"});
   return table;

@@ -70,13 +70,18 @@ void CloudBonds<D>::shift_gradients(ConstFieldView lambda) {
 template <int D>
 void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
                            double* A) const noexcept {
+  // Locals: what is written could be any double that a member is.
+  const std::int32_t* const neighbour = families_.lists().neighbour.data() + begin;
+  const Row *const at = u.data(), *const gradient = H.data(), here = at[p];
+  const double far_share = far_share_;
+  Row own[D];
+  for (std::size_t e = 0; e < D; ++e) own[e] = (1 - far_share) * gradient[D * p + e];
   for (int l = 0; l < n; ++l) {
-    const auto j = static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(begin + l)]);
-    const Row d = u[j] - u[p];
+    const auto j = static_cast<std::size_t>(neighbour[l]);
+    const Row d = at[j] - here;
     for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
     for (int e = 0; e < D; ++e) {
-      const Row& own = H[D * p + static_cast<std::size_t>(e)];
-      const Row h = far_share_ == 0 ? own : (1 - far_share_) * own + far_share_ * H[D * j + static_cast<std::size_t>(e)];
+      const Row h = far_share == 0 ? own[e] : own[e] + far_share * gradient[D * j + static_cast<std::size_t>(e)];
       for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
     }
   }
@@ -91,26 +96,30 @@ void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const Align
 template <int D>
 void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept {
   double *xi = s.bond[0], *length = s.bond[2], *omega = s.bond[2] + batch_points, *volume = s.bond[2] + 2 * batch_points;
-  const double* influence = families_.omegas();
-  const Row x = position_[p];
+  const double *const influence = families_.omegas(), *const scale = scale_.data();
+  const std::int32_t* const neighbour = families_.lists().neighbour.data();
+  const Row *const position = position_, x = position[p];
+  const bool by_kernel = formulation_.weight == BondWeight::kernel;
+  const double own_scale = scale[p];
   for (int l = 0; l < lanes; ++l) {
     const bool real = l < n;
     const auto k = static_cast<std::size_t>(begin + (real ? l : 0));
-    const auto j = static_cast<std::size_t>(families_.lists().neighbour[k]);
-    const Row bond = position_[j] - x;
+    const auto j = static_cast<std::size_t>(neighbour[k]);
+    const Row far = position[j], bond = far - x;
     for (int c = 0; c < D; ++c) xi[c * batch_points + l] = bond[c];
     length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
     omega[l] = real ? influence[k] : 0.0;
-    volume[l] = real ? position_[j][3] : 0.0;
-    const double factor = !real ? 0.0 : formulation_.weight == BondWeight::kernel ? influence[k] : families_.b(k);
-    s.weight[l] = scale_[p] * position_[j][3] * factor;
-    s.far_weight[l] = scale_[j] * x[3] * factor;
-    if (factor_) {
-      s.weight[l] *= factor_[k];
-      if (pairs_) s.far_weight[l] *= far_factor_[k];
-    }
+    volume[l] = real ? far[3] : 0.0;
+    const double factor = !real ? 0.0 : by_kernel ? influence[k] : families_.b(k);
+    s.weight[l] = own_scale * far[3] * factor;
+    s.far_weight[l] = scale[j] * x[3] * factor;
     s.owner[l] = static_cast<std::int32_t>(p);
     s.far[l] = static_cast<std::int32_t>(j);
+  }
+  for (int l = 0; l < n && factor_; ++l) {
+    const auto k = static_cast<std::size_t>(begin + l);
+    s.weight[l] *= factor_[k];
+    if (pairs_) s.far_weight[l] *= far_factor_[k];
   }
 }
 
@@ -167,17 +176,19 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Bl
 template <int D>
 void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
   Row own{}, own_stress[D] = {};
+  Row *const force = force_.data(), *const flux = flux_.data();
+  const double far_share = far_share_;
   for (int l = 0; l < n; ++l) {
     const auto j = static_cast<std::size_t>(s.far[l]);
     Row t{};
     for (int c = 0; c < D; ++c) t[c] = s.t[c * batch_points + l];
     own += t;
-    force_[j] -= t;
+    force[j] -= t;
     for (int e = 0; e < D; ++e) {
       Row stress{};
       for (int c = 0; c < D; ++c) stress[c] = s.P[(c * D + e) * batch_points + l];
-      own_stress[e] += (1 - far_share_) * stress;
-      if (far_share_ > 0) flux_[D * j + static_cast<std::size_t>(e)] += far_share_ * stress;
+      own_stress[e] += stress;
+      if (far_share > 0) flux[D * j + static_cast<std::size_t>(e)] += far_share * stress;
     }
   }
   const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };
@@ -187,7 +198,7 @@ void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool bo
     if (both_ends) pressure_[static_cast<std::size_t>(s.far[l])] += pressure(lanes + l);
   }
   force_[p] += own;
-  for (int e = 0; e < D; ++e) flux_[D * p + static_cast<std::size_t>(e)] += own_stress[e];
+  for (int e = 0; e < D; ++e) flux[D * p + static_cast<std::size_t>(e)] += (1 - far_share) * own_stress[e];
 }
 
 /// Eight points at a time: rows of gradients to lanes.

@@ -50,6 +50,7 @@ class CloudPairs final : public PairLoop {
   /// Whether all bonds of the point had a finite positive length.
   template <PairWork work>
   bool run_point(std::size_t p, const PairPass& pass, double& energy);
+  void moduli(std::size_t p, const std::int32_t* neighbour, int n, const Gathered& g, double* out) const noexcept;
   template <PairWork work>
   void gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept;
 
@@ -80,20 +81,38 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
   if (parts.quiet) watch_waves(reach);
 }
 
+/// c_ij of n bonds.
+template <int D>
+void CloudPairs<D>::moduli(std::size_t p, const std::int32_t* neighbour, int n, const Gathered& g, double* out) const noexcept {
+  const Row *const modulus = moduli_.data(), own = modulus[p];
+  if (fields_.correction.size() == 0) {
+    for (int l = 0; l < n; ++l) out[l] = 0.5 * (own[3] + modulus[neighbour[l]][3]);
+  } else {
+    for (int l = 0; l < n; ++l) {
+      const Row mean = 0.5 * (own + modulus[neighbour[l]]);
+      double factor = 0;
+      for (int c = 0; c < D; ++c) factor += mean[c] * g.xi[c][l] * g.xi[c][l];
+      out[l] = mean[3] * factor / g.length[l];
+    }
+  }
+  for (int l = 0; l < n && fields_.crosses(p); ++l) {
+    const auto j = static_cast<std::size_t>(neighbour[l]);
+    const double mean = 0.5 * (own[3] + modulus[j][3]);
+    if (mean > 0) out[l] *= fields_.of_bond(p, j) / mean;
+  }
+}
+
 template <int D>
 template <PairWork work>
 void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept {
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
-  const Row x = position_[p], own = u_[p], own_w = rate ? w_[p] : Row{}, own_moduli = moduli_.empty() ? Row{} : moduli_[p];
-  const bool crosses = fields_.crosses(p);
-  const std::int32_t* neighbour = lists_.neighbour.data() + begin;
-  const double *omega = families_.whole_omegas(), *integrity = families_.integrities();
+  // One loop for what every bond has, and one for each thing more: each is short enough to stay in registers.
+  const Row *const position = position_, *const u = u_.data(), x = position[p], own = u[p];
+  const std::int32_t* const neighbour = lists_.neighbour.data() + begin;
   for (int l = 0; l < n; ++l) {
     const auto j = static_cast<std::size_t>(neighbour[l]);
-    // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
-    const double b = integrity ? integrity[begin + l] : 1.0;
-    const Row far = position_[j], xi = far - x, du = b > 0 ? u_[j] - own : Row{};
+    const Row far = position[j], xi = far - x, du = u[j] - own;
     double square = 0;
     for (int c = 0; c < D; ++c) {
       g.xi[c][l] = xi[c];
@@ -101,24 +120,33 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
       square += xi[c] * xi[c];
     }
     g.length[l] = square;
-    g.far_volume[l] = b * far[3];
-    if (fails_) g.integrity[l] = b;
-    g.omega[l] = omega ? omega[begin + l] : 1.0;
-    if constexpr (rate) {
-      const Row dw = w_[j] - own_w;
+    g.far_volume[l] = far[3];
+    if constexpr (!sums) g.q[l] = own[3] + u[j][3];
+  }
+  if (const double* integrity = families_.integrities()) {
+    for (int l = 0; l < n; ++l) {
+      const double b = g.integrity[l] = integrity[begin + l];
+      g.far_volume[l] *= b;
+      // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
+      for (int c = 0; c < D && !(b > 0); ++c) g.du[c][l] = 0;
+    }
+  } else if (fails_) {
+    std::fill_n(g.integrity, n, 1.0);
+  }
+  if (const double* omega = families_.whole_omegas())
+    std::copy_n(omega + begin, n, g.omega);
+  else
+    std::fill_n(g.omega, n, 1.0);
+  if constexpr (rate) {
+    const Row *const w = w_.data(), own_w = w[p];
+    for (int l = 0; l < n; ++l) {
+      const Row far_w = w[neighbour[l]], dw = far_w - own_w;
       for (int c = 0; c < D; ++c) g.dw[c][l] = dw[c];
-      if (dilatation_) g.dq[l] = own_w[3] + w_[j][3];
+      if (dilatation_) g.dq[l] = own_w[3] + far_w[3];
     }
-    if constexpr (!sums) {
-      if (dilatation_) g.q[l] = own[3] + u_[j][3];
-      if (!moduli_.empty()) {
-        Row mean = 0.5 * (own_moduli + moduli_[j]);
-        if (crosses) mean[3] = fields_.of_bond(p, j);
-        double factor = 0;
-        for (int c = 0; c < D; ++c) factor += mean[c] * xi[c] * xi[c];
-        s.modulus[l] = fields_.correction.size() > 0 ? mean[3] * factor / square : mean[3];
-      }
-    }
+  }
+  if constexpr (!sums) {
+    if (!moduli_.empty()) moduli(p, neighbour, n, g, s.modulus);
   }
   for (int l = n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
     for (int c = 0; c < D; ++c) {
@@ -141,6 +169,10 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   const bool screened = work == PairWork::force && pass.screen;
   const bool energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
   double highest = 0;  // energy of a bond, over its share where that is asked for
+  // Locals: packs that are stored may be any member, as far as the compiler knows.
+  const bool dilatation = dilatation_, fails = fails_;
+  Row* const force = force_.data();
+  const std::int64_t end = lists_.first[p + 1];
   alignas(64) PairScratch s;
   alignas(64) Gathered g;
   const double volume = position_[p][3];
@@ -153,10 +185,10 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   bool finite = true;
   const Pack onset(nearest_.least_onset);
   Pack excess(-std::numeric_limits<double>::max());
-  for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < lists_.first[p + 1]; begin += batch_points) {
-    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, lists_.first[p + 1] - begin));
+  for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < end; begin += batch_points) {
+    const int n = static_cast<int>(std::min<std::int64_t>(batch_points, end - begin));
     gather<work>(p, begin, n, g, s);
-    const auto far_point = [&](int l) { return static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(begin + l)]); };
+    const std::int32_t* const neighbour = lists_.neighbour.data() + begin;
     for (int l = 0; l < n; l += pack_width) {
       Pack xi[D], du[D], dw[D];
       for (int c = 0; c < D; ++c) {
@@ -167,7 +199,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       const Pack length = Pack::load(g.length + l);
       const Stretch<D> bond(xi, length, du);
       finite = finite && all(bond.e == bond.e);
-      if (work == PairWork::force && fails_) excess = max(excess, bond.e - onset * length);
+      if (work == PairWork::force && fails) excess = max(excess, bond.e - onset * length);
       bond.e.store(s.e + l);
       for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
@@ -175,10 +207,9 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t[0] + l);
     }
     if constexpr (sums) {
-      for (int l = 0; l < n; ++l) {
-        own_sum += g.t[0][l] * g.far_volume[l];
-        if (half) pass.out.data[far_point(l)] += g.t[0][l] * (fails_ ? g.integrity[l] * volume : volume);
-      }
+      double* const out = pass.out.data;
+      for (int l = 0; l < n; ++l) own_sum += g.t[0][l] * g.far_volume[l];
+      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += g.t[0][l] * (fails ? g.integrity[l] * volume : volume);
       continue;
     }
     law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr,
@@ -187,7 +218,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (pass.screen->over_share) pair_energy_shares(law_, n, g.length, g.omega, s.stiffness);
       for (int l = 0; l < n; ++l) {
         double value = s.energy[l];
-        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * (pass.by_theta[p] + pass.by_theta[far_point(l)]);
+        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * (pass.by_theta[p] + pass.by_theta[neighbour[l]]);
         if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / s.stiffness[l] : 0.0;
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }
@@ -197,7 +228,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     for (int l = 0; l < n; l += pack_width) {
       const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
       Pack T = Pack::load(s.force + l);
-      if (dilatation_) T += weight * Pack::load(g.q + l);
+      if (dilatation) T += weight * Pack::load(g.q + l);
       if constexpr (work == PairWork::force) {
         T *= volumes;
         for (int c = 0; c < D; ++c) (T * Pack::load(s.n[c] + l)).store(g.t[c] + l);
@@ -205,7 +236,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         // d(T n) = dT n + T (dw - n de)/|y|
         const Pack de = Pack::load(s.de + l), turn = T * Pack::load(s.inverse_length + l);
         Pack dT = Pack::load(s.stiffness + l) * de;
-        if (dilatation_) dT += weight * Pack::load(g.dq + l);
+        if (dilatation) dT += weight * Pack::load(g.dq + l);
         for (int c = 0; c < D; ++c) {
           const Pack n_c = Pack::load(s.n[c] + l);
           (-volumes * (dT * n_c + turn * (Pack::load(g.dw[c] + l) - n_c * de))).store(g.t[c] + l);
@@ -216,12 +247,12 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       Row t{};
       for (int c = 0; c < D; ++c) t[c] = g.t[c][l];
       own += t;
-      if (half) force_[far_point(l)] -= t;
+      if (half) force[neighbour[l]] -= t;
     }
   }
   if (screened && highest > pass.screen->limit + pass.screen->density[p])
     std::atomic_ref(pass.screen->near[p / padding]).store(1, std::memory_order_relaxed);
-  if (work == PairWork::force && fails_) {
+  if (work == PairWork::force && fails) {
     alignas(64) double lanes[pack_width];
     excess.store(lanes);
     nearest_.excess[p] = *std::max_element(lanes, lanes + pack_width);

@@ -74,6 +74,9 @@ class LatticePairs final : public PairLoop {
   template <PairWork work, bool half>
   int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
 
+  void moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept;
+  void screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept;
+
   const PairKinematics& law_;
   const PairFields& fields_;
   bool dilatation_;
@@ -83,6 +86,55 @@ class LatticePairs final : public PairLoop {
   std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
 
+/// c_ij of the bonds of `count` slots.
+template <int D>
+void LatticePairs<D>::moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept {
+  const double *const of_point = fields_.modulus.data() + p, *G[D];
+  const bool crosses = fields_.crosses(static_cast<std::size_t>(p)), corrected = fields_.correction.size() > 0;
+  for (int a = 0; a < D && corrected; ++a) G[a] = fields_.correction.component(a) + p;
+  const auto* const shifts = families_.slots.shifts.data();
+  for (int k = 0; k < count; ++k, out += chunk_points) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    const std::int64_t far = shifts[at];
+    for (int l = 0; l < chunk_points; l += pack_width) {
+      if (pattern.mask[at] == 0) {
+        Pack(0.0).store(out + l);
+        continue;
+      }
+      (Pack(0.5) * (Pack::load(of_point + l) + Pack::load(of_point + far + l))).store(out + l);
+    }
+    for (int l = 0; l < chunk_points && crosses; ++l)
+      if (pattern.mask[at] >> l & 1) out[l] = fields_.of_bond(static_cast<std::size_t>(p + l), static_cast<std::size_t>(p + far + l));
+    for (int l = 0; l < chunk_points && corrected; l += pack_width) {
+      Pack g(0.0);
+      for (int a = 0; a < D; ++a) {
+        const double cosine = families_.slots.xi[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
+        g += Pack(0.5 * cosine * cosine) * (Pack::load(G[a] + l) + Pack::load(G[a] + far + l));
+      }
+      (Pack::load(out + l) * g).store(out + l);
+    }
+  }
+}
+
+/// Marks the chunk where a bond holds too much: its energy, over its share where that is asked for.
+template <int D>
+void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept {
+  Pack highest[chunk_points / pack_width];
+  for (int k = 0; k < count; ++k) {
+    const std::size_t at = slot + static_cast<std::size_t>(k);
+    const std::int64_t far = p + families_.slots.shifts[at];
+    const Pack weight(omega_[at * chunk_points] * length_[at * chunk_points]), per_share(pass.screen->over_share ? inverse_share_[at] : 1.0);
+    for (int l = 0; l < chunk_points && pattern.mask[at] != 0; l += pack_width) {
+      Pack value = Pack::load(s.energy + k * chunk_points + l);
+      if (pass.by_theta) value += weight * Pack::load(s.e + k * chunk_points + l) * (Pack::load(pass.by_theta + p + l) + Pack::load(pass.by_theta + far + l));
+      highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value * per_share));
+    }
+  }
+  bool near = false;
+  for (int l = 0; l < chunk_points; ++l) near |= highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)];
+  if (near) pass.screen->near[static_cast<std::size_t>(p) / padding] = 1;
+}
+
 template <int D>
 template <PairWork work, bool half>
 int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& total) const noexcept {
@@ -90,66 +142,74 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
   constexpr int packs = chunk_points / pack_width, results = sums || work == PairWork::energy ? 1 : D;
   const LatticePattern& pattern = families_.pattern(chunk);
-  const bool weakened = !pattern.integrity.empty();   // some b lies between 0 and 1: it weighs all that its bond does
   const std::int64_t p = chunk.first;
   const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
-  const bool screened = work == PairWork::force && pass.screen,
+  const bool screened = work == PairWork::force && pass.screen, uniform = fields_.modulus.size() == 0,
              energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
-  Pack highest[packs];  // energy of a bond, over its share where that is asked for
-  const bool uniform = fields_.modulus.size() == 0, crosses = fields_.crosses(static_cast<std::size_t>(p));
+  // Locals: packs that are stored may be any member, as far as the compiler knows.
+  const bool weakened = !pattern.integrity.empty(), dilatation = dilatation_;   // weakened: a b between 0 and 1 weighs all that its bond does
+  const double volume = families_.volume, squared_volume = squared_volume_, *const lengths = length_.data(), *const omegas = omega_.data();
+  const auto* const xis = families_.slots.xi.data();
+  const auto* const shifts = families_.slots.shifts.data();
+  const auto* const masks = &pattern.mask[0];
+  const double *u[D], *w[D] = {};
+  const double *const q = dilatation_ && !sums ? pass.q.data + p : nullptr, *const dq = dilatation_ && rate && !sums ? pass.dq.data + p : nullptr;
+  double* out[results];
+  for (int c = 0; c < D; ++c) {
+    u[c] = pass.u.component(c) + p;
+    if constexpr (rate) w[c] = pass.w.component(c) + p;
+  }
+  for (int c = 0; c < results; ++c) out[c] = pass.out.component(c) + p;
+  const auto add_far = [](double* target, std::uint8_t mask, std::uint8_t bits, Pack t) {
+    if (mask == 0xff) (Pack::load(target) + t).store(target);
+    else subtract_at(target, bits, -t);
+  };
+
   alignas(64) PairScratch s;
   if constexpr (!sums) {
-    if (uniform)
-      for (double& c : s.modulus) c = fields_.uniform;
+    if (uniform) std::fill(std::begin(s.modulus), std::end(s.modulus), fields_.uniform);
   }
-  Pack own_u[D][packs], own_w[D][packs], own[results][packs], stored[packs];
-  for (int c = 0; c < D; ++c)
-    for (int v = 0; v < packs; ++v) {
-      own_u[c][v] = Pack::load(pass.u.component(c) + p + v * pack_width);
-      if constexpr (rate) own_w[c][v] = Pack::load(pass.w.component(c) + p + v * pack_width);
-    }
+  Pack own[results][packs], stored[packs];
   PackMask finite[packs];
   for (PackMask& f : finite) f = Pack(0.0) == Pack(0.0);
   for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
     const int count = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
     // Bonds: extension and direction, kept for the second half of the work.
-    for (int k = 0; k < count; ++k) {
-      const std::size_t at = slot + static_cast<std::size_t>(k);
-      const std::int64_t far = p + families_.slots.shifts[at];
-      const std::uint8_t mask = pattern.mask[at];
-      if (mask == 0) {
-        for (int lane = k * chunk_points; lane < (k + 1) * chunk_points; lane += pack_width) {
-          Pack(0.0).store(s.e + lane);
-          if (!uniform) Pack(0.0).store(s.modulus + lane);
-        }
-        continue;
+    for (int v = 0; v < packs; ++v) {
+      const int l = v * pack_width;
+      Pack own_u[D], own_w[D], sum(0.0);
+      for (int c = 0; c < D; ++c) {
+        own_u[c] = Pack::load(u[c] + l);
+        if constexpr (rate) own_w[c] = Pack::load(w[c] + l);
       }
-      Pack xi[D];
-      for (int c = 0; c < D; ++c) xi[c] = Pack(families_.slots.xi[at][static_cast<std::size_t>(c)]);
-      for (int v = 0; v < packs; ++v) {
-        const int l = v * pack_width, lane = k * chunk_points + l;
-        const auto bits = static_cast<std::uint8_t>(mask >> l);
-        const auto difference = [&](ConstFieldView u, int c, Pack mine) {
-          const Pack d = Pack::load(u.component(c) + far + l) - mine;
+      PackMask good = finite[v];
+      for (int k = 0; k < count; ++k) {
+        const std::size_t at = slot + static_cast<std::size_t>(k);
+        const std::int64_t far = shifts[at] + l;
+        const std::uint8_t mask = masks[at], bits = static_cast<std::uint8_t>(mask >> l);
+        const int lane = k * chunk_points + l;
+        if (mask == 0) {
+          Pack(0.0).store(s.e + lane);
+          continue;
+        }
+        const auto difference = [&](const double* field, Pack mine) {
+          const Pack d = Pack::load(field + far) - mine;
           return mask == 0xff ? d : keep(bits, d);
         };
-        Pack du[D], dw[D];
+        Pack xi[D], du[D], dw[D];
         for (int c = 0; c < D; ++c) {
-          du[c] = difference(pass.u, c, own_u[c][v]);
-          if constexpr (rate) dw[c] = difference(pass.w, c, own_w[c][v]);
+          xi[c] = Pack(xis[at][static_cast<std::size_t>(c)]);
+          du[c] = difference(u[c], own_u[c]);
+          if constexpr (rate) dw[c] = difference(w[c], own_w[c]);
         }
-        const Pack length(length_[at * chunk_points]);
-        const Stretch<D> bond(xi, length, du);
-        finite[v] &= bond.e == bond.e;
+        const double length = lengths[at * chunk_points];
+        const Stretch<D> bond(xi, Pack(length), du);
+        good &= bond.e == bond.e;
         if constexpr (sums) {
-          Pack term = Pack(omega_[at * chunk_points] * length_[at * chunk_points] * families_.volume) * (rate ? bond.along(dw) : bond.e);
+          Pack term = Pack(omegas[at * chunk_points] * length * volume) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
-          own[0][v] += term;
-          if constexpr (half) {
-            double* target = pass.out.data + far + l;
-            if (mask == 0xff) (Pack::load(target) + term).store(target);
-            else subtract_at(target, bits, -term);
-          }
+          sum += term;
+          if constexpr (half) add_far(out[0] + far, mask, bits, term);
         } else {
           bond.e.store(s.e + lane);
           for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + lane);
@@ -157,98 +217,70 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
             bond.along(dw).store(s.de + lane);
             bond.inverse_length.store(s.inverse_length + lane);
           }
-          if (!uniform) {
-            Pack c = Pack(0.5) * (Pack::load(fields_.modulus.data() + p + l) + Pack::load(fields_.modulus.data() + far + l));
-            if (crosses) {
-              alignas(64) double of_lane[pack_width];
-              c.store(of_lane);
-              for (int i = 0; i < pack_width; ++i)
-                if (bits >> i & 1) of_lane[i] = fields_.of_bond(static_cast<std::size_t>(p + l + i), static_cast<std::size_t>(far + l + i));
-              c = Pack::load(of_lane);
-            }
-            if (fields_.correction.size() > 0) {
-              Pack g(0.0);
-              for (int a = 0; a < D; ++a) {
-                const double cosine = families_.slots.xi[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
-                const double* G = fields_.correction.component(a);
-                g += Pack(0.5 * cosine * cosine) * (Pack::load(G + p + l) + Pack::load(G + far + l));
-              }
-              c *= g;
-            }
-            c.store(s.modulus + lane);
-          }
         }
       }
+      finite[v] = good;
+      if constexpr (sums) own[0][v] += sum;
     }
-    if constexpr (!sums) {
-      const int lanes = count * chunk_points;
-      law_.bond_law({lanes, length_.data() + slot * chunk_points, omega_.data() + slot * chunk_points, s.e, s.modulus,
-                     energies ? s.energy : nullptr, work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+    if constexpr (sums) continue;
+    if (!uniform) moduli(pattern, p, slot, count, s.modulus);
+    law_.bond_law({count * chunk_points, lengths + slot * chunk_points, omegas + slot * chunk_points, s.e, s.modulus, energies ? s.energy : nullptr,
+                   work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+    if (screened) screen(pass, pattern, p, slot, count, s);
+    for (int v = 0; v < packs; ++v) {
+      const int l = v * pack_width;
+      Pack sum[D], own_w[D], sum_stored(0.0);
+      for (int c = 0; c < D; ++c) {
+        sum[c] = Pack(0.0);
+        if constexpr (rate) own_w[c] = Pack::load(w[c] + l);
+      }
+      const Pack own_q = dilatation ? Pack::load(q + l) : Pack(0.0), own_dq = dilatation && rate ? Pack::load(dq + l) : Pack(0.0);
       for (int k = 0; k < count; ++k) {
         const std::size_t at = slot + static_cast<std::size_t>(k);
-        const std::int64_t far = p + families_.slots.shifts[at];
-        const std::uint8_t mask = pattern.mask[at];
+        const std::int64_t far = shifts[at] + l;
+        const std::uint8_t mask = masks[at], bits = static_cast<std::uint8_t>(mask >> l);
+        const int lane = k * chunk_points + l;
         if (mask == 0) continue;
-        for (int v = 0; v < packs; ++v) {
-          const int l = v * pack_width, lane = k * chunk_points + l;
-          const auto bits = static_cast<std::uint8_t>(mask >> l);
-          const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
-          if (screened) {
-            Pack value = Pack::load(s.energy + lane);
-            if (pass.by_theta)
-              value += Pack(omega_[at * chunk_points] * length_[at * chunk_points]) * Pack::load(s.e + lane) *
-                       (Pack::load(pass.by_theta + p + l) + Pack::load(pass.by_theta + far + l));
-            highest[v] = max(highest[v], keep(bits, value * Pack(pass.screen->over_share ? inverse_share_[at] : 1.0)));
-          }
-          if (energies) stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
-          if constexpr (work == PairWork::energy) continue;
-          Pack t[D], T = Pack::load(s.force + lane);
-          const double weight = omega_[at * chunk_points] * length_[at * chunk_points];
-          if (dilatation_) T += Pack(weight) * (Pack::load(pass.q.data + p + l) + Pack::load(pass.q.data + far + l));
-          if constexpr (work == PairWork::force) {
-            T = T * Pack(squared_volume_);
-            for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
-          } else {
-            // d(T n) = dT n + T (dw - n de)/|y|
-            const Pack de = Pack::load(s.de + lane);
-            Pack dT = Pack::load(s.stiffness + lane) * de;
-            if (dilatation_) dT += Pack(weight) * (Pack::load(pass.dq.data + p + l) + Pack::load(pass.dq.data + far + l));
-            const Pack turn = T * Pack::load(s.inverse_length + lane);
-            for (int c = 0; c < D; ++c) {
-              const Pack dw = keep(bits, Pack::load(pass.w.component(c) + far + l) - own_w[c][v]), n = Pack::load(s.n[c] + lane);
-              t[c] = Pack(-squared_volume_) * (dT * n + turn * (dw - n * de));
-            }
-          }
+        const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
+        if (energies) sum_stored += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
+        if constexpr (work == PairWork::energy) continue;
+        Pack t[D], T = Pack::load(s.force + lane);
+        const Pack weight(omegas[at * chunk_points] * lengths[at * chunk_points]);
+        if (dilatation) T += weight * (own_q + Pack::load(q + far));
+        if constexpr (work == PairWork::force) {
+          T = T * Pack(squared_volume);
+          for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
+        } else {
+          // d(T n) = dT n + T (dw - n de)/|y|
+          const Pack de = Pack::load(s.de + lane);
+          Pack dT = Pack::load(s.stiffness + lane) * de;
+          if (dilatation) dT += weight * (own_dq + Pack::load(dq + far));
+          const Pack turn = T * Pack::load(s.inverse_length + lane);
           for (int c = 0; c < D; ++c) {
-            if (weakened) t[c] *= b;
-            if (mask != 0xff) t[c] = keep(bits, t[c]);
-            own[c][v] += t[c];
-            if constexpr (half) {
-              double* target = pass.out.component(c) + far + l;
-              if (mask == 0xff) (Pack::load(target) - t[c]).store(target);
-              else subtract_at(target, bits, t[c]);
-            }
+            const Pack dw = keep(bits, Pack::load(w[c] + far) - own_w[c]), n = Pack::load(s.n[c] + lane);
+            t[c] = Pack(-squared_volume) * (dT * n + turn * (dw - n * de));
           }
         }
+        for (int c = 0; c < D; ++c) {
+          if (weakened) t[c] *= b;
+          if (mask != 0xff) t[c] = keep(bits, t[c]);
+          sum[c] += t[c];
+          if constexpr (half) add_far(out[c] + far, mask, bits, -t[c]);
+        }
       }
+      if (energies) stored[v] += sum_stored;
+      if constexpr (work != PairWork::energy)
+        for (int c = 0; c < D; ++c) own[c][v] += sum[c];
     }
-  }
-  if (screened) {
-    bool near = false;
-    for (int l = 0; l < chunk_points; ++l)
-      near |=
-          highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)];
-    if (near) pass.screen->near[static_cast<std::size_t>(p) / padding] = 1;
   }
   int bad = -1;
   for (int l = chunk_points - 1; l >= 0; --l)
     if (!finite[l / pack_width][l % pack_width]) bad = l;
   for (int v = 0; v < packs; ++v) {
-    const int l = v * pack_width;
-    if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * families_.volume) * stored[v];
-    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume_ * sum(stored[v]);
+    if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * volume) * stored[v];
+    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume * sum(stored[v]);
     for (int c = 0; c < results; ++c) {
-      double* target = pass.out.component(c) + p + l;
+      double* target = out[c] + v * pack_width;
       (Pack::load(target) + own[c][v]).store(target);
     }
   }

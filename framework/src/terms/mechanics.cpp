@@ -47,7 +47,7 @@ void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
 /// Of the rows of these displacements, where those of the first `keep` components are not zero.
 std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near) {
   LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep);
-  const BatchWork work(parts_.laws, finder);
+  const BatchWork work(parts_.laws, finder, parts_.formulation.selective());
   Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
   space_->run(pass);
   return finder.take();
