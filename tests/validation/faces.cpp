@@ -134,6 +134,7 @@ TEST_CASE("a beam whose end turns about a face that is free along its normal: it
 
 TEST_CASE("order two in three dimensions: held, loaded, symmetric and periodic sides in one body") {
   for (const std::string& law : {std::string("\"baqp\""), std::string("\"sub_horizon\"")}) check_order("block", law, {10, 20});
+  check_order("block_wave", "\"baqp\"", {16, 32});
 }
 
 TEST_CASE("the reaction of a face is the derivative of the energy by its displacement, and what it does enters the balance") {
@@ -180,7 +181,8 @@ TEST_CASE("orders of every kinematics, as a table" * doctest::skip()) {
   laws.insert(laws.end(), {"\"conventional\"", "{type=\"selective\",base=\"baqp\"}", "\"ordinary\"", "\"bond_based\""});
   for (const Study& study : {Study{"bar", "Bar held at its face", {40, 80, 160}}, Study{"standing_wave", "Standing wave between held faces", {40, 80, 160}},
                              Study{"square", "Square held on four faces", {16, 32, 64}}, Study{"mixed", "Square held on one face, loaded on three", {16, 32, 64}},
-                             Study{"oblique_wave", "Oblique wave, periodic", {20, 40, 80}}, Study{"block", "Block: held, loaded, symmetric, periodic", {8, 16, 32}}}) {
+                             Study{"oblique_wave", "Oblique wave, periodic", {20, 40, 80}}, Study{"block", "Block: held, loaded, symmetric, periodic", {8, 16, 32}},
+                             Study{"block_wave", "Standing wave in a block", {12, 24, 48}}}) {
     out << fmt::format("**{}** (`configs/faces/{}.toml`)\n\n| kinematics | {} points | {} | {} | order |\n|---|---|---|---|---|\n", study.title, study.scene,
                        study.points[0], study.points[1], study.points[2]);
     for (const std::string& law : laws) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/semidefinite.hpp"
+#include "core/symmetric_matrix.hpp"
 #include "maps/selective_tangent.hpp"
 #include "maps/selective_map.hpp"
 

@@ -1,8 +1,10 @@
 #include "body/level_surface.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
+
+#include "core/symmetric_matrix.hpp"
 
 namespace perikit {
 
@@ -51,9 +53,7 @@ double stretch_of(const Matrix& shape, double depth) {
   // come together.
   constexpr double least_in_front = 0.1, least_behind = 0.05;
   const Matrix front = Matrix::Identity() - depth * shape, behind = Matrix::Identity() + depth * shape;
-  const auto least = [](const Matrix& A) {
-    return Eigen::SelfAdjointEigenSolver<Matrix>(A, Eigen::EigenvaluesOnly).eigenvalues().minCoeff();
-  };
+  const auto least = [](const Matrix& A) { return SymmetricEigen(3, A.data(), false).least(); };
   if (least(front) < least_in_front || least(behind) < least_behind) return 0;
   return behind.determinant() / front.determinant();
 }

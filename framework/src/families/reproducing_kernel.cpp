@@ -1,9 +1,9 @@
 #include "families/reproducing_kernel.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <array>
 
+#include "core/symmetric_matrix.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
@@ -43,9 +43,8 @@ bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<
     }
   }
   const Eigen::MatrixXd M = q * weight.asDiagonal() * q.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(M);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
-  if (!(values(size - 1) > 0) || !(values(0) >= singular_ratio * values(size - 1))) return false;
+  const SymmetricEigen eigen(static_cast<int>(size), M.data(), false);
+  if (!(eigen.largest() > 0) || !(eigen.least() >= singular_ratio * eigen.largest())) return false;
   // M^-1 q W = R^-1 Q^T W^(1/2) with W^(1/2) q^T = Q R, whose condition is the root of M's. With its eigenvalues
   // 3e7 apart (order 8 in 3D) the gradient is exact to 1e-12 (tests/unit/gradient_order.cpp), where the inverse of M would lose seven digits.
   const Eigen::VectorXd root = weight.cwiseSqrt();

@@ -1,67 +1,63 @@
 #include "families/shape_tensor.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include "core/symmetric_matrix.hpp"
 
 namespace perikit {
 
 namespace {
 
-template <int D>
-using Square = Eigen::Matrix<double, D, D>;
+/// d x d, from its upper triangle.
+struct Square {
+  double entries[9] = {};
+  int d;
+  explicit Square(int dimension) : d(dimension) {}
+  Square(int dimension, const double* k) : d(dimension) {
+    for (int a = 0; a < d; ++a)
+      for (int b = 0; b < d; ++b) (*this)(a, b) = k[symmetric_index(d, a, b)];
+  }
+  double& operator()(int a, int b) noexcept { return entries[a * d + b]; }
+};
 
-template <int D>
-Square<D> matrix(const double* k) {
-  Square<D> m;
-  for (int a = 0; a < D; ++a)
-    for (int b = 0; b < D; ++b) m(a, b) = k[symmetric_index(D, a, b)];
-  return m;
-}
-
-template <int D>
-double ratio(const double* k) {
-  const Eigen::SelfAdjointEigenSolver<Square<D>> eigen(matrix<D>(k), Eigen::EigenvaluesOnly);
-  const double high = eigen.eigenvalues()(D - 1);
-  return high > 0 ? std::max(0.0, eigen.eigenvalues()(0) / high) : 0.0;
-}
-
-template <int D>
-bool invert(const double* k, double* inverse, double* condition) {
-  const Eigen::SelfAdjointEigenSolver<Square<D>> eigen(matrix<D>(k));
-  const double low = eigen.eigenvalues()(0), high = eigen.eigenvalues()(D - 1);
-  const bool regular = high > 0 && low > singular_ratio * high;
-  if (condition) *condition = regular ? high / low : std::numeric_limits<double>::infinity();
-  Square<D> m = Square<D>::Zero();
-  if (regular) m = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-  for (int a = 0; a < D; ++a)
-    for (int b = a; b < D; ++b) inverse[symmetric_index(D, a, b)] = m(a, b);
-  return regular;
-}
-
-/// Eigenvalues of K relative to W = L L^T are those of L^-1 K L^-T.
-template <int D>
-double support(const double* k, const double* whole) {
-  double inverse[6];
-  if (!invert<D>(k, inverse, nullptr) || !invert<D>(whole, inverse, nullptr)) return 0;
-  const Square<D> L = matrix<D>(whole).llt().matrixL();
-  Square<D> relative = L.template triangularView<Eigen::Lower>().solve(matrix<D>(k));
-  relative = L.template triangularView<Eigen::Lower>().solve(relative.transpose().eval());
-  const Eigen::SelfAdjointEigenSolver<Square<D>> eigen(relative, Eigen::EigenvaluesOnly);
-  return std::clamp(eigen.eigenvalues()(0), 0.0, 1.0);
-}
+bool regular(const SymmetricEigen& eigen) noexcept { return eigen.largest() > 0 && eigen.least() > singular_ratio * eigen.largest(); }
 
 }  // namespace
 
-double eigenvalue_ratio(int d, const double* K) { return d == 1 ? ratio<1>(K) : d == 2 ? ratio<2>(K) : ratio<3>(K); }
-
-bool invert_shape(int d, const double* K, double* inverse, double* condition) {
-  return d == 1 ? invert<1>(K, inverse, condition) : d == 2 ? invert<2>(K, inverse, condition) : invert<3>(K, inverse, condition);
+double eigenvalue_ratio(int d, const double* K) {
+  const SymmetricEigen eigen(d, Square(d, K).entries, false);
+  return eigen.largest() > 0 ? std::max(0.0, eigen.least() / eigen.largest()) : 0.0;
 }
 
+bool invert_shape(int d, const double* K, double* inverse, double* condition) {
+  const SymmetricEigen eigen(d, Square(d, K).entries);
+  const bool exists = regular(eigen);
+  if (condition) *condition = exists ? eigen.largest() / eigen.least() : std::numeric_limits<double>::infinity();
+  for (int a = 0; a < d; ++a)
+    for (int b = a; b < d; ++b) {
+      double sum = 0;
+      for (int k = 0; k < d && exists; ++k) sum += eigen.vector(a, k) * (1 / eigen.value(k)) * eigen.vector(b, k);
+      inverse[symmetric_index(d, a, b)] = sum;
+    }
+  return exists;
+}
+
+/// Eigenvalues of K relative to W = Q L Q^T are those of L^-1/2 Q^T K Q L^-1/2.
 double shape_support(int d, const double* K, const double* whole) {
-  return d == 1 ? support<1>(K, whole) : d == 2 ? support<2>(K, whole) : support<3>(K, whole);
+  Square k(d, K);
+  const SymmetricEigen own(d, k.entries, false), all(d, Square(d, whole).entries);
+  if (!regular(own) || !regular(all)) return 0;
+  Square relative(d);
+  for (int a = 0; a < d; ++a)
+    for (int b = 0; b < d; ++b) {
+      double sum = 0;
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j < d; ++j) sum += all.vector(i, a) * k(i, j) * all.vector(j, b);
+      relative(a, b) = sum / std::sqrt(all.value(a) * all.value(b));
+    }
+  return std::clamp(SymmetricEigen(d, relative.entries, false).least(), 0.0, 1.0);
 }
 
 }  // namespace perikit

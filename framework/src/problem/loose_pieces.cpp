@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "core/symmetric_matrix.hpp"
 
 namespace perikit {
 
@@ -81,7 +82,7 @@ void find_motions(const Body& body, ConstFieldView u, LoosePiece& piece) {
   piece.size = 1e-3 * body.spacing();
   for (const std::int32_t p : piece.points)
     for (std::size_t c = 0; c < 3; ++c) piece.size = std::max(piece.size, std::abs(place(body, u, p)[c] - piece.centre[c]));
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(m, m);
+  std::vector<double> gram(static_cast<std::size_t>(m * m), 0.0);
   for (const std::int32_t p : piece.points) {
     std::array<Point, 6> at;
     for (int k = 0; k < m; ++k) {
@@ -91,36 +92,35 @@ void find_motions(const Body& body, ConstFieldView u, LoosePiece& piece) {
     }
     for (int j = 0; j < m; ++j)
       for (int k = 0; k < m; ++k)
-        for (std::size_t c = 0; c < 3; ++c) gram(j, k) += at[static_cast<std::size_t>(j)][c] * at[static_cast<std::size_t>(k)][c];
+        for (std::size_t c = 0; c < 3; ++c) gram[static_cast<std::size_t>(j * m + k)] += at[static_cast<std::size_t>(j)][c] * at[static_cast<std::size_t>(k)][c];
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(gram);
+  const SymmetricEigen axes(m, gram.data());
   for (int k = 0; k < m; ++k) {
     // Points on a line do not turn about it, and a single one does not turn.
-    if (axes.eigenvalues()(k) <= 1e-9 * axes.eigenvalues()(m - 1)) continue;
+    if (axes.value(k) <= 1e-9 * axes.largest()) continue;
     LoosePiece::Motion motion{};
     for (int j = 0; j < m; ++j)
-      motion[static_cast<std::size_t>(j)] = axes.eigenvectors()(j, k) / std::sqrt(axes.eigenvalues()(k));
+      motion[static_cast<std::size_t>(j)] = axes.vector(j, k) / std::sqrt(axes.value(k));
     piece.motions.push_back(motion);
   }
 }
 
 /// Keeps the motions that violate none of the conditions: rows of their values.
 void keep_free(const std::vector<std::vector<double>>& rows, LoosePiece& piece) {
-  const auto n = static_cast<Eigen::Index>(piece.motions.size());
-  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(n, n);
-  for (const std::vector<double>& row : rows) {
-    const auto values = Eigen::Map<const Eigen::VectorXd>(row.data(), n);
-    squares += values * values.transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(squares);
-  const double largest = n > 0 ? axes.eigenvalues()(n - 1) : 0.0;
+  const auto n = static_cast<int>(piece.motions.size());
+  std::vector<double> squares(static_cast<std::size_t>(n * n), 0.0);
+  for (const std::vector<double>& row : rows)
+    for (std::size_t j = 0; j < piece.motions.size(); ++j)
+      for (std::size_t k = 0; k < piece.motions.size(); ++k) squares[j * piece.motions.size() + k] += row[j] * row[k];
+  const SymmetricEigen axes(n, squares.data());
+  const double largest = n > 0 ? axes.largest() : 0.0;
   std::vector<LoosePiece::Motion> free;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    if (largest > 0 && axes.eigenvalues()(k) > 1e-10 * largest) continue;
+  for (int k = 0; k < n; ++k) {
+    if (largest > 0 && axes.value(k) > 1e-10 * largest) continue;
     LoosePiece::Motion motion{};
-    for (Eigen::Index j = 0; j < n; ++j)
+    for (int j = 0; j < n; ++j)
       for (std::size_t c = 0; c < motion.size(); ++c)
-        motion[c] += axes.eigenvectors()(j, k) * piece.motions[static_cast<std::size_t>(j)][c];
+        motion[c] += axes.vector(j, k) * piece.motions[static_cast<std::size_t>(j)][c];
     free.push_back(motion);
   }
   piece.motions = std::move(free);

@@ -1,11 +1,12 @@
 #include "spaces/closed_points.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "body/voronoi.hpp"
+#include "core/symmetric_matrix.hpp"
 #include "families/cloud_families.hpp"
 #include "perikit/core/communicator.hpp"
 
@@ -93,13 +94,23 @@ class Normals {
     copy_from_sources(away_);
   }
 
-  Eigen::Matrix3d of(std::size_t p) const {
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (int c = 0; c < body_.dimension(); ++c) sum(c, c) = sides_.component(c)[p];
-    if (!sum.isZero()) return sum;
-    const Eigen::Vector3d moment =
-        Eigen::Vector3d(away_.component(0)[p], away_.component(1)[p], away_.component(2)[p]).normalized();
-    return moment * moment.transpose();
+  /// Adds those of point p, n (x) n each, to a d x d matrix.
+  void add(std::size_t p, std::array<double, 9>& sum) const {
+    const auto d = static_cast<std::size_t>(body_.dimension());
+    bool any = false;
+    for (std::size_t c = 0; c < d; ++c) {
+      const double side = sides_.component(static_cast<int>(c))[p];
+      sum[c * d + c] += side;
+      any |= side != 0;
+    }
+    if (any) return;
+    double moment[3] = {}, square = 0;
+    for (std::size_t c = 0; c < d; ++c) {
+      moment[c] = away_.component(static_cast<int>(c))[p];
+      square += moment[c] * moment[c];
+    }
+    for (std::size_t a = 0; a < d && square > 0; ++a)
+      for (std::size_t b = 0; b < d; ++b) sum[a * d + b] += moment[a] * moment[b] / square;
   }
 
  private:
@@ -177,13 +188,13 @@ ClosedPoints find_closed_points(const Families& families, const std::function<vo
   ClosedPoints closed;
   for (const std::int32_t p : body.owned()) {
     const auto at = static_cast<std::size_t>(p);
-    Eigen::Matrix3d sides = Eigen::Matrix3d::Zero();
+    std::array<double, 9> sides{};
     double worst = open.data()[p];
-    if (worst == 1) sides += normals.of(at);
+    if (worst == 1) normals.add(at, sides);
     for (const std::int32_t j : cloud.neighbours(at)) {
       if (open.data()[j] == 0) continue;
       worst = std::max(worst, open.data()[j]);
-      sides += normals.of(static_cast<std::size_t>(j));
+      normals.add(static_cast<std::size_t>(j), sides);
     }
     if (worst == 0) closed.whole.push_back(p);
     if (worst != 1 || body.dimension() == 1) continue;
@@ -191,15 +202,17 @@ ClosedPoints find_closed_points(const Families& families, const std::function<vo
     // normal.
     constexpr double least = 0.02;
     const int d = body.dimension();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(sides.topLeftCorner(d, d));
+    const SymmetricEigen axes(d, sides.data());
+    double trace = 0;
+    for (int k = 0; k < d; ++k) trace += axes.value(k);
     ClosedPoints::AtSurface along{p, {}};
     bool any = false;
     for (int k = 0; k < d; ++k) {
-      if (axes.eigenvalues()[k] > least * sides.trace()) continue;
+      if (axes.value(k) > least * trace) continue;
       any = true;
       for (int a = 0; a < d; ++a)
         for (int b = 0; b < d; ++b)
-          along.along[static_cast<std::size_t>(3 * a + b)] += axes.eigenvectors()(a, k) * axes.eigenvectors()(b, k);
+          along.along[static_cast<std::size_t>(3 * a + b)] += axes.vector(a, k) * axes.vector(b, k);
     }
     if (any) closed.at_surfaces.push_back(along);
   }

@@ -40,6 +40,7 @@ class CloudPairs final : public PairLoop {
     alignas(64) double omega[batch_points];
     alignas(64) double q[batch_points];        ///< q_i + q_j
     alignas(64) double dq[batch_points];
+    alignas(64) double own_strain[batch_points], far_strain[batch_points];   ///< see PairFields::own_strain; near interfaces
     alignas(64) double far_volume[batch_points];   ///< b V_j
     alignas(64) double integrity[batch_points];    ///< b, where damage is on
     alignas(64) double t[3][batch_points];
@@ -148,6 +149,15 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
   if constexpr (!sums) {
     if (!moduli_.empty()) moduli(p, neighbour, n, g, s.modulus);
   }
+  // Dilatations see their own side of bonds that cross an interface.
+  const bool crosses = dilatation_ && fields_.crosses(p);
+  for (int l = 0; l < n && crosses; ++l) {
+    const auto j = static_cast<std::size_t>(neighbour[l]);
+    g.own_strain[l] = fields_.own_strain(p, j);
+    g.far_strain[l] = fields_.own_strain(j, p);
+    if constexpr (!sums) g.q[l] = g.own_strain[l] * own[3] + g.far_strain[l] * u[j][3];
+    if constexpr (work == PairWork::tangent) g.dq[l] = g.own_strain[l] * w_[p][3] + g.far_strain[l] * w_[j][3];
+  }
   for (int l = n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
     for (int c = 0; c < D; ++c) {
       g.xi[c][l] = c == 0;
@@ -170,7 +180,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   const bool energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
   double highest = 0;  // energy of a bond, over its share where that is asked for
   // Locals: packs that are stored may be any member, as far as the compiler knows.
-  const bool dilatation = dilatation_, fails = fails_;
+  const bool dilatation = dilatation_, fails = fails_, crosses = dilatation_ && fields_.crosses(p);
   Row* const force = force_.data();
   const std::int64_t end = lists_.first[p + 1];
   alignas(64) PairScratch s;
@@ -208,8 +218,8 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     }
     if constexpr (sums) {
       double* const out = pass.out.data;
-      for (int l = 0; l < n; ++l) own_sum += g.t[0][l] * g.far_volume[l];
-      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += g.t[0][l] * (fails ? g.integrity[l] * volume : volume);
+      for (int l = 0; l < n; ++l) own_sum += (crosses ? g.own_strain[l] : 1.0) * g.t[0][l] * g.far_volume[l];
+      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[0][l] * (fails ? g.integrity[l] * volume : volume);
       continue;
     }
     law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr,
@@ -218,7 +228,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (pass.screen->over_share) pair_energy_shares(law_, n, g.length, g.omega, s.stiffness);
       for (int l = 0; l < n; ++l) {
         double value = s.energy[l];
-        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * (pass.by_theta[p] + pass.by_theta[neighbour[l]]);
+        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * ((crosses ? g.own_strain[l] : 1.0) * pass.by_theta[p] + (crosses ? g.far_strain[l] : 1.0) * pass.by_theta[neighbour[l]]);
         if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / s.stiffness[l] : 0.0;
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <array>
 #include <numeric>
 #include <vector>
 
@@ -75,6 +76,7 @@ class LatticePairs final : public PairLoop {
   int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
 
   void moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept;
+  std::array<Pack, 2> own_strains(std::int64_t p, std::int64_t q, std::uint8_t bits) const noexcept;
   void screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept;
 
   const PairKinematics& law_;
@@ -116,17 +118,38 @@ void LatticePairs<D>::moduli(const LatticePattern& pattern, std::int64_t p, std:
   }
 }
 
+/// PairFields::own_strain of both ends of a pack of bonds, from p and q on.
+template <int D>
+std::array<Pack, 2> LatticePairs<D>::own_strains(std::int64_t p, std::int64_t q, std::uint8_t bits) const noexcept {
+  alignas(64) double of_own[pack_width], of_far[pack_width];
+  for (int i = 0; i < pack_width; ++i) {
+    const auto own = static_cast<std::size_t>(p + i), far = static_cast<std::size_t>(q + i);
+    of_own[i] = bits >> i & 1 ? fields_.own_strain(own, far) : 1;
+    of_far[i] = bits >> i & 1 ? fields_.own_strain(far, own) : 1;
+  }
+  return {Pack::load(of_own), Pack::load(of_far)};
+}
+
 /// Marks the chunk where a bond holds too much: its energy, over its share where that is asked for.
 template <int D>
 void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept {
   Pack highest[chunk_points / pack_width];
+  const bool crosses = fields_.crosses(static_cast<std::size_t>(p));
   for (int k = 0; k < count; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t far = p + families_.slots.shifts[at];
     const Pack weight(omega_[at * chunk_points] * length_[at * chunk_points]), per_share(pass.screen->over_share ? inverse_share_[at] : 1.0);
     for (int l = 0; l < chunk_points && pattern.mask[at] != 0; l += pack_width) {
       Pack value = Pack::load(s.energy + k * chunk_points + l);
-      if (pass.by_theta) value += weight * Pack::load(s.e + k * chunk_points + l) * (Pack::load(pass.by_theta + p + l) + Pack::load(pass.by_theta + far + l));
+      if (pass.by_theta) {
+        Pack own = Pack::load(pass.by_theta + p + l), other = Pack::load(pass.by_theta + far + l);
+        if (crosses) {
+          const auto [of_own, of_far] = own_strains(p + l, far + l, static_cast<std::uint8_t>(pattern.mask[at] >> l));
+          own *= of_own;
+          other *= of_far;
+        }
+        value += weight * Pack::load(s.e + k * chunk_points + l) * (own + other);
+      }
       highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value * per_share));
     }
   }
@@ -147,6 +170,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   const bool screened = work == PairWork::force && pass.screen, uniform = fields_.modulus.size() == 0,
              energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
   // Locals: packs that are stored may be any member, as far as the compiler knows.
+  const bool crosses = dilatation_ && fields_.crosses(static_cast<std::size_t>(p));
   const bool weakened = !pattern.integrity.empty(), dilatation = dilatation_;   // weakened: a b between 0 and 1 weighs all that its bond does
   const double volume = families_.volume, squared_volume = squared_volume_, *const lengths = length_.data(), *const omegas = omega_.data();
   const auto* const xis = families_.slots.xi.data();
@@ -208,6 +232,12 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         if constexpr (sums) {
           Pack term = Pack(omegas[at * chunk_points] * length * volume) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
+          if (crosses) {
+            const auto [of_own, of_far] = own_strains(p + l, p + far, bits);
+            sum += of_own * term;
+            if constexpr (half) add_far(out[0] + far, mask, bits, of_far * term);
+            continue;
+          }
           sum += term;
           if constexpr (half) add_far(out[0] + far, mask, bits, term);
         } else {
@@ -246,7 +276,10 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         if constexpr (work == PairWork::energy) continue;
         Pack t[D], T = Pack::load(s.force + lane);
         const Pack weight(omegas[at * chunk_points] * lengths[at * chunk_points]);
-        if (dilatation) T += weight * (own_q + Pack::load(q + far));
+        std::array<Pack, 2> strain;
+        if (crosses) strain = own_strains(p + l, p + far, bits);
+        const auto of_ends = [&](Pack own_value, Pack far_value) { return crosses ? strain[0] * own_value + strain[1] * far_value : own_value + far_value; };
+        if (dilatation) T += weight * of_ends(own_q, Pack::load(q + far));
         if constexpr (work == PairWork::force) {
           T = T * Pack(squared_volume);
           for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
@@ -254,7 +287,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
           // d(T n) = dT n + T (dw - n de)/|y|
           const Pack de = Pack::load(s.de + lane);
           Pack dT = Pack::load(s.stiffness + lane) * de;
-          if (dilatation) dT += weight * (own_dq + Pack::load(dq + far));
+          if (dilatation) dT += weight * of_ends(own_dq, Pack::load(dq + far));
           const Pack turn = T * Pack::load(s.inverse_length + lane);
           for (int c = 0; c < D; ++c) {
             const Pack dw = keep(bits, Pack::load(w[c] + far) - own_w[c]), n = Pack::load(s.n[c] + lane);

@@ -79,7 +79,8 @@ bool PairAssembly<D>::dilatation(std::size_t row, ConstFieldView u, Memory& m) {
   alignas(64) double theta[padding] = {}, modulus[padding] = {}, pressure[padding] = {}, stiffness[padding] = {};
   std::array<double, D> own{};
   for (std::size_t k = 0; k < bonds; ++k) {
-    const double weight = scale * m.omega[k] * m.family.length[k] * m.family.volume[k];
+    const std::size_t q = rows_.point(static_cast<std::size_t>(rows_.neighbours(row)[k]));
+    const double weight = scale * points_.fields.own_strain(p, q) * m.omega[k] * m.family.length[k] * m.family.volume[k];
     theta[0] += weight * m.extension[k];
     for (std::size_t c = 0; c < D; ++c) {
       const double slope = weight * m.direction[c][k];
@@ -107,8 +108,11 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
                  m.modulus.data(), nullptr, m.force.data(), m.stiffness.data()});
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     double T = m.force[k];
-    if (formulation_.dilatation)
-      T += m.omega[k] * m.family.length[k] * (pressure_[row] + pressure_[static_cast<std::size_t>(neighbours[k])]);
+    if (formulation_.dilatation) {
+      const auto far = static_cast<std::size_t>(neighbours[k]);
+      const std::size_t p = rows_.point(row), q = rows_.point(far);
+      T += m.omega[k] * m.family.length[k] * (points_.fields.own_strain(p, q) * pressure_[row] + points_.fields.own_strain(q, p) * pressure_[far]);
+    }
     const double volumes = rows_.volume(row) * m.family.volume[k], turn = T * m.inverse_length[k];
     double* block = m.places.block(K, neighbours[k], entries);
     for (std::size_t a = 0; a < D; ++a)

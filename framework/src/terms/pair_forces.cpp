@@ -53,6 +53,13 @@ void PairForces<D>::set_sides() {
       const double found = std::abs(interface.distance[k]);
       distance = distance > 0 ? std::min(distance, found) : found;
       fields_.near[p / padding] = 1;
+      // Of the material, which a point far from this rank's does not have; laws that vary in space have none.
+      const MaterialRecord& record = laws_.records()[interfaces_->material[p]];
+      if (!record.uniform) continue;
+      PairPoint whole = point(p);
+      whole.moduli = record.material->small_strain(record.constants.data());
+      whole.weighted_volume = 1;
+      fields_.sides.component(PairFields::of_material)[p] = law_.moduli(whole).bond;
     }
   renew_sides();
 }
@@ -175,7 +182,7 @@ void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
       const double q = formulation_.dilatation ? q_.data()[p] : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
         const auto far = static_cast<std::size_t>(family.far[k]);
-        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * q,
+        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * fields_.own_strain(p, far) * q,
                      factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
         for (int a = 0; a < D; ++a) {
           const double y = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
@@ -206,7 +213,8 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
       const double theta = formulation_.dilatation ? scale_.data()[p] * theta_.data()[p] : 0.0;
       const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * bonds.extension[k];
+        const double strain = fields_.own_strain(p, static_cast<std::size_t>(family.far[k]));
+        const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * strain * bonds.extension[k];
         const double energy = body_.volume(p) * family.volume[k] * family.b(k) * w;
         samples.add({own, family.far[k], 0.0, energy});
         if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy});

@@ -47,8 +47,8 @@ struct PairFields {
   Field sides;                    ///< see Side
 
   /// What a bond that crosses an interface needs of its ends: the number of the material, the distance from the interface [m], c_i (of an
-  /// image that of its source), and whether the point stores something, 1 or 0.
-  enum Side { material, distance, stiffness, stores, side_components };
+  /// image that of its source), what c_i would be in a family of weighted volume 1, and whether the point stores something, 1 or 0.
+  enum Side { material, distance, stiffness, of_material, stores, side_components };
   bool crosses(std::size_t p) const noexcept { return !near.empty() && near[p / padding]; }
   /// c_ij of a bond without its correction: the mean of both ends; across an interface springs in series, each as long as the bond lies on
   /// its side.
@@ -56,6 +56,16 @@ struct PairFields {
     if (modulus.size() == 0) return uniform;
     const double series = crosses(p) ? in_series(p, q) : -1.0;
     return series < 0 ? 0.5 * (modulus.data()[p] + modulus.data()[q]) : series;
+  }
+  /// Strain of the side of p over that of the whole bond, of springs in series; 1 where it does not cross. The dilatation of p sees its own side.
+  /// By the materials alone: a ghost may not have its whole family.
+  double own_strain(std::size_t p, std::size_t q) const noexcept {
+    if (!crosses(p) || sides.component(material)[p] == sides.component(material)[q]) return 1;
+    const double c[2] = {sides.component(of_material)[p], sides.component(of_material)[q]};
+    double length[2] = {sides.component(distance)[p], sides.component(distance)[q]};
+    if (!(c[0] > 0 && c[1] > 0)) return 1;
+    if (length[0] + length[1] == 0) length[0] = length[1] = 1;
+    return (length[0] + length[1]) / (length[0] + length[1] * c[0] / c[1]);
   }
   /// Negative where the bond does not cross.
   double in_series(std::size_t p, std::size_t q) const noexcept {
