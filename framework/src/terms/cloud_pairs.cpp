@@ -86,20 +86,14 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
 template <int D>
 void CloudPairs<D>::moduli(std::size_t p, const std::int32_t* neighbour, int n, const Gathered& g, double* out) const noexcept {
   const Row *const modulus = moduli_.data(), own = modulus[p];
-  if (fields_.correction.size() == 0) {
-    for (int l = 0; l < n; ++l) out[l] = 0.5 * (own[3] + modulus[neighbour[l]][3]);
-  } else {
-    for (int l = 0; l < n; ++l) {
-      const Row mean = 0.5 * (own + modulus[neighbour[l]]);
-      double factor = 0;
-      for (int c = 0; c < D; ++c) factor += mean[c] * g.xi[c][l] * g.xi[c][l];
-      out[l] = mean[3] * factor / g.length[l];
-    }
-  }
-  for (int l = 0; l < n && fields_.crosses(p); ++l) {
-    const auto j = static_cast<std::size_t>(neighbour[l]);
-    const double mean = 0.5 * (own[3] + modulus[j][3]);
-    if (mean > 0) out[l] *= fields_.of_bond(p, j) / mean;
+  for (int l = 0; l < n; ++l) out[l] = 0.5 * (own[3] + modulus[neighbour[l]][3]);
+  for (int l = 0; l < n && fields_.crosses(p); ++l) out[l] = fields_.of_bond(p, static_cast<std::size_t>(neighbour[l]));
+  if (fields_.correction.size() == 0) return;
+  for (int l = 0; l < n; ++l) {
+    const Row mean = 0.5 * (own + modulus[neighbour[l]]);
+    double factor = 0;
+    for (int c = 0; c < D; ++c) factor += mean[c] * g.xi[c][l] * g.xi[c][l];
+    out[l] = out[l] * factor / g.length[l];
   }
 }
 

@@ -54,27 +54,34 @@ struct PairFields {
   /// its side.
   double of_bond(std::size_t p, std::size_t q) const noexcept {
     if (modulus.size() == 0) return uniform;
-    const double series = crosses(p) ? in_series(p, q) : -1.0;
-    return series < 0 ? 0.5 * (modulus.data()[p] + modulus.data()[q]) : series;
+    const Springs springs = across(p, q, stiffness);
+    if (!springs.in_series) return 0.5 * (modulus.data()[p] + modulus.data()[q]);
+    return 0.5 * (sides.component(stores)[p] + sides.component(stores)[q]) * (springs.length[0] + springs.length[1]) /
+           (springs.length[0] / springs.c[0] + springs.length[1] / springs.c[1]);
   }
   /// Strain of the side of p over that of the whole bond, of springs in series; 1 where it does not cross. The dilatation of p sees its own side.
   /// By the materials alone: a ghost may not have its whole family.
   double own_strain(std::size_t p, std::size_t q) const noexcept {
-    if (!crosses(p) || sides.component(material)[p] == sides.component(material)[q]) return 1;
-    const double c[2] = {sides.component(of_material)[p], sides.component(of_material)[q]};
-    double length[2] = {sides.component(distance)[p], sides.component(distance)[q]};
-    if (!(c[0] > 0 && c[1] > 0)) return 1;
-    if (length[0] + length[1] == 0) length[0] = length[1] = 1;
-    return (length[0] + length[1]) / (length[0] + length[1] * c[0] / c[1]);
+    const Springs springs = across(p, q, of_material);
+    if (!springs.in_series) return 1;
+    return (springs.length[0] + springs.length[1]) / (springs.length[0] + springs.length[1] * springs.c[0] / springs.c[1]);
   }
-  /// Negative where the bond does not cross.
-  double in_series(std::size_t p, std::size_t q) const noexcept {
-    if (sides.component(material)[p] == sides.component(material)[q]) return -1;
-    const double c[2] = {sides.component(stiffness)[p], sides.component(stiffness)[q]};
-    double length[2] = {sides.component(distance)[p], sides.component(distance)[q]};
-    if (!(c[0] > 0 && c[1] > 0)) return -1;
-    if (length[0] + length[1] == 0) length[0] = length[1] = 1;
-    return 0.5 * (sides.component(stores)[p] + sides.component(stores)[q]) * (length[0] + length[1]) / (length[0] / c[0] + length[1] / c[1]);
+
+ private:
+  struct Springs {
+    bool in_series = false;  ///< the bond crosses an interface, and both sides are stiff
+    double c[2] = {}, length[2] = {};
+  };
+  Springs across(std::size_t p, std::size_t q, Side c) const noexcept {
+    Springs springs;
+    if (!crosses(p) || sides.component(material)[p] == sides.component(material)[q]) return springs;
+    for (int end = 0; end < 2; ++end) {
+      springs.c[end] = sides.component(c)[end == 0 ? p : q];
+      springs.length[end] = sides.component(distance)[end == 0 ? p : q];
+    }
+    if (springs.length[0] + springs.length[1] == 0) springs.length[0] = springs.length[1] = 1;
+    springs.in_series = springs.c[0] > 0 && springs.c[1] > 0;
+    return springs;
   }
 };
 
