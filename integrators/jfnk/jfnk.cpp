@@ -91,7 +91,7 @@ void Jfnk::run(Problem& problem, Observer& observer) {
     if (std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part()) {
       observer.log("jfnk: preconditioner mixed");
       MixedEquations equations(problem, options_, std::move(volumes));
-      return iterate(problem, observer, equations);
+      return run_newton("jfnk", options_.values, problem, observer, equations);
     }
     if (asked)
       throw options_.values.error("preconditioner",
@@ -102,12 +102,7 @@ void Jfnk::run(Problem& problem, Observer& observer) {
   auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
   observer.log("jfnk: preconditioner " + chosen);
   KrylovEquations equations(problem, options_, std::move(preconditioner));
-  iterate(problem, observer, equations);
-}
-
-void Jfnk::iterate(Problem& problem, Observer& observer, LinearisedProblem& equations) {
-  NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);
-  run_load_steps("jfnk", options_.load_steps, problem, observer, newton);
+  run_newton("jfnk", options_.values, problem, observer, equations);
 }
 
 }  // namespace perikit

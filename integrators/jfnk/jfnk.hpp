@@ -3,28 +3,19 @@
 
 #include <memory>
 
-#include "../shared/field_vector.hpp"
+#include "../shared/bond_jacobian.hpp"
 #include "../shared/preconditioner.hpp"
-#include "perikit/plugin/parameters.hpp"
-#include "perikit/sdk/newton_iteration.hpp"
 #include "tangent_action.hpp"
 
 namespace perikit {
 
 struct JfnkOptions {
-  LoadStepOptions load_steps;
   bool differences = false;  ///< tangent by central differences instead of exactly
   std::string preconditioner = "auto";
   int restart = 60;  ///< Krylov vectors before GMRES restarts
   int max_restarts = 20;
-  bool line_search = true;
-  ParameterValues values;  ///< as the scene has them, for errors
+  ParameterValues values;  ///< as the scene has them: load steps, and for errors
 };
-
-struct KrylovDeleter {
-  void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
-};
-using KrylovSolver = std::unique_ptr<_generic_SUNLinearSolver, KrylovDeleter>;
 
 /// Krylov solution of the linearised equations: SUNDIALS' restarted GMRES on tangent actions.
 class KrylovEquations final : public LinearisedProblem {
@@ -69,8 +60,6 @@ class Jfnk final : public Integrator {
   void run(Problem& problem, Observer& observer) override;
 
  private:
-  void iterate(Problem& problem, Observer& observer, LinearisedProblem& equations);
-
   JfnkOptions options_;
 };
 

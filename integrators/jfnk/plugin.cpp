@@ -9,6 +9,7 @@ PERIKIT_PLUGIN(registrar) {
   table.integer("restart", "Krylov vectors before GMRES restarts; each costs one field.").by_default("60").at_least(2).at_most(1000);
   table.integer("max_restarts", "Restarts of GMRES before a linear solve ends.").by_default("20").at_least(0).at_most(10000);
   table.boolean("line_search", "Halve steps that are inadmissible or do not lead on.").by_default("true");
+  add_bond_jacobian_key(table);
   registrar.integrator(
       {.name = "jfnk",
        .summary = "quasi-static Newton-Krylov without a matrix",
@@ -20,12 +21,10 @@ PERIKIT_PLUGIN(registrar) {
        .limits = "Follows paths that the load parameter can follow: no snap-through."},
       [](const ParameterValues& values, const PartFactory&) {
         JfnkOptions options;
-        options.load_steps = load_step_options(values);
         options.differences = values.text("tangent") == "differences";
         options.preconditioner = values.text("preconditioner");
         options.restart = static_cast<int>(values.integer("restart"));
         options.max_restarts = static_cast<int>(values.integer("max_restarts"));
-        options.line_search = values.boolean("line_search");
         options.values = values;
         return std::make_unique<Jfnk>(options);
       });

@@ -52,8 +52,7 @@ void Newton::run(Problem& problem, Observer& observer) {
                     size.blocks, bytes / 1e9, limit / 1e9));
   }
   FactorisedEquations equations;
-  NewtonIteration newton(equations, options_.load_steps.max_iterations, options_.line_search);
-  run_load_steps("newton", options_.load_steps, problem, observer, newton);
+  run_newton("newton", values_, problem, observer, equations);
 }
 
 }  // namespace perikit

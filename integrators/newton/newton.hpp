@@ -1,13 +1,8 @@
 #pragma once
 #include "../shared/assembled_tangent.hpp"
-#include "perikit/sdk/newton_iteration.hpp"
+#include "../shared/bond_jacobian.hpp"
 
 namespace perikit {
-
-struct NewtonOptions {
-  LoadStepOptions load_steps;
-  bool line_search = true;
-};
 
 /// The linearised equations, assembled and factorised at every state; once where the stiffness is constant.
 class FactorisedEquations final : public LinearisedProblem {
@@ -27,12 +22,12 @@ class FactorisedEquations final : public LinearisedProblem {
 /// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.
 class Newton final : public Integrator {
  public:
-  explicit Newton(const NewtonOptions& options) : options_(options) {}
+  explicit Newton(const ParameterValues& values) : values_(values) {}
   IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
   void run(Problem& problem, Observer& observer) override;
 
  private:
-  NewtonOptions options_;
+  ParameterValues values_;
 };
 
 }  // namespace perikit

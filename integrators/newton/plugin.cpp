@@ -5,6 +5,7 @@ PERIKIT_PLUGIN(registrar) {
   using namespace perikit;
   ParameterTable table = load_step_parameters(25);
   table.boolean("line_search", "Halve steps that are inadmissible or do not lead on.").by_default("true");
+  add_bond_jacobian_key(table);
   registrar.integrator(
       {.name = "newton",
        .summary = "quasi-static Newton's method with the assembled tangent and a sparse direct solver",
@@ -16,6 +17,6 @@ PERIKIT_PLUGIN(registrar) {
        .limits = "Memory grows with the coupling of two to three horizons: 2D, and 3D with small families. Follows paths that the load parameter can follow: "
                  "no snap-through."},
       [](const ParameterValues& values, const PartFactory&) {
-        return std::make_unique<Newton>(NewtonOptions{load_step_options(values), values.boolean("line_search")});
+        return std::make_unique<Newton>(values);
       });
 }

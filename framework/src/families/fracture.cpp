@@ -76,10 +76,18 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   BondUpdate update;
   if (!begin) {
     if (time_step > 0) hastened_.forget();
+    weakening_.clear();
+    settling_.clear();
     if (!damage_.law->traits().bits) {
       std::vector<double> from;
       for (const BondChange& change : changes) from.push_back(families_.integrity(change.bond));
-      hastened_.hasten(changes, from);
+      if (forecasts_) {
+        hastened_.hasten(changes, from);
+      } else {
+        settling_ = hastened_.settling(changes, from);
+        for (const BondChange& change : changes)
+          if (change.integrity > 0) weakening_.push_back(change.bond);
+      }
     }
     fail(std::move(changes), u, 0, {}, body, update);
     finish(update);
@@ -121,6 +129,68 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     fail(std::move(of_half), at_, owed, impulse, body, update);
     for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
   }
+  finish(update);
+  return update;
+}
+
+std::vector<double> Fracture::integrities(std::span<const BondId> bonds, ConstFieldView u) {
+  const std::size_t size = padded(bonds.size());
+  AlignedVector<double> value(size, 0.0), onset(size, 1.0), failure(size, 1.0), left(size, 1.0);
+  finder_->values(bonds, u, {value.data(), bonds.size()});
+  for (std::size_t k = 0; k < bonds.size(); ++k) {
+    const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
+    onset[k] = limits.onset;
+    failure[k] = limits.failure;
+  }
+  damage_.law->integrity({static_cast<int>(bonds.size()), value.data(), onset.data(), failure.data(), left.data()});
+  return {left.begin(), left.begin() + static_cast<std::ptrdiff_t>(bonds.size())};
+}
+
+bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force, const Body& body) {
+  const double length = largest_magnitude(w);
+  if (weakening_.empty() || length == 0) return true;
+  // Central differences: points move by the cube root of the rounding unit times the spacing.
+  const double step = std::cbrt(std::numeric_limits<double>::epsilon()) * families_.body().spacing() / length;
+  Field at = families_.body().make_field(u.components);
+  combine(1, u, step, w, at);
+  std::vector<double> slope = integrities(weakening_, at);
+  combine(1, u, -step, w, at);
+  const std::vector<double> behind = integrities(weakening_, at);
+  double largest = 0;
+  for (std::size_t k = 0; k < slope.size(); ++k) {
+    slope[k] = (slope[k] - behind[k]) / (2 * step);
+    largest = std::max(largest, std::abs(slope[k]));
+  }
+  if (largest == 0) return true;
+  const double change = 1e-6 / largest;
+  std::vector<BondChange> before, after;
+  for (std::size_t k = 0; k < slope.size(); ++k) {
+    const double b = families_.integrity(weakening_[k]);
+    if (b == 0) continue;
+    before.push_back({weakening_[k], b});
+    after.push_back({weakening_[k], std::clamp(b + change * slope[k], 0.5 * b, 1.0)});
+  }
+  if (before.empty()) return true;
+  std::vector<std::int32_t> ends;
+  for (const BondChange& bond : before) ends.insert(ends.end(), {bond.bond.point, bond.bond.far});
+  const GroupMarks marks = dependent_on(ends);
+  const bool known = std::isfinite(body.forces(u, marks, -1 / change, force));
+  body.changed(families_.lower(after));
+  const bool still = std::isfinite(body.forces(u, marks, 1 / change, force));
+  body.changed(families_.raise(before));
+  return known && still;
+}
+
+BondUpdate Fracture::weaken(ConstFieldView u, ConstFieldView forecast, const Body& body) {
+  const std::vector<double> ahead = integrities(settling_, forecast);
+  std::vector<BondChange> changes;
+  for (std::size_t k = 0; k < settling_.size(); ++k) {
+    const double now = families_.integrity(settling_[k]), then = std::max(ahead[k], least_left_of_bonds * now);
+    if (then < now) changes.push_back({settling_[k], then});
+  }
+  BondUpdate update;
+  if (changes.empty()) return update;
+  fail(std::move(changes), u, 0, {}, body, update);
   finish(update);
   return update;
 }
@@ -311,6 +381,8 @@ void Fracture::restore(std::span<const BondChange> of_all, const std::function<v
   if (gradual_) gradual_->restore(changes, fragments(ends));
   finder_->forget();
   hastened_.forget();
+  weakening_.clear();
+  settling_.clear();
 }
 
 BondChecks Fracture::checks() const {

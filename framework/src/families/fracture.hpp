@@ -37,6 +37,16 @@ class Fracture {
   /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds. All ranks must call it.
   BondUpdate update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction, const Body& body);
 
+  // Of the bonds that weakened in the last update outside of a step, and have something left; on one rank.
+  /// Whether some of them may be forecast.
+  bool settling() const noexcept { return !settling_.empty(); }
+  /// Whether others forecast how far they will weaken, by `weaken`; else updates do (HastenedBonds).
+  void leave_forecasts(bool to_others) noexcept { forecasts_ = !to_others; }
+  /// force += df/db (db/du . w) at u, the displacement of that update [N]. False where a point is inadmissible.
+  bool add_weakening(ConstFieldView u, ConstFieldView w, FieldView force, const Body& body);
+  /// Those that may be forecast, as their falls form a series that ends (HastenedBonds), weaken to what they are at `forecast`, and not by more than half. Energies are those at u.
+  BondUpdate weaken(ConstFieldView u, ConstFieldView forecast, const Body& body);
+
   /// Every bond that is not as it was at the set-up, by places in the whole body: on rank 0 those of all ranks. All ranks must
   /// call it.
   std::vector<BondChange> changed() const;
@@ -65,6 +75,8 @@ class Fracture {
   void take_back(std::vector<BondChange>& before, const Body& body);
   std::vector<BondChange> later_half(std::vector<BondChange>& changes) const;
   void finish(BondUpdate& update);
+  /// What the criterion leaves of these bonds at u, whatever they had before.
+  std::vector<double> integrities(std::span<const BondId> bonds, ConstFieldView u);
 
   Families& families_;
   const BodyDamage& damage_;
@@ -72,6 +84,8 @@ class Fracture {
   std::unique_ptr<BondFinder> finder_;
   std::optional<GradualFailure> gradual_;
   HastenedBonds hastened_;
+  bool forecasts_ = true;
+  std::vector<BondId> weakening_, settling_;  ///< by the last update outside of a step; those of them that may be forecast
   std::size_t updates_ = 0;
   Field before_, at_;  ///< displacement at the beginning of the step, and where bonds fail
   Field part_;         ///< of an impulse, as long as nobody knows whether it is whole

@@ -9,6 +9,17 @@ namespace perikit {
 BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
                                   BondReaction* reaction) {
   BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
+  account(update, state);
+  return update;
+}
+
+bool FractureRecord::weaken(Terms& terms, ConstFieldView u, ConstFieldView forecast, State& state) {
+  const BondUpdate update = terms.weaken_bonds(u, forecast);
+  account(update, state);
+  return update.changed > 0;
+}
+
+void FractureRecord::account(const BondUpdate& update, State& state) {
   state.energies.dissipated += update.dissipated;
   state.energies.strain -= update.dissipated;  // explicit steps take it anew
   if (update.dissipated < 0) {
@@ -17,7 +28,6 @@ BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, 
   }
   inside_out_ += update.inside_out;
   held_ += static_cast<std::int64_t>(update.held);
-  return update;
 }
 
 std::string FractureRecord::summary(const BondChecks& checks, double dissipated) const {

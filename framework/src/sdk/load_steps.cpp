@@ -215,6 +215,11 @@ class LoadSteps {
                         "The body may be about to break apart; a crack that has far to run at one load needs more rounds",
                         integrator_, t, state_.step, options_.bond_rounds));
       }
+      if (!settled && solver_.forecast_bonds(equilibrium_, u_, residual_)) {
+        solver_.bonds_changed();
+        solution.converged = equilibrium_.residual(u_, residual_, &energies.strain);
+        if (!solution.converged) break;
+      }
       const double held = energies.strain - energies.external_work;
       copy(u_, start_);
       const Solution again = find(t, false);

@@ -93,6 +93,7 @@ struct Terms::Failing {
   Field force;                       ///< work field
   std::optional<Vicinity> vicinity;  ///< made when asked for
 
+  Fracture::Body body(Terms& terms);
   FieldView cleared(ConstFieldView like, const Body& body) {
     if (force.size() == 0) force = body.make_field(like.components);
     clear(force.data(), force.size());
@@ -273,10 +274,26 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
-  const Families& families = *parts_.families;
-  GroupMarks last, only, near;  // before and after bonds fail the same groups are asked for
-  const auto forces = [&](ConstFieldView at, const GroupMarks& marks, double factor, FieldView force) {
-    const FieldView own = failing_->cleared(at, families.body());
+  return failing_->fracture.update(u, time_step, begin, reaction, failing_->body(*this));
+}
+
+bool Terms::settling() const noexcept { return failing_ && failing_->fracture.settling(); }
+
+void Terms::leave_forecasts(bool to_others) { failing_->fracture.leave_forecasts(to_others); }
+
+EvaluationStatus Terms::weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force) {
+  if (failing_->fracture.add_weakening(u, w, force, failing_->body(*this))) return {};
+  return {.description = "near bonds that weaken"};
+}
+
+BondUpdate Terms::weaken_bonds(ConstFieldView u, ConstFieldView forecast) { return failing_->fracture.weaken(u, forecast, failing_->body(*this)); }
+
+/// What those who change bonds need of the terms. As long as it lives, before and after bonds fail, the same groups are asked for.
+Fracture::Body Terms::Failing::body(Terms& terms) {
+  const Families& families = *terms.parts_.families;
+  const auto forces = [this, &terms, &families, last = GroupMarks(), only = GroupMarks(), near = GroupMarks()](
+                          ConstFieldView at, const GroupMarks& marks, double factor, FieldView sum) mutable {
+    const FieldView own = cleared(at, families.body());
     ExactSum energy;
     if (marks != last) {
       // A bond may be evaluated once for both ends, at either.
@@ -285,25 +302,23 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBeg
       near = families.around(only);
     }
     std::int64_t bad = -1;
-    for (const auto& term : terms_) bad = std::max(bad, term->add_forces_of(at, only, near, own, &energy));
+    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, only, near, own, &energy));
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
-    if (force.data) combine(1, force, factor, own, force);
+    if (sum.data) combine(1, sum, factor, own, sum);
     return total_over_ranks(energy);
   };
-  const Formulation& f = parts_.formulation;
+  const Formulation& f = terms.parts_.formulation;
   const bool owners_alone = !f.pairs && !(f.bond && f.far_share > 0);
-  const auto energy = [&](ConstFieldView at, const GroupMarks& marks) {
+  const auto energy = [this, &terms, &families, owners_alone](ConstFieldView at, const GroupMarks& marks) {
     const GroupMarks of = owners_alone ? marks : families.around(marks), around = families.around(of);
-    if (failing_->force.size() == 0) failing_->cleared(at, families.body());
+    if (force.size() == 0) cleared(at, families.body());
     ExactSum sum;
     std::int64_t bad = -1;
-    for (const auto& term : terms_) bad = std::max(bad, term->add_forces_of(at, of, around, failing_->force, &sum));
+    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, of, around, force, &sum));
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
     return total_over_ranks(sum);
   };
-  return failing_->fracture.update(
-      u, time_step, begin, reaction,
-      {forces, energy, owners_alone, [&](std::span<const std::int32_t> points) { bonds_changed(points); }});
+  return {forces, energy, owners_alone, [&terms](std::span<const std::int32_t> points) { terms.bonds_changed(points); }};
 }
 
 std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {

@@ -56,6 +56,7 @@ class BodyProblem final : public Problem {
   EvaluationStatus sample(PointSamples& samples);
   bool constant_stiffness() const noexcept override;
   bool advance(double time_step, FieldView velocity = {}) override;
+  std::unique_ptr<WeakeningBonds> weakening_bonds() override;
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
@@ -94,6 +95,8 @@ class BodyProblem final : public Problem {
   std::size_t bytes() const noexcept;
 
  private:
+  class Weakening;
+
   ProblemParts parts_;
   ProblemValues values_;
   std::optional<Ghosts> ghosts_;

@@ -19,6 +19,8 @@ class FractureRecord {
   const BodyDamage* damage() const noexcept { return damage_.get(); }
   /// Lets bonds of `terms` fail at u, the displacement as they see it; energies of the state follow. The rest: see Terms.
   BondUpdate update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin, BondReaction* reaction);
+  /// Likewise lets bonds weaken to what they are at `forecast`. True when some did.
+  bool weaken(Terms& terms, ConstFieldView u, ConstFieldView forecast, State& state);
   /// How bonds failed so far, in words; empty where they never fail.
   std::string summary(const BondChecks& checks, double dissipated) const;
 
@@ -29,6 +31,7 @@ class FractureRecord {
 
  private:
   void read_account(ByteReader& in);
+  void account(const BondUpdate& update, State& state);
 
   std::unique_ptr<const BodyDamage> damage_;
   std::int64_t gains_ = 0;  ///< updates that raised the strain energy

@@ -13,6 +13,7 @@
 #include "perikit/problem/masses.hpp"
 #include "perikit/problem/state.hpp"
 #include "perikit/problem/volumetric_part.hpp"
+#include "perikit/problem/weakening_bonds.hpp"
 
 namespace perikit {
 
@@ -78,6 +79,9 @@ class Problem {
   /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium
   /// of a step, after the first one with time_step = 0: as long as bonds change, the step is not over.
   virtual bool advance(double time_step, FieldView velocity = {}) = 0;
+  /// Bonds that weaken gradually, for solvers that forecast how far they do; as long as it lives, advance() leaves that to it. Null where none
+  /// do, and on several ranks. The problem must outlive it.
+  virtual std::unique_ptr<WeakeningBonds> weakening_bonds() = 0;
   /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
   /// Bonds of `bonds`, not empty.

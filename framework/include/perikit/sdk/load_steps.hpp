@@ -39,6 +39,9 @@ class EquilibriumSolver {
   virtual Solution solve(Equilibrium& equilibrium, bool extrapolated) = 0;
   /// After a step that converged, `u` its displacement: where state that later steps reuse may be renewed.
   virtual void accepted(Problem&, ConstFieldView /*u*/) {}
+  /// Bonds have weakened at the equilibrium u, which left it out of balance by r. Solvers that know how far they go on weakening let them do
+  /// so; true when they did.
+  virtual bool forecast_bonds(Equilibrium&, ConstFieldView /*u*/, ConstFieldView /*r*/) { return false; }
   /// Bonds have failed, or are as before because a step was given up: a tangent that is kept is that of another body.
   virtual void bonds_changed() {}
 };

@@ -93,6 +93,15 @@ class Terms {
   /// every step, with its length [s] (0 in quasi-static runs). Where `begin` is given, bonds fail inside the step, and *reaction
   /// (fields of u, zero before) is what that means for it.
   BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepBegin& begin = {}, BondReaction* reaction = nullptr);
+  // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
+  /// Whether some of them may be forecast.
+  bool settling() const noexcept;
+  /// Whether somebody else forecasts how far bonds weaken; else updates do.
+  void leave_forecasts(bool to_others);
+  /// force <- force + df/db (db/du . w) at u, the displacement of that update.
+  EvaluationStatus weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force);
+  /// Lowers them to what they are at `forecast`, and not by more than half; energies are those at u.
+  BondUpdate weaken_bonds(ConstFieldView u, ConstFieldView forecast);
   /// The shares of all bonds in the energy at u: they add up to it. Ascending. Not where laws have a history.
   std::vector<BondEnergy> bond_energies(ConstFieldView u);
   /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
