@@ -38,15 +38,14 @@ struct MooneyRivlin {
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    // I1* = 3/r and I2* = (3 + p)/r^2 with p = I2(d)/(1 + m)^2, q = det(d)/(1 + m)^3, r^3 = 1 + p + q = J^2/(1 + m)^3;
+    // I1* = 3 s and I2* = 3 s^2 + p with s = (1 + m) J^(-2/3), p = I2(d) J^(-4/3), q = det(d) J^-2, s^3 = 1 - p s - q;
     // what is left after subtracting 3 is of second order in d, term by term.
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const T j = jacobian_minus_one(H), a = T(1.0) / (1.0 + trace(e) * (1.0 / 3.0));
-    const T p = -0.5 * inner(d, d) * (a * a), q = determinant(d) * (a * a * a);
-    const T r = rational_power<2, 3>(T(1.0 + j)) * a, sum = 1.0 + r * (1.0 + r);
-    const T first = -3.0 * (p + q) / (r * sum);
-    const T second = (p * (r * r - 2.0 * r - 2.0) - 3.0 * q * (1.0 + r)) / (r * r * sum);
-    return C1 * first + C2 * second + volumetric_energy(volumetric, kappa, j);
+    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root;
+    const T s = scale * (1.0 + trace(e) * (1.0 / 3.0));
+    const T p = -0.5 * inner(d, d) * (scale * scale), q = determinant(d) * (scale * scale * scale);
+    const T first = -3.0 * (p * s + q), second = p * (1.0 - 2.0 * s * (1.0 + s)) - 3.0 * q * (1.0 + s);
+    return (C1 * first + C2 * second) / (1.0 + s * (1.0 + s)) + volumetric_energy(volumetric, kappa, j);
   }
 
   template <class T, class S, class K>

@@ -31,13 +31,12 @@ struct NeoHookean {
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [mu, kappa] = k;
-    // tr C / J^(2/3) = 3/r with r^3 = J^2 / (1 + m)^3 = 1 + w, and w is of second order in the deviator d of C - I:
-    // w = I2(d)/(1 + m)^2 + det(d)/(1 + m)^3. So 3/r - 3 = -3 w / (r (1 + r + r^2)) keeps its digits.
-    const T m = mean_strain(H), j = jacobian_minus_one(H), a = T(1.0) / (1.0 + m);
+    // tr C / J^(2/3) = 3 s with s = (1 + m) J^(-2/3), and s^-3 = 1 + w with w of second order in the deviator d of C - I:
+    // w = I2(d)/(1 + m)^2 + det(d)/(1 + m)^3. So 3 s - 3 = -3 w s^3 / (1 + s + s^2) keeps its digits.
+    const T m = mean_strain(H), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root, s = scale * (1.0 + m);
     const Tensor<T, S> d = deviator(right_cauchy_green_minus_identity(H));
-    const T w = (determinant(d) * a - 0.5 * inner(d, d)) * (a * a);
-    const T r = rational_power<2, 3>(T(1.0 + j)) * a;
-    return -1.5 * mu * (w / (r * (1.0 + r * (1.0 + r)))) + volumetric_energy(volumetric, kappa, j);
+    const T second = -0.5 * inner(d, d) * (scale * scale), third = determinant(d) * (scale * scale * scale);
+    return -1.5 * mu * ((second * s + third) / (1.0 + s * (1.0 + s))) + volumetric_energy(volumetric, kappa, j);
   }
 
   template <class T, class S, class K>

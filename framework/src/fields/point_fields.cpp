@@ -21,11 +21,11 @@ const std::vector<PointField>& point_fields() {
        [](From f) { return f.vector(reactions(f.problem_, f.dynamic_, f.problem_.state().time)); }},
       {"strain_energy_density", 1, false, Sampling::energy, "strain energy density", "J/m³",
        [](From f) { return f.scalar(f.samples_->strain_energy_density); }},
-      {"deformation_gradient", 9, true, Sampling::tensors, "deformation gradient", "", [](From f) { return f.tensor(f.samples_->H, true); }},
-      {"first_piola", 9, false, Sampling::virial, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples_->P); }},
-      {"cauchy", 9, true, Sampling::tensors, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples_->cauchy); }},
-      {"von_mises", 1, true, Sampling::tensors, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples_->von_mises); }},
-      {"jacobian", 1, true, Sampling::tensors, "jacobian", "", [](From f) { return f.jacobian(); }},
+      {"deformation_gradient", 9, true, Sampling::H, "deformation gradient", "", [](From f) { return f.tensor(f.samples_->H, true); }},
+      {"first_piola", 9, false, Sampling::P | Sampling::virial, "first Piola-Kirchhoff stress", "Pa", [](From f) { return f.tensor(f.samples_->P); }},
+      {"cauchy", 9, true, Sampling::cauchy, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples_->cauchy); }},
+      {"von_mises", 1, true, Sampling::von_mises, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples_->von_mises); }},
+      {"jacobian", 1, true, Sampling::H, "jacobian", "", [](From f) { return f.jacobian(); }},
       {"damage", 1, false, Sampling::nothing, "damage", "", [](From f) { return f.scalar(f.problem_.terms().damage()); }},
       {"shape_tensor_condition", 1, true, Sampling::nothing, "shape tensor condition", "",
        [](From f) { return f.scalar(f.problem_.terms().shape_tensor_condition()); }},
@@ -104,10 +104,10 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
 }
 
 void PointFields::expect(std::span<const std::string> names) {
-  Sampling most = Sampling::nothing;
-  for (const std::string& name : names) most = std::max(most, find_point_field(name)->samples);
-  if (most == Sampling::nothing || (samples_ && samples_->asked >= most)) return;
-  problem_.sample(samples_.emplace(PointSamples{.asked = most}));
+  Sampling all = samples_ ? samples_->asked : Sampling::nothing;
+  for (const std::string& name : names) all = all | find_point_field(name)->samples;
+  if (all == Sampling::nothing || (samples_ && samples_->asked == all)) return;
+  problem_.sample(samples_.emplace(PointSamples{.asked = all}));
 }
 
 const OutputField& PointFields::get(const std::string& name) {

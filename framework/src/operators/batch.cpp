@@ -373,16 +373,12 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
   const auto to = [&](const double* value, double* sum, int c) { all[count++] = {value, sum + static_cast<std::size_t>(c) * sums.stride}; };
   to(s.psi, sums.psi, 0);
   std::optional<LaneStresses> stresses;
-  if (sums.weight) {
-    stresses.emplace(n, space, s);
-    to(ones.data(), sums.weight, 0);
-    to(stresses->von_mises, sums.von_mises, 0);
-    for (int c = 0; c < 9; ++c) to(stresses->sigma[c], sums.cauchy, c);
-    for (int c = 0; c < components; ++c) {
-      to(stress_space && c >= d * d ? s.lateral : s.H + c * batch_points, sums.H, c);
-      to(s.P + c * batch_points, sums.P, c);
-    }
-  }
+  if (sums.weight) to(ones.data(), sums.weight, 0);
+  if (sums.von_mises || sums.cauchy) stresses.emplace(n, space, s);
+  if (sums.von_mises) to(stresses->von_mises, sums.von_mises, 0);
+  for (int c = 0; c < 9 && sums.cauchy; ++c) to(stresses->sigma[c], sums.cauchy, c);
+  for (int c = 0; c < components && sums.H; ++c) to(stress_space && c >= d * d ? s.lateral : s.H + c * batch_points, sums.H, c);
+  for (int c = 0; c < components && sums.P; ++c) to(s.P + c * batch_points, sums.P, c);
   for (int l = 0; l < n;) {
     const std::int32_t p = s.owner[l];
     int next = 1;

@@ -80,7 +80,7 @@ struct BatchScratch {
   AlignedVector<double> old_state, new_state;    ///< gathered, [component][lane]
 };
 
-/// Sums over lanes of sampled quantities go here, one row per owner; null: all but psi.
+/// Sums over lanes of sampled quantities go here, one row per owner; null, but for psi: not asked for.
 struct SampleSums {
   double* weight;      ///< sum W
   double* psi;         ///< sum W psi

@@ -127,7 +127,7 @@ EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldV
     if (ghosts_ && images()) ghosts_->clear(force);
     return {};
   }
-  PointSamples samples;
+  PointSamples samples{.asked = Sampling::H};
   EvaluationStatus status = terms().sample(seen(u, seen_), samples);
   agree(status);
   if (!status.ok()) return status;

@@ -181,23 +181,23 @@ void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const Group
 
 std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
   const Body& body = parts_.families.body();
-  const bool tensors = s.asked >= Sampling::tensors;
+  const bool averages = any_of(s.asked, Sampling::H | Sampling::P | Sampling::cauchy | Sampling::von_mises);
+  const auto field = [&](Sampling of, int components) { return any_of(s.asked, of) ? body.make_field(components) : Field(); };
   Field weight, energy = body.make_field(1);
-  if (tensors) {
-    weight = body.make_field(1);
-    s.H = body.make_field(parts_.laws.components());
-    s.P = body.make_field(parts_.laws.components());
-    s.cauchy = body.make_field(9);
-    s.von_mises = body.make_field(1);
-  }
-  const SampleSums sums{weight.data(), energy.data(), s.H.data(), s.P.data(), s.cauchy.data(), s.von_mises.data(), body.stride()};
+  if (averages) weight = body.make_field(1);
+  s.H = field(Sampling::H, parts_.laws.components());
+  s.P = field(Sampling::P, parts_.laws.components());
+  s.cauchy = field(Sampling::cauchy, 9);
+  s.von_mises = field(Sampling::von_mises, 1);
+  const auto to = [](Field& of) { return of.size() > 0 ? of.data() : nullptr; };
+  const SampleSums sums{to(weight), energy.data(), to(s.H), to(s.P), to(s.cauchy), to(s.von_mises), body.stride()};
   const BatchWork work = this->work(Work::sample, false);
   Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
   space_->run(pass);
   for (const std::int32_t index : body.internal()) {
     const auto p = static_cast<std::size_t>(index);
     s.strain_energy_density.data()[p] += energy.data()[p] / body.volume(p);
-    if (!tensors) continue;
+    if (!averages) continue;
     const double inverse = weight.data()[p] > 0 ? 1.0 / weight.data()[p] : 0.0;
     for (Field* field : {&s.H, &s.P, &s.cauchy, &s.von_mises})
       for (int c = 0; c < field->components(); ++c) field->component(c)[p] *= inverse;

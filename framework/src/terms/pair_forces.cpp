@@ -294,7 +294,7 @@ std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples)
     const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
     if (bad >= 0) return bad;
   }
-  if (samples.asked == Sampling::virial) {
+  if (any_of(samples.asked, Sampling::virial)) {
     samples.P = body_.make_field(D * D);
     add_virial(u, samples.P);
   }

@@ -270,17 +270,17 @@ class LawMaterial final : public Material {
             for (std::size_t i = 0; i < end.state.size(); ++i) end.state[i].store(b.state_new + i * b.state_stride + p);
         }
       } else {
-        if (b.psi) {
-          if constexpr (HasEnergy<Law, Pack, S, Constants>)
-            put_energy(law.psi(H, k));
-          else
-            put_energy(0.0);
-        }
-        if (b.P) {
-          if constexpr (own_zeros)
-            put_stress(zeros.equation[in_group].stress(H, zeros.root[in_group]));
-          else
-            put_stress(stress(law, H, k));
+        if (b.psi || b.P) {
+          // Stress first, and always: what the energy has in common with it, roots and invariants, is there by then.
+          const Tensor<Pack, S> P = [&] {
+            if constexpr (own_zeros) return zeros.equation[in_group].stress(H, zeros.root[in_group]);
+            else return stress(law, H, k);
+          }();
+          if (b.psi) {
+            if constexpr (HasEnergy<Law, Pack, S, Constants>) put_energy(law.psi(H, k));
+            else put_energy(0.0);
+          }
+          if (b.P) put_stress(P);
         }
       }
       if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k);
