@@ -5,7 +5,7 @@
 ///   abi = 1
 ///   build_id = "gcc12 libstdc++-cxx11abi1 simd512 headers-0123456789ab"
 ///   size = 48216                       # of the library [bytes]
-///   checksum = "ab12..."               # FNV-1a, 64 bits, of the library
+///   checksum = "ab12..."               # Fingerprint of the library
 ///   part = [ { kind = "material", name = "neo_hookean", summary = "..." } ]
 
 #include <cstdint>
