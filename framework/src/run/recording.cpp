@@ -252,6 +252,11 @@ void RunRecorder::step_done(const StepReport& report) {
   // What only the stop asks for is written but not counted: the run that goes on writes what the run without a stop had written.
   const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
   if (row || frame || stopping_) watch_energies(report, row || frame);
+  std::vector<std::string> wanted;   // sampled once for all that is written
+  for (const HistoryDescription& record : simulation_.scene().output.history)
+    if (row || stopping_) wanted.push_back(record.quantity);
+  if (frame || stopping_) wanted.insert(wanted.end(), frame_fields_.begin(), frame_fields_.end());
+  fields_.expect(wanted);
   if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
   if (frame && first_) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
