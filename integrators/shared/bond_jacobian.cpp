@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sunlinsol/sunlinsol_spfgmr.h>
 
+#include <string>
+
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -54,7 +56,6 @@ int BondJacobian::multiply(void* self, N_Vector w, N_Vector Jw) {
   auto& own = *static_cast<BondJacobian*>(self);
   if (!own.equilibrium_->tangent(own.u_, field_of(w), field_of(Jw))) return -1;
   const EvaluationStatus status = own.bonds_->add_tangent(own.u_, field_of(w), field_of(Jw));
-  if (!status.ok()) own.failure_ = status.description;
   mask(own.equilibrium_->free(), field_of(Jw));
   return status.ok() ? 0 : -1;
 }
@@ -62,7 +63,8 @@ int BondJacobian::multiply(void* self, N_Vector w, N_Vector Jw) {
 int BondJacobian::precondition(void* self, N_Vector r, N_Vector z, realtype, int) {
   auto& own = *static_cast<BondJacobian*>(self);
   fill(0.0, field_of(z));
-  return own.equations_.solve(*own.equilibrium_, field_of(r), own.equations_.exact() ? 0.0 : of_K, field_of(z), own.note_, own.failure_) ? 0 : -1;
+  std::string note, failure;   // a forecast that fails is none, and says so in one line
+  return own.equations_.solve(*own.equilibrium_, field_of(r), own.equations_.exact() ? 0.0 : of_K, field_of(z), note, failure) ? 0 : -1;
 }
 
 Solution BondJacobian::solve(Equilibrium& equilibrium, bool extrapolated) {
@@ -77,9 +79,12 @@ bool BondJacobian::forecast_bonds(Equilibrium& equilibrium, ConstFieldView u, Co
   copy(u, u_);
   copy(r, right_);
   fill(0.0, du_);
-  failure_.clear();
   // That of the equilibrium, with the bonds that it had, serves as well.
-  if (!factorised_ && !equations_.linearise(equilibrium, u_, failure_)) return false;
+  std::string failure;
+  if (!factorised_ && !equations_.linearise(equilibrium, u_, failure)) {
+    equilibrium.note("  bonds: no forecast: " + failure);
+    return false;
+  }
   const double size = norm(right_);
   SUNLinSolSetup(gmres_.get(), nullptr);
   const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution_.get(), right_vector_.get(), accuracy * size);

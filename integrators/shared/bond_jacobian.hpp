@@ -4,7 +4,7 @@
 #include <sundials/sundials_linearsolver.h>
 
 #include <memory>
-#include <string>
+#include <string_view>
 
 #include "field_vector.hpp"
 #include "perikit/plugin/parameters.hpp"
@@ -53,7 +53,6 @@ class BondJacobian final : public EquilibriumSolver {
   FieldVector right_vector_, solution_;
   KrylovSolver gmres_;
   Equilibrium* equilibrium_ = nullptr;  ///< of the forecast in progress
-  std::string failure_, note_;
 };
 
 }  // namespace perikit

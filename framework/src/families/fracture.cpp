@@ -68,6 +68,8 @@ std::vector<double> Fracture::moments(std::span<const BondChange> changes, Const
 BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction,
                             const Body& body) {
   ++updates_;
+  weakening_.clear();
+  settling_.clear();
   std::vector<BondChange> changes = finder_->find(u);
   // Ranks see what bonds of their own points hold, but all must know which bonds fail.
   if (shared_.part() && !damage_.by_stretch() && on_any_rank(!changes.empty())) changes = shared_.of_all(changes);
@@ -76,8 +78,6 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   BondUpdate update;
   if (!begin) {
     if (time_step > 0) hastened_.forget();
-    weakening_.clear();
-    settling_.clear();
     if (!damage_.law->traits().bits) {
       std::vector<double> from;
       for (const BondChange& change : changes) from.push_back(families_.integrity(change.bond));
@@ -185,7 +185,7 @@ BondUpdate Fracture::weaken(ConstFieldView u, ConstFieldView forecast, const Bod
   const std::vector<double> ahead = integrities(settling_, forecast);
   std::vector<BondChange> changes;
   for (std::size_t k = 0; k < settling_.size(); ++k) {
-    const double now = families_.integrity(settling_[k]), then = std::max(ahead[k], least_left_of_bonds * now);
+    const double now = families_.integrity(settling_[k]), then = std::max(ahead[k], HastenedBonds::least_left * now);
     if (then < now) changes.push_back({settling_[k], then});
   }
   BondUpdate update;

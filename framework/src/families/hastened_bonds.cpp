@@ -30,7 +30,7 @@ void HastenedBonds::hasten(std::vector<BondChange>& changes, const std::vector<d
     if (!(ratio[k] < most)) continue;
     BondChange& change = changes[k];
     const double fall = from[k] - change.integrity;
-    change.integrity = std::max(change.integrity - cautious * fall * ratio[k] / (1 - ratio[k]), least_left_of_bonds * change.integrity);
+    change.integrity = std::max(change.integrity - cautious * fall * ratio[k] / (1 - ratio[k]), least_left * change.integrity);
     last_.erase(change.bond);
   }
 }

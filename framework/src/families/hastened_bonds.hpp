@@ -12,11 +12,11 @@ namespace perikit {
 /// the limit of stability rho is close to 1. Once a bond has fallen twice, by ratio rho < 1, half of what is still to come,
 /// rho/(1 - rho) times the last fall, is taken at once [Aitken]. Where several such series add up, their ratio grows from fall to
 /// fall, so that this is less than what is to come; integrities never rise, and what is taken too much would be lost.
-/// Share of an integrity that a forecast leaves at least: no bond fails by one.
-inline constexpr double least_left_of_bonds = 0.5;
-
 class HastenedBonds {
  public:
+  /// Share of an integrity that a forecast leaves at least: no bond fails by one.
+  static constexpr double least_left = 0.5;
+
   /// The bonds that fell in this round, to what: some of them fall further. from: their integrity before it.
   void hasten(std::vector<BondChange>& changes, const std::vector<double>& from);
   /// Those of them whose falls form such a series and leave something: how far it goes is for others to say.

@@ -6,8 +6,8 @@ namespace perikit {
 /// What is sampled, several of them added by |. virial: P of pair laws, too. The energy density comes with all of them.
 enum class Sampling : unsigned { nothing = 0, energy = 1, H = 2, P = 4, cauchy = 8, von_mises = 16, tensors = 31, virial = 32 };
 constexpr Sampling operator|(Sampling a, Sampling b) noexcept { return static_cast<Sampling>(static_cast<unsigned>(a) | static_cast<unsigned>(b)); }
-/// Whether `some` of what `wanted` names is among them.
-constexpr bool any_of(Sampling some, Sampling wanted) noexcept { return (static_cast<unsigned>(some) & static_cast<unsigned>(wanted)) != 0; }
+/// Whether they have something in common.
+constexpr bool any_of(Sampling a, Sampling b) noexcept { return (static_cast<unsigned>(a) & static_cast<unsigned>(b)) != 0; }
 
 /// Averages of evaluation-point quantities at points, weighted with W_q over the q that each point owns. Component-major over
 /// the body's stride; tensors with the components of the space (cauchy: 9, row-major). What was not asked for is empty.
