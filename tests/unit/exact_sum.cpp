@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 using namespace perikit;
@@ -88,4 +89,27 @@ TEST_CASE("exact_sum: order and who adds do not matter") {
   std::ranges::shuffle(terms, random);
   for (const double x : terms) sum.add(-x);
   CHECK(sum.value() == 0.0);
+}
+
+TEST_CASE("exact_sum: a group at once is each of its terms, near to each other or far apart, subnormal or infinite") {
+  std::mt19937_64 random(11);
+  const auto both = [&](const std::vector<double>& terms) {
+    ExactSum alone, grouped;
+    for (std::size_t first = 0; first < terms.size(); first += ExactSum::group) {
+      ExactSum::Group group{};
+      for (std::size_t k = first; k < std::min(terms.size(), first + group.size()); ++k) alone.add(group[k - first] = terms[k]);
+      grouped.add(group);
+    }
+    alone.normalize();
+    grouped.normalize();
+    CHECK(alone.numbers() == grouped.numbers());
+  };
+  for (const auto& [least, most] : {std::pair{-3, 3}, {-60, 60}, {-1073, -1000}, {-950, -850}, {900, 1023}, {-1073, 1023}})
+    for (int round = 0; round < 200; ++round) both(spread(random, 700 + static_cast<std::size_t>(round), least, most));
+  both({});
+  both(std::vector<double>(600, 0.0));
+  both(std::vector<double>(1024, std::numeric_limits<double>::max()));
+  both(std::vector<double>(512, 0x1.fffffffffffffp-1));
+  both({1.0, -INFINITY, 3.0, std::nan("")});
+  both({5e-324, -1.0, 0x1p-900, 0x1p1000, -0.0});
 }

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "perikit/core/simd.hpp"
+
 namespace perikit {
 
 namespace {
@@ -25,6 +27,27 @@ void ExactSum::add(const ExactSum& other) noexcept {
   theirs.normalize();
   for (std::size_t k = 0; k < limb_.size(); ++k) limb_[k] += theirs.limb_[k];
   if (++pending_ >= most_pending) normalize();
+}
+
+/// The leading bits of all terms, down to one place, add up without rounding; what is left of the terms is 2^-41 of them at most, and goes the same
+/// way until nothing is left [Rump, Ogita, Oishi 2008, Accurate floating-point summation, ExtractVector].
+void ExactSum::add(Group& terms) noexcept {
+  for (;;) {
+    Pack magnitudes(0.0), leading(0.0);
+    for (std::size_t k = 0; k < group; k += pack_width) magnitudes += abs(Pack::load(&terms[k]));
+    const double bound = sum(magnitudes);
+    if (bound == 0) return;
+    if (!(bound > 0x1p-900 && bound < 0x1p1000)) break;
+    // A power of two of at least four times the bound: neither what is cut off a term nor the sum of all of it is rounded.
+    const double cut = std::bit_cast<double>(((std::bit_cast<std::uint64_t>(bound) >> 52) + 3) << 52);
+    for (std::size_t k = 0; k < group; k += pack_width) {
+      const Pack term = Pack::load(&terms[k]), part = (term + Pack(cut)) - Pack(cut);
+      leading += part;
+      (term - part).store(&terms[k]);
+    }
+    add(sum(leading));
+  }
+  for (const double term : terms) add(term);
 }
 
 double ExactSum::value() const noexcept {

@@ -1,6 +1,7 @@
 #include "perikit/problem/motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "perikit/core/communicator.hpp"
@@ -9,13 +10,28 @@
 
 namespace perikit {
 
+namespace {
+
+template <int D>
+ExactSum kinetic_energy_of(std::span<const double> masses, ConstFieldView velocity) {
+  std::array<const double*, D> v;
+  for (int c = 0; c < D; ++c) v[static_cast<std::size_t>(c)] = velocity.component(c);
+  return exact_sum(masses.size(), [v, m = masses.data()](std::size_t p) {
+    double v2 = 0;
+    for (const double* const component : v) v2 += component[p] * component[p];
+    return 0.5 * m[p] * v2;
+  });
+}
+
+}  // namespace
+
 double kinetic_energy(const Problem& problem, ConstFieldView velocity) {
   const std::span<const double> masses = problem.masses().by_point();
-  return total_over_ranks(exact_sum(masses.size(), [&](std::size_t p) {
-    double v2 = 0;
-    for (int c = 0; c < velocity.components; ++c) v2 += velocity.component(c)[p] * velocity.component(c)[p];
-    return 0.5 * masses[p] * v2;
-  }));
+  switch (velocity.components) {
+    case 1: return total_over_ranks(kinetic_energy_of<1>(masses, velocity));
+    case 2: return total_over_ranks(kinetic_energy_of<2>(masses, velocity));
+    default: return total_over_ranks(kinetic_energy_of<3>(masses, velocity));
+  }
 }
 
 Field accelerations(Problem& problem, double t) {

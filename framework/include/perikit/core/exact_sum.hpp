@@ -37,6 +37,11 @@ class ExactSum {
   }
   void add(const ExactSum& other) noexcept;
 
+  /// So many terms at once, which are used up; the last ones may be 0.
+  static constexpr std::size_t group = 512;
+  using Group = std::array<double, group>;
+  void add(Group& terms) noexcept;
+
   /// Every limb but the topmost below 2^32 and not negative.
   void normalize() noexcept;
   Limbs& numbers() noexcept { return limb_; }

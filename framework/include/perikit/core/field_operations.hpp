@@ -26,8 +26,13 @@ template <class Term>
 ExactSum exact_sum(std::size_t n, Term&& term) {
   std::vector<ExactSum> parts(static_cast<std::size_t>(thread_count()));
   over_blocks(n, [&](std::size_t begin, std::size_t end) {
-    ExactSum& part = parts[static_cast<std::size_t>(thread_index())];
-    for (std::size_t k = begin; k < end; ++k) part.add(term(k));
+    ExactSum::Group terms;
+    for (std::size_t first = begin; first < end; first += terms.size()) {
+      const std::size_t count = std::min(terms.size(), end - first);
+      for (std::size_t k = 0; k < count; ++k) terms[k] = term(first + k);
+      std::fill(terms.begin() + static_cast<std::ptrdiff_t>(count), terms.end(), 0.0);
+      parts[static_cast<std::size_t>(thread_index())].add(terms);
+    }
   });
   for (std::size_t t = 1; t < parts.size(); ++t) parts[0].add(parts[t]);
   return parts[0];
