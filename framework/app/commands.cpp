@@ -101,6 +101,7 @@ void run(const Options& options) {
     recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
   try {
     simulation.run(recorder);
+    recorder.finish();
   } catch (const RunError& error) {
     const std::string reason = fmt::format("{}; last good frame: {}", error.what(),
                                            recorder.frames() > 0 ? fmt::format("{}", recorder.frames() - 1) : "none");

@@ -180,7 +180,9 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         for (const BondEnergy& b : problem.terms().released_energies(u))
           densities.push_back(b.energy / (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far))));
         std::ranges::sort(densities);
-        options.conditions = fmt::format(fmt::runtime(weakening), "released", "1.0", crossing(body) * densities[densities.size() * 9 / 10]) +
+        // Between two of them: what is found from the forces that are there is the same but for rounding.
+        const auto limit = densities.begin() + static_cast<std::ptrdiff_t>(densities.size() * 9 / 10);
+        options.conditions = fmt::format(fmt::runtime(weakening), "released", "1.0", crossing(body) * 0.5 * (limit[0] + limit[-1])) +
                              "limit = \"equal\"\n";
         fail_screened_or_not(options, kinematics_table(example), released.size());
       }

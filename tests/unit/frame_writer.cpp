@@ -151,6 +151,7 @@ TEST_CASE("a frame from pieces is the same file, byte for byte, and a field that
     writer.add(field.name, field.width, rows(1, points - 1));
   }
   writer.end();
+  writer.finish();
   CHECK(read_text(folder.path / "frames/00000001.h5") == read_text(folder.path / "frames/00000000.h5"));
   CHECK(dataset(folder.path / "results.h5", "/frames/00000001/cauchy").data == all[1].data);
 
@@ -282,6 +283,32 @@ TEST_CASE("a full disk is a RunError with file and reason, and earlier frames st
   CHECK(count_files(folder.path / "frames") == 1);
   writer.write(2, 2, fields(2));
   CHECK(read_last_frame(folder.path, points).step == 2);
+}
+
+TEST_CASE("a frame that could not be stored behind the back of its writer is told of by what comes next, and the one after it takes its place") {
+  const TemporaryFolder folder;
+  FrameWriter writer(folder.path, reference(), run);
+  const auto add = [&](int number) {
+    writer.begin(number, number);
+    for (const OutputField& field : fields(number)) writer.add(field.name, field.width, field.data);
+    writer.end();
+  };
+  const auto lock = [&](bool on) {   // the folder of frames is not where it was
+    fs::rename(folder.path / (on ? "frames" : "away"), folder.path / (on ? "away" : "frames"));
+  };
+  add(1);
+  CHECK(writer.frames() == 1);
+  writer.begin(2, 2);
+  for (const OutputField& field : fields(2)) writer.add(field.name, field.width, field.data);
+  lock(true);
+  writer.end();
+  CHECK(writer.frames() == 1);
+  CHECK_THROWS_WITH_AS(writer.begin(3, 3), doctest::Contains("frames/00000001.h5: cannot write: No such file"), RunError);
+  lock(false);
+  add(3);
+  writer.finish();
+  CHECK(writer.frames() == 2);
+  CHECK(read_last_frame(folder.path, points).step == 3);
 }
 
 TEST_CASE("folders that cannot be used are named with the system's reason") {

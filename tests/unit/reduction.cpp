@@ -38,7 +38,7 @@ double recorded(Simulation& simulation, Value&& value, double t = 0) {
     problem.state().displacement().component(0)[p] = value(x[0], x[1]);
   }
   PointFields fields(problem, false, false);
-  return reduced(simulation.scene().output.history.front(), problem, fields.get("displacement"), t);
+  return reduced(simulation.scene().output.history.front(), problem, fields, t);
 }
 
 }  // namespace

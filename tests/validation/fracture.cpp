@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perikit/problem/motion.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/validation/scenes.hpp"
 
@@ -80,6 +81,54 @@ TEST_CASE("double cantilever beam: with gradients bonds take Gc per area by the 
   CHECK(released == doctest::Approx(1).epsilon(0.1));
   CHECK(weighted == doctest::Approx(1).epsilon(0.1));
   CHECK(held > 1.2);
+}
+
+TEST_CASE("compact tension: the specimen is as stiff as linear elastic fracture mechanics says, and its crack costs Gc per area") {
+  // At twice the spacing, 600 points; framework/tools/compact_tension.py compares the loads.
+  const auto specimen = load("fracture/compact_tension.toml", {"kinematics=bond_based", "body.lattice.spacing=2e-3", "constants.dx=2e-3", "run.threads=1",
+                                                               "sets.upper_lip={nearest=[0,0.001]}", "sets.lower_lip={nearest=[0,-0.001]}"});
+  BodyProblem& problem = specimen->problem();
+  const auto of_set = [&](const char* set, const Field& field) {
+    double sum = 0;
+    for (const std::int32_t p : problem.body().set(set)) sum += field.component(field.components() - 1)[p];
+    return sum;
+  };
+  double stiffness = 0, first_length = 0, first_dissipated = 0, length = 0, before = 0;
+  contract::Watch watch(*specimen);
+  watch.each = [&](const StepReport& report) {
+    const double lost = of_set("lips", problem.terms().damage());
+    if (report.step == 0) before = lost;
+    length = 0.028 * lost / before - 0.01;
+    const Energies& e = problem.state().energies;
+    if (report.step == 1) {
+      const FieldView u = problem.state().displacement();
+      const double opening = u.component(1)[problem.body().set("upper_lip").front()] - u.component(1)[problem.body().set("lower_lip").front()];
+      stiffness = of_set("upper_pin", reactions(problem, false, report.time)) / opening;
+    }
+    if (first_length == 0 && length > 1.1 * 0.018) {
+      first_length = length;
+      first_dissipated = e.dissipated;
+    }
+  };
+  specimen->run(watch);
+  // Saxena and Hudak, International Journal of Fracture 14 (1978) 453: a/W = 0.45.
+  constexpr double a = 0.45;
+  constexpr double compliance = (1 + a) / (1 - a) * (1 + a) / (1 - a) *
+                                (2.1630 + a * (12.219 + a * (-20.065 + a * (-0.9925 + a * (20.609 - 9.9314 * a)))));
+  CHECK(stiffness == doctest::Approx(3e9 / compliance).epsilon(0.05));
+  CHECK(length > 0.03);
+  CHECK((problem.state().energies.dissipated - first_dissipated) / (500 * (length - first_length)) == doctest::Approx(1).epsilon(0.1));
+}
+
+TEST_CASE("crack in a strip: what bonds set free follows from the forces that are there, as if all of it were evaluated anew") {
+  const auto scene = [](const char* skip) {
+    return load("fracture/strip.toml", {"kinematics=baqp", "integrator.end_time=2e-5", fmt::format("run.skip={}", skip)});
+  };
+  const auto found = scene("true"), anew = scene("false");
+  const Balance some = run(*found), every = run(*anew);
+  CHECK(some.dissipated > 0);
+  CHECK(some.dissipated == doctest::Approx(every.dissipated).epsilon(1e-9));
+  CHECK(found->problem().terms().bond_checks().failed == anew->problem().terms().bond_checks().failed);
 }
 
 TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {

@@ -17,8 +17,7 @@ const std::vector<PointField>& point_fields() {
       {"internal_force", 3, false, Sampling::nothing, "internal force density", "N/m³",
        [](From f) { return f.vector(f.problem_.state().internal_force(), true); }},
       {"external_force", 3, false, Sampling::nothing, "external force density", "N/m³", [](From f) { return f.external_force(); }},
-      {"reaction", 3, false, Sampling::nothing, "reaction", "N",
-       [](From f) { return f.vector(reactions(f.problem_, f.dynamic_, f.problem_.state().time)); }},
+      {"reaction", 3, false, Sampling::nothing, "reaction", "N", [](From f) { return f.reaction(); }},
       {"strain_energy_density", 1, false, Sampling::energy, "strain energy density", "J/m³",
        [](From f) { return f.scalar(f.samples_->strain_energy_density); }},
       {"deformation_gradient", 9, true, Sampling::H, "deformation gradient", "", [](From f) { return f.tensor(f.samples_->H, true); }},
@@ -69,10 +68,9 @@ int PointFields::column(const std::string& name, const std::string& component) {
 }
 
 std::vector<double> PointFields::vector(ConstFieldView field, bool per_volume) const {
-  const std::vector<std::int32_t>& internal = problem_.body().owned();
-  std::vector<double> out(3 * internal.size(), 0.0);
-  for (std::size_t p = 0; p < internal.size(); ++p) {
-    const auto i = static_cast<std::size_t>(internal[p]);
+  std::vector<double> out(3 * rows_.size(), 0.0);
+  for (std::size_t p = 0; p < rows_.size(); ++p) {
+    const auto i = static_cast<std::size_t>(rows_[p]);
     const double factor = per_volume ? 1.0 / problem_.body().volume(i) : 1.0;
     for (int c = 0; c < field.components && field.data; ++c)
       out[3 * p + static_cast<std::size_t>(c)] = factor * field.component(c)[i];
@@ -81,22 +79,20 @@ std::vector<double> PointFields::vector(ConstFieldView field, bool per_volume) c
 }
 
 std::vector<double> PointFields::scalar(ConstFieldView field) const {
-  const std::vector<std::int32_t>& internal = problem_.body().owned();
-  std::vector<double> out(internal.size());
-  for (std::size_t p = 0; p < internal.size(); ++p) out[p] = field.data[internal[p]];
+  std::vector<double> out(rows_.size());
+  for (std::size_t p = 0; p < rows_.size(); ++p) out[p] = field.data[rows_[p]];
   return out;
 }
 
 std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) const {
-  const std::vector<std::int32_t>& internal = problem_.body().owned();
   const auto d = static_cast<std::size_t>(problem_.dimension());
-  std::vector<double> out(9 * internal.size(), 0.0);
-  for (std::size_t p = 0; p < internal.size(); ++p) {
+  std::vector<double> out(9 * rows_.size(), 0.0);
+  for (std::size_t p = 0; p < rows_.size(); ++p) {
     for (int c = 0; c < field.components; ++c) {
       const auto k = static_cast<std::size_t>(c);
       // In-space components row by row, then the other diagonal ones.
       const std::size_t at = field.components == 9 ? k : k < d * d ? 3 * (k / d) + k % d : 4 * (d + k - d * d);
-      out[9 * p + at] = field.component(c)[internal[p]];
+      out[9 * p + at] = field.component(c)[rows_[p]];
     }
     for (std::size_t a = 0; a < 3 && identity; ++a) out[9 * p + 4 * a] += 1.0;
   }
@@ -112,22 +108,33 @@ void PointFields::expect(std::span<const std::string> names) {
 
 const OutputField& PointFields::get(const std::string& name) {
   if (const auto known = cache_.find(name); known != cache_.end()) return known->second;
+  return cache_[name] = at(name, problem_.body().owned());
+}
+
+OutputField PointFields::at(const std::string& name, std::span<const std::int32_t> points) {
   const PointField* field = find_point_field(name);
   if (!field) throw std::out_of_range("point field " + name);
   expect({&name, 1});
-  return cache_[name] = {name, field->width, field->compute(*this)};
+  rows_ = points;
+  return {name, field->width, field->compute(*this)};
 }
 
-std::vector<double> PointFields::acceleration() const {
-  return vector(dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field());
+std::vector<double> PointFields::acceleration() {
+  if (!acceleration_) acceleration_ = dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field();
+  return vector(*acceleration_);
+}
+
+std::vector<double> PointFields::reaction() {
+  if (!reaction_) reaction_ = reactions(problem_, dynamic_, problem_.state().time);
+  return vector(*reaction_);
 }
 
 std::vector<double> PointFields::external_force() const {
   return vector(problem_.loads().any() ? ConstFieldView(problem_.state().external_force()) : ConstFieldView(), true);
 }
 
-std::vector<double> PointFields::jacobian() {
-  const std::vector<double>& F = get("deformation_gradient").data;
+std::vector<double> PointFields::jacobian() const {
+  const std::vector<double> F = tensor(samples_->H, true);
   std::vector<double> out(F.size() / 9);
   for (std::size_t p = 0; p < out.size(); ++p) {
     const double* f = &F[9 * p];
@@ -138,9 +145,8 @@ std::vector<double> PointFields::jacobian() {
 
 std::vector<double> PointFields::material_id() const {
   const auto ids = problem_.body().material_ids();
-  const std::vector<std::int32_t>& internal = problem_.body().owned();
-  std::vector<double> out(internal.size());
-  for (std::size_t p = 0; p < out.size(); ++p) out[p] = ids.empty() ? 0.0 : ids[static_cast<std::size_t>(internal[p])];
+  std::vector<double> out(rows_.size());
+  for (std::size_t p = 0; p < out.size(); ++p) out[p] = ids.empty() ? 0.0 : ids[static_cast<std::size_t>(rows_[p])];
   return out;
 }
 

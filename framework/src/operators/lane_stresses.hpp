@@ -11,8 +11,8 @@ struct LaneStresses {
   alignas(64) double sigma[9][batch_points];      ///< row by row [Pa]
   alignas(64) double von_mises[batch_points];   ///< [Pa]
 
-  /// sigma = P F^T / det F
-  LaneStresses(int n, Space space, const BatchScratch& s) noexcept {
+  /// sigma = P F^T / det F; not stored without `tensors`.
+  LaneStresses(int n, Space space, const BatchScratch& s, bool tensors = true) noexcept {
     const int d = dimension(space), components = tensor_components(space);
     const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
     for (int l = 0; l < n; l += pack_width) {
@@ -34,7 +34,7 @@ struct LaneStresses {
       for (int a = 0; a < 3; ++a)
         for (int b = 0; b < 3; ++b) {
           t[a][b] = (P[a][0] * F[b][0] + P[a][1] * F[b][1] + P[a][2] * F[b][2]) * over_J;
-          t[a][b].store(sigma[3 * a + b] + l);
+          if (tensors) t[a][b].store(sigma[3 * a + b] + l);
         }
       const Pack xy = t[0][1] * t[0][1] + t[1][2] * t[1][2] + t[0][2] * t[0][2];
       const Pack dx = t[0][0] - t[1][1], dy = t[1][1] - t[2][2], dz = t[2][2] - t[0][0];

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <future>
 #include <optional>
 #include <system_error>
 #include <type_traits>
@@ -82,7 +83,7 @@ struct FrameWriter::Implementation {
   hdf5::Image results;             ///< grows by one link per frame
   std::vector<std::string> grids;  ///< of the sidecar, one per frame
 
-  /// The one that is being put together.
+  /// The one that is being put together, and then stored.
   struct Frame {
     explicit Frame(const fs::path& path) : file(path) {}
     double time = 0;
@@ -92,6 +93,7 @@ struct FrameWriter::Implementation {
     std::size_t values = 0;                   ///< of it so far
   };
   std::optional<Frame> frame;
+  std::future<void> storing;       ///< of `frame`, on a thread of its own
 
   std::filesystem::path next_file() const { return folder / frame_path(frames); }
   /// Where this fails nothing of the frame stays.
@@ -137,6 +139,23 @@ struct FrameWriter::Implementation {
     list(index, frame.real("/", "time"), fields);
   }
 
+  /// The frame that is put together becomes the next one on the disk.
+  void store_frame() {
+    with_frame([this](Frame& complete) {
+      complete.file.keep();
+      // In the order in which a resumed run finds them.
+      std::ranges::sort(complete.fields, {}, &XdmfField::name);
+      list(frames, complete.time, complete.fields);
+    });
+    frame.reset();
+    store_results();
+    store_sidecar();
+    ++frames;
+  }
+  void finish() {
+    if (storing.valid()) storing.get();
+  }
+
   void store_results() { store_atomically(folder / "results.h5", results.bytes()); }
 
   /// Last of all, because ParaView gives up on a sidecar that names a missing file.
@@ -175,7 +194,7 @@ FrameWriter::~FrameWriter() = default;
 
 void FrameWriter::begin(double time, std::int64_t step) {
   Implementation& self = *implementation_;
-  self.frame.reset();
+  self.finish();
   self.frame.emplace(self.next_file());
   self.with_frame([&](Implementation::Frame& frame) {
     frame.time = time;
@@ -205,24 +224,21 @@ void FrameWriter::end() {
   self.with_frame([&](Implementation::Frame& frame) {
     self.end_field();
     frame.rows.reset();
-    frame.file.keep();
-    // In the order in which a resumed run finds them.
-    std::ranges::sort(frame.fields, {}, &XdmfField::name);
-    self.list(frames(), frame.time, frame.fields);
   });
-  self.frame.reset();
-  self.store_results();
-  self.store_sidecar();
-  ++self.frames;
+  self.storing = std::async(std::launch::async | std::launch::deferred, [&self] { self.store_frame(); });   // here where no thread is to be had
 }
+
+void FrameWriter::finish() { implementation_->finish(); }
 
 void FrameWriter::write(double time, std::int64_t step, std::span<const OutputField> fields) {
   begin(time, step);
   for (const OutputField& field : fields) add(field.name, field.width, field.data);
   end();
+  finish();
 }
 
 std::int64_t FrameWriter::frames() const noexcept {
+  if (implementation_->storing.valid()) implementation_->storing.wait();
   return implementation_->frames;
 }
 

@@ -259,7 +259,6 @@ void RunRecorder::step_done(const StepReport& report) {
   fields_.expect(wanted);
   if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
-  if (frame && first_) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(done_.frames)));
   done_.history_rows += row;
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
@@ -296,9 +295,15 @@ void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
   std::vector<std::byte> state = simulation_.problem().snapshot();
   if (!first_) return;
-  history_->sync();  // frames are on the disk already
+  finish();
+  history_->sync();
+  for (std::int64_t k = std::ssize(done_.frame_fingerprints); k < done_.frames; ++k) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(k)));
   write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
                              std::move(state)});
+}
+
+void RunRecorder::finish() {
+  if (writer_) writer_->finish();
 }
 
 void RunRecorder::write_frame(const StepReport& report) {
@@ -336,7 +341,7 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           report.residual};
   if (problem.laws().dissipates()) row.push_back(energies.dissipated_by_laws);
   for (const HistoryDescription& record : simulation_.scene().output.history)
-    row.push_back(reduced(record, problem, fields_.get(record.quantity), report.time));
+    row.push_back(reduced(record, problem, fields_, report.time));
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;
   if (first_) history_->row(row);

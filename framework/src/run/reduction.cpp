@@ -9,26 +9,20 @@
 #include <tuple>
 #include <utility>
 
-#include "perikit/fields/point_fields.hpp"
 #include "run/gathering.hpp"
-#include "run/reduction.hpp"
 
 namespace perikit {
 
 namespace {
 
 /// At this rank's points of a set, in its order.
-std::vector<double> values_of(const HistoryDescription& record, const Body& body, const OutputField& field) {
+std::vector<double> values_of(const HistoryDescription& record, const Body& body, PointFields& fields) {
   const int column = PointFields::column(record.quantity, record.component);
+  const OutputField field = fields.at(record.quantity, body.set(record.set));
   const auto w = static_cast<std::size_t>(field.width);
-  const auto input = [&](std::int32_t p) { return body.input_of(static_cast<std::size_t>(p)); };
   std::vector<double> values;
-  for (const std::int32_t p : body.set(record.set)) {
-    const auto row_number =
-        static_cast<std::size_t>(std::ranges::lower_bound(body.owned(), input(p), {}, input) - body.owned().begin());
-    const double* row = &field.data[w * row_number];
+  for (const double* row = field.data.data(); row < field.data.data() + field.data.size(); row += w)
     values.push_back(column >= 0 ? row[column] : std::sqrt(std::inner_product(row, row + w, row, 0.0)));
-  }
   return values;
 }
 
@@ -103,8 +97,8 @@ double error(const HistoryDescription& record, const Body& body, const std::vect
 
 }  // namespace
 
-double reduced(const HistoryDescription& record, const BodyProblem& problem, const OutputField& field, double t) {
-  const std::vector<double> values = gather_set(problem, record.set, values_of(record, problem.body(), field));
+double reduced(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields, double t) {
+  const std::vector<double> values = gather_set(problem, record.set, values_of(record, problem.body(), fields));
   if (values.empty()) return 0;  // rank 0 has them
   const Body& body = problem.whole();
   if (record.reduce == "fit") return fitted(record, body, values);

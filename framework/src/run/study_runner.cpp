@@ -92,6 +92,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     const std::clock_t processor = std::clock();
     try {
       simulation.run(recorder);
+      recorder.finish();
     } catch (const RunError& error) {
       recorder.log(fmt::format("failed: {}", error.what()));
       throw;

@@ -13,6 +13,7 @@
 #include "families/families.hpp"
 #include "families/quiet_blocks.hpp"
 #include "operators/batch.hpp"
+#include "operators/point_flux.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/operators/report.hpp"
 
@@ -38,6 +39,8 @@ class EvaluationSpace {
   /// Point gradients of order 1 on clouds, and those of parts of families: shifted by this field from now on (spaces/shift.hpp). It
   /// must outlive the space.
   virtual void shift_gradients(ConstFieldView) {}
+  /// Of the last run, where that was an evaluation of all forces.
+  virtual PointFlux point_flux() const noexcept { return {}; }
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
   /// The history of laws was replaced.

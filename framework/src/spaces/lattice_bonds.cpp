@@ -159,7 +159,7 @@ template <int D>
 int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
   const LatticeChunk& chunk = tiles_.chunks[index];
   const LatticePattern& pattern = families_.pattern(chunk);
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.alone();
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.alone(), sampled_pairs = samples_pairs(pass);
   const std::int64_t p = chunk.first;
   double* const H = selective_ ? s.Ht : s.H;
   double* const dH = selective_ ? s.dHt : s.dH;
@@ -196,7 +196,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
       const int lane = k * chunk_points + l;
       const Pack weight = Pack::load(b + l) * Pack(slot_weight_[at]);
       (weight * Pack::load(scale + l)).store(s.weight + lane);
-      if (both_ends) (weight * Pack::load(far_scale + l)).store(s.far_weight + lane);
+      if (both_ends || sampled_pairs) (weight * Pack::load(far_scale + l)).store(s.far_weight + lane);
       if (mask == 0xff) continue;
       const Pack keep = Pack::load(lane_factors[mask] + l);
       for (int c = 0; c < D * D; ++c) {
@@ -214,7 +214,10 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   if (bad >= 0) return bad;
   pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
   if (sample) {
-    pass.add_samples(lanes, s);
+    if (sampled_pairs)
+      pass.work.add_samples(lanes, s, *pass.sums, {p, shifts, pattern.mask.data() + slot});
+    else
+      pass.add_samples(lanes, s);
     return -1;
   }
   if (pass.alone()) return -1;
@@ -227,7 +230,7 @@ template <int D>
 void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
-  const std::size_t slots = pairs_ && !pass.alone() ? families_.slots.half : families_.slots.size();
+  const std::size_t slots = (pairs_ && !pass.alone()) || samples_pairs(pass) ? families_.slots.half : families_.slots.size();
   BlockEnergy energy;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
@@ -259,6 +262,12 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
   }
 }
 
+/// Averages at points: what one evaluation says of a bond counts at either end, where both have the same law.
+template <int D>
+bool LatticeBonds<D>::samples_pairs(const Pass& pass) const noexcept {
+  return pairs_ && pass.sums && laws_.single() && !selective_ && !pass.work.numbered();
+}
+
 /// Adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
 template <int D>
 void LatticeBonds<D>::divergence(Pass& pass, int number) const {
@@ -281,6 +290,7 @@ template <int D>
 void LatticeBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
+  of_forces_ = pass.work.work() == Work::force && !pass.only;
   if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
   if (pass.everywhere())
     quiet_.wake();
@@ -295,6 +305,7 @@ void LatticeBonds<D>::run(Pass& pass) {
   parallel_for(blocks(), [&](std::size_t b) {
     if (quiet_.begins(b) && here(b, pass)) gradients(b, pass);
   });
+  if (samples_pairs(pass)) return tiles_.colouring.for_each([&](std::size_t b) { bonds(b, pass); });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
   tiles_.colouring.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
   parallel_for(blocks(), awake([&](std::size_t b) { finish_stress(b, pass); }));

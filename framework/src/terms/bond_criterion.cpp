@@ -104,7 +104,7 @@ void BondCriterion::begin_forces(ConstFieldView u) {
 
 /// Groups with bonds that may fail at u.
 std::vector<std::int32_t> BondCriterion::near_failure(ConstFieldView u) {
-  if (screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin())) return marked(screen_.near);
+  if (known_at(u)) return marked(screen_.near);
   if (!by_point_ || screen_.near.empty()) return groups_;
   // The energies of all points are no more than a look at them.
   const BondSampling asked = samples_.what();
@@ -131,8 +131,13 @@ std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
 void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
   std::fill(own_.begin(), own_.end(), std::uint8_t{0});
   for (const std::int32_t g : groups) own_[static_cast<std::size_t>(g)] = 1;
+  if (flux_.flux.data) {
+    samples_.ask(BondSampling::energy);
+    return collect(u, own_, own_);
+  }
   near_ = families_.around(own_);
   if (!release_) return collect(u, near_, own_);
+  samples_.ask(BondSampling::derivative);
   const GroupMarks owners = release_->reach() > 1 ? families_.around(near_) : near_;
   collect(u, owners, near_);
   release_->find(u, near_, owners, samples_);
@@ -190,13 +195,17 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const std::
     array->assign(size, 1.0);
   m.stress.assign(traits_.stress ? 6 * size : 0, 0.0);
   energy_shares(formulation_, body_.dimension(), m.family, m.all_shares);
+  if (flux_.flux.data) release_->of(p, m.family, m.place, u, flux_, samples_, m.energy.data());
   for (std::size_t k = 0; k < n; ++k) {
     const std::int32_t far = m.family.far[m.place[k]];
+    const double volumes = body_.volume(static_cast<std::size_t>(p)) * body_.volume(static_cast<std::size_t>(far));
     m.length[k] = m.family.length[m.place[k]];
     m.stretch[k] = bond_stretch(m.family, m.place[k], static_cast<std::size_t>(p), u);
     m.share[k] = m.all_shares[m.place[k]];
-    if (release_)
-      m.energy[k] = (release_->of(p, far) + release_->of(far, p)) / (body_.volume(static_cast<std::size_t>(p)) * body_.volume(static_cast<std::size_t>(far)));
+    if (flux_.flux.data)
+      m.energy[k] /= volumes;
+    else if (release_)
+      m.energy[k] = (release_->of(p, far) + release_->of(far, p)) / volumes;
     else if (traits_.energy)
       m.energy[k] = energy_of(p, far, m.family.b(m.place[k]), m.family.whole_omega(m.place[k]));
     if (traits_.stress) {
@@ -240,6 +249,7 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   found_.clear();
   found_at_ = u.data;
   const std::vector<std::int32_t> near = skip_ ? near_failure(u) : groups_;
+  flux_ = release_ && release_->follows_from_flux() && known_at(u) ? terms_.front()->point_flux() : PointFlux();
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<Found>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
@@ -253,6 +263,7 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
     });
     for (const auto& of_group : found) found_.insert(found_.end(), of_group.begin(), of_group.end());
   });
+  flux_ = {};
   // Where a bond lies in two pieces it was found in both.
   const auto bond = [](const Found& f) { return f.change.bond; };
   std::ranges::sort(found_, {}, bond);

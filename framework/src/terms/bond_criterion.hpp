@@ -1,6 +1,7 @@
 #pragma once
 /// Finds the bonds that fail by more than their stretch: by their energy or their stress, which the terms are asked for.
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
@@ -50,6 +51,8 @@ class BondCriterion final : public BondFinder {
   };
 
   void set_screen(std::span<const double> factors);
+  /// Whether the last evaluation of forces with a screen was at u.
+  bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
   std::vector<std::int32_t> near_failure(ConstFieldView u);
   std::vector<std::int32_t> marked(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
@@ -74,6 +77,7 @@ class BondCriterion final : public BondFinder {
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
   std::optional<BondRelease> release_;  ///< where the criterion asks for what bonds set free
+  PointFlux flux_;                      ///< what was sampled last has these at its points; without data: it has not
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
   GroupMarks own_, near_;             ///< what was sampled last: groups, and those of everything in their families
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "families/lattice_families.hpp"
 #include "families/shape_tensor.hpp"
 #include "maps/selective_map.hpp"
 #include "perikit/core/dimension.hpp"
@@ -108,6 +109,38 @@ double BondRelease::of(std::int32_t p, std::int32_t far) const noexcept {
   const Owner& owner = owner_of(p);
   const std::size_t k = owner.place_of(far);
   return k == owner.far.size() ? 0.0 : owner.released[k];
+}
+
+bool BondRelease::follows_from_flux() const noexcept {
+  const Formulation& f = parts_.formulation;
+  return mirrored_ && f.bond && f.g_from_xi_only && !f.weighted && f.order == 1 && !parts_.stabilization && !parts_.shift.data && parts_.families.lattice();
+}
+
+/// dE/dH : (z (x) g)/b with g = b omega V K^-1 xi is omega z . Q d, Q the flux and d the bond in cells; the far end sees -z and -d.
+void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const std::size_t> bonds, ConstFieldView u, const PointFlux& flux,
+                     const BondSamples& samples, double* released) const noexcept {
+  const LatticeFamilies& lattice = *parts_.families.lattice();
+  const int dimension = family.dimension;
+  const auto normaliser = [&](std::int32_t of) { return parts_.families.normaliser(static_cast<std::size_t>(of), parts_.formulation.weight); };
+  const double own = normaliser(p);
+  for (const std::size_t k : bonds) {
+    const std::int32_t far = family.far[k];
+    double sum = 0;
+    for (int c = 0; c < dimension; ++c) {
+      const double relative = u.component(c)[far] - u.component(c)[p];
+      for (const std::int32_t end : {p, far}) {
+        double z = relative, t = 0;
+        for (int e = 0; e < dimension; ++e) {
+          z -= flux.gradient.component(c * dimension + e)[end] * family.xi[e][k];
+          t += flux.flux.component(c * dimension + e)[end] * family.xi[lattice.grid.axis[static_cast<std::size_t>(e)]][k];
+        }
+        sum += z * t;
+      }
+    }
+    sum *= family.whole_omega(k) / lattice.spacing;
+    if (const BondSamples::Entry* const entry = samples.find(p, far)) sum += entry->energy / family.b(k) * (1 + own / normaliser(far));
+    *released++ = sum;
+  }
 }
 
 void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples) {

@@ -14,6 +14,7 @@
 
 #include "families/families.hpp"
 #include "operators/bond_samples.hpp"
+#include "operators/point_flux.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
@@ -44,6 +45,13 @@ class BondRelease {
   void find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples);
   /// dE/db_ij by what belongs to p and its evaluation points [J], of an intact bond; the rest is that of the far end.
   double of(std::int32_t p, std::int32_t far) const noexcept;
+
+  /// Whether dE/db_ij follows from the flux at both ends and the energy of the bond alone: on lattices, of one gradient for both directions
+  /// of a bond that needs no more than the gradients of its ends.
+  bool follows_from_flux() const noexcept;
+  /// Then: of these bonds of p, whole, into `released`. samples: energies of the bonds of p. flux: of forces at u.
+  void of(std::int32_t p, const FamilyArrays& family, std::span<const std::size_t> bonds, ConstFieldView u, const PointFlux& flux, const BondSamples& samples,
+          double* released) const noexcept;
 
  private:
   /// A point with its bonds.

@@ -9,6 +9,7 @@
 #include "families/families.hpp"
 #include "perikit/core/exact_sum.hpp"
 #include "operators/bond_samples.hpp"
+#include "operators/point_flux.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
 #include "perikit/operators/samples.hpp"
@@ -43,6 +44,9 @@ class Term {
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
   virtual const NearestFailure* watch(const BodyDamage& damage) = 0;
+
+  /// Of the last evaluation, where that was one of all forces, and leaves any.
+  virtual PointFlux point_flux() const noexcept { return {}; }
 
   /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on.
   virtual void screen(BondScreen* screen) = 0;

@@ -21,8 +21,10 @@ class PointFields {
   static int column(const std::string& name, const std::string& component);
 
   /// Forget what was computed: the state has changed.
-  void renew() { cache_.clear(), samples_.reset(); }
+  void renew() { cache_.clear(), samples_.reset(), acceleration_.reset(), reaction_.reset(); }
   const OutputField& get(const std::string& name);
+  /// The rows of these points of this rank alone, internal indices, in their order; nothing is done for others that a point needs not.
+  OutputField at(const std::string& name, std::span<const std::int32_t> points);
   /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
   void expect(std::span<const std::string> names);
   /// Frees its memory until it is asked for again.
@@ -34,15 +36,18 @@ class PointFields {
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;
-  std::vector<double> acceleration() const;
+  std::vector<double> acceleration();
   std::vector<double> external_force() const;
-  std::vector<double> jacobian();
+  std::vector<double> reaction();
+  std::vector<double> jacobian() const;
   std::vector<double> material_id() const;
 
   BodyProblem& problem_;
   bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
+  std::optional<Field> acceleration_, reaction_;
+  std::span<const std::int32_t> rows_;   ///< the points that are computed for
 };
 
 }  // namespace perikit

@@ -42,11 +42,16 @@ class FrameWriter {
   ~FrameWriter();
   /// Writes frames/<next index>.h5, then results.h5, then results.xdmf.
   void write(double time, std::int64_t step, std::span<const OutputField> fields);
-  // The same file from pieces, so that nobody needs all of a frame at once.
+  // The same file from pieces, so that nobody needs all of a frame at once, and without waiting for the disk.
   void begin(double time, std::int64_t step);
   /// The next rows of a field; those of one field follow each other.
   void add(const std::string& name, int width, std::span<const double> values);
+  /// The frame goes to the disk on a thread of its own, which nothing else of HDF5 may run beside: finish() first. What fails there is
+  /// thrown by the next begin() or finish().
   void end();
+  /// Waits until the frame that ended is on the disk.
+  void finish();
+  /// On the disk; waits for the one that is on its way.
   std::int64_t frames() const noexcept;
 
  private:

@@ -89,7 +89,7 @@ struct OutputProgress {
   double end_time = 0;
   double frame_spacing = 0;                    ///< of [output] frames: it stays where a run is lengthened
   EnergyBalance energies;
-  std::vector<std::int64_t> frame_fingerprints;   ///< of the files of these frames
+  std::vector<std::int64_t> frame_fingerprints;   ///< of the files of these frames, up to the last checkpoint
   std::int64_t history_fingerprint = 0;        ///< of the values in these rows; 0: none yet
 };
 
@@ -115,6 +115,8 @@ class RunRecorder final : public Observer {
   bool interrupted() const noexcept override;
   void stopped_within_step() override;
 
+  /// The end of the run: waits until all is on the disk. RunError where something did not come there.
+  void finish();
   /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
