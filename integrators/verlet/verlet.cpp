@@ -149,9 +149,17 @@ double Verlet::steps_to_end(double time, double step) const {
                                                       options_.end_time, steps, step, most));
 }
 
+double Verlet::first_step(Problem& problem) {
+  if (options_.time_step > 0) return options_.time_step;
+  const ConstFieldView u = problem.state().displacement();
+  if (planned_.problem != &problem || !std::equal(u.data, u.data + u.size(), planned_.displacement.begin(), planned_.displacement.end()))
+    planned_ = {&problem, stable_step(problem), {u.data, u.data + u.size()}};
+  return planned_.step;
+}
+
 std::string Verlet::plan(Problem& problem) {
   check_time_step(problem, options_.values);
-  const double dt = options_.time_step > 0 ? options_.time_step : stable_step(problem);
+  const double dt = first_step(problem);
   const double steps = steps_to_end(0, dt);
   return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
                      options_.end_time / steps, options_.end_time, bond_based_time_step(problem.body(), problem.laws()));
@@ -177,7 +185,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
   const bool fresh = dt == 0;
   if (fresh) {
     check_time_step(problem, options_.values, &observer);
-    make_plan(estimated ? stable_step(problem) : options_.time_step);   // before the fields of the steps are there: it has its own
+    make_plan(first_step(problem));   // before the fields of the steps are there: it has its own
+    planned_ = {};
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
   }
   Stepper stepper(problem);
