@@ -2,8 +2,9 @@
 """Kalthoff and Winkler's plate (configs/fracture/kalthoff_winkler.toml): angle, start and speed of the upper crack by kinematics, kernel,
 horizon and orientation of the lattice. A Markdown table is printed; it is that of framework/docs/fracture.md, "Kernels that follow the lattice".
 
-    kalthoff_winkler.py PERIKIT OUT [--spacing 1e-3] [--threads 1]
+    kalthoff_winkler.py PERIKIT OUT [--solid] [--spacing 1e-3] [--threads 1]
 
+--solid: the plate in three dimensions, 9 mm thick (kalthoff_winkler_3d.toml), with the `constant` kernel and a horizon of three spacings.
 Runs that are done are kept: a stopped command goes on where it was. Needs numpy and h5py.
 
 Angle: of the line through the points with damage above 0.35, from 2 mm to 30 mm above the notch (of the fitted x over y, so that a vertical crack
@@ -21,7 +22,7 @@ import kept_runs
 import turned_lattice
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SCENE = ROOT / "configs/fracture/kalthoff_winkler.toml"
+PLATE, SOLID = (ROOT / "configs/fracture" / name for name in ("kalthoff_winkler.toml", "kalthoff_winkler_3d.toml"))
 KINEMATICS = {  # by name: settings
     "bond_based": ["kinematics=bond_based"],
     "ordinary": ["kinematics=ordinary"],
@@ -31,11 +32,11 @@ KINEMATICS = {  # by name: settings
 KERNELS = {"bond_based": ["constant"]}  # which the influence function does not change
 
 
-def run(perikit, folder, spacing, kinematics, kernel, ratio, degrees, threads):
+def run(perikit, folder, scene, spacing, kinematics, kernel, ratio, degrees, threads):
     settings = kinematics + ["family.influence=" + kernel, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
                 "output.frames=50"] + ([] if degrees else ["body.lattice.spacing=%g" % spacing])
     kept_runs.run(perikit, folder, settings, threads,
-                  lambda: turned_lattice.turned(SCENE.read_text(), folder, spacing, degrees, (0, -0.1), (0.1, 0.1)))
+                  lambda: turned_lattice.turned(scene.read_text(), folder, spacing, degrees, (0, -0.1), (0.1, 0.1)))
 
 
 def measured(folder):
@@ -68,18 +69,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("perikit")
     parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--solid", action="store_true")
     parser.add_argument("--spacing", type=float, default=1e-3)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
-    cases = [(3.015, 0), (4.015, 0), (3.015, 30)]
+    cases = [(3.015, 0)] if options.solid else [(3.015, 0), (4.015, 0), (3.015, 30)]
     print("| kinematics | kernel | " + " | ".join("horizon %g%s" % (round(r), ", turned by %d degrees" % d if d else "") for r, d in cases) + " |")
     print("|" + "---|" * (2 + len(cases)))
     for name, kinematics in KINEMATICS.items():
-        for kernel in KERNELS.get(name, ("constant", "gaussian", "cubic_spline")):
+        for kernel in ("constant",) if options.solid else KERNELS.get(name, ("constant", "gaussian", "cubic_spline")):
             cells = []
             for ratio, degrees in cases:
-                folder = options.out / ("%s_%s_%d_%d" % (name.replace(", ", "_"), kernel, round(ratio), degrees))
-                run(options.perikit, folder, options.spacing, kinematics, kernel, ratio, degrees, options.threads)
+                folder = options.out / ("%s_%s_%d_%d%s" % (name.replace(", ", "_"), kernel, round(ratio), degrees, "_solid" if options.solid else ""))
+                run(options.perikit, folder, SOLID if options.solid else PLATE, options.spacing, kinematics, kernel, ratio, degrees, options.threads)
                 cells.append(", ".join(word for word in measured(folder) if word))
             print("| `%s` | `%s` | %s |" % (name, kernel, " | ".join(cells)), flush=True)
 
