@@ -340,16 +340,6 @@ void add_eight(std::span<const Sampled> all, int first, std::size_t p, const dou
   }
 }
 
-/// The same of their far ends; others write there, too, but to no cell that the masks name.
-void add_far(std::span<const Sampled> all, int n, const FarCells& far, const double* weight) noexcept {
-  for (int k = 0; 8 * k < n; ++k)
-    for (int l = 0; l < 8; l += pack_width) {
-      const Pack w = Pack::load(weight + 8 * k + l);
-      for (const Sampled& q : all)
-        add_to_cells(q.sum + far.first + far.shifts[k] + l, w * Pack::load(q.value + 8 * k + l), pack_mask(far.masks[k], l));
-    }
-}
-
 /// Lanes first ... end - 1 belong to p, and are added in this order.
 void add_run(std::span<const Sampled> all, int first, int end, std::size_t p, const double* weight) noexcept {
   const auto add = [&](auto count, const Sampled* q) {
@@ -369,7 +359,7 @@ void add_run(std::span<const Sampled> all, int first, int end, std::size_t p, co
 
 }  // namespace
 
-void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums, const FarCells& far) const noexcept {
+void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept {
   static constexpr auto ones = [] {
     std::array<double, batch_points> all{};
     all.fill(1.0);
@@ -403,7 +393,6 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
     add_run({all, count}, l, end, static_cast<std::size_t>(p), s.weight);
     l = end;
   }
-  if (far.shifts) add_far({all, count}, n, far, s.far_weight);
 }
 
 }  // namespace perikit

@@ -91,13 +91,6 @@ struct SampleSums {
   std::size_t stride;
 };
 
-/// Where the far ends of eights of lanes are, cells of a lattice: those of eight k from first + shifts[k] on, the ones in its mask.
-struct FarCells {
-  std::int64_t first = 0;
-  const std::int64_t* shifts = nullptr;   ///< null: nothing is added there
-  const std::uint8_t* masks = nullptr;
-};
-
 /// One BatchScratch per thread.
 class ScratchPool {
  public:
@@ -158,8 +151,8 @@ class BatchWork {
   /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept;
-  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l], and with s.far_weight to those of its far end.
-  void add_samples(int n, const BatchScratch& s, const SampleSums& sums, const FarCells& far = {}) const noexcept;
+  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
+  void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
  private:
   /// The lanes of a batch that are laminates.

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <future>
@@ -31,6 +32,12 @@ void remove_later_frames(const fs::path& frames, std::int64_t first_frame) {
     if (frame || file_of_temporary(name).ends_with(".h5")) stale.push_back(entry.path());
   }
   for (const fs::path& file : stale) remove_file(file);
+}
+
+/// The heap of a new thread takes 128 MB of addresses, which others may need where the shell allows but so many.
+bool addresses_limited() {
+  rlimit limit{};
+  return getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
 }
 
 void write_run_attributes(hdf5::NewFile& file, const RunAttributes& run) {
@@ -225,6 +232,7 @@ void FrameWriter::end() {
     self.end_field();
     frame.rows.reset();
   });
+  if (addresses_limited()) return self.store_frame();
   self.storing = std::async(std::launch::async | std::launch::deferred, [&self] { self.store_frame(); });   // here where no thread is to be had
 }
 

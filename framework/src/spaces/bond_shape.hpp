@@ -106,6 +106,17 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
   }
 }
 
+/// Bits of the lanes l ... l + pack_width - 1 of a mask.
+inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
+  return static_cast<std::uint8_t>(mask >> l & ((1u << pack_width) - 1));
+}
+
+/// to[lanes of mask] += value; other cells are not touched.
+inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
+  if (mask == pack_mask(0xff, 0)) (Pack::load(to) + value).store(to);
+  else subtract_at(to, mask, -value);
+}
+
 /// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the
 /// stress on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written.
 template <int D, bool per_slot, bool both>

@@ -39,7 +39,7 @@ class EvaluationSpace {
   /// Point gradients of order 1 on clouds, and those of parts of families: shifted by this field from now on (spaces/shift.hpp). It
   /// must outlive the space.
   virtual void shift_gradients(ConstFieldView) {}
-  /// Of the last run, where that was an evaluation of all forces.
+  /// Of the last run, where that was an evaluation of forces.
   virtual PointFlux point_flux() const noexcept { return {}; }
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;

@@ -186,39 +186,42 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   };
   choose(gradient, pass.u, ConstFieldView(gradient_), H);
   if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
-  const double* const scale = pattern.scale_of(formulation_.weight);
+  // Local copies: a pack that is stored may be any member, so that the compiler would read each again for every slot.
+  const std::uint8_t* const masks = pattern.mask.data() + slot;
+  const double* const integrity = pattern.integrity.empty() ? nullptr : pattern.b_of(slot);
+  const auto weigh = [&, slot_weight = slot_weight_.data() + slot](const double* end_scale, const std::int64_t* moved, double* weight) {
+    for (int k = 0; k < slots; ++k) {
+      const double* const b = integrity ? integrity + k * chunk_points : lane_factors[masks[k]];
+      const double* const scale = moved ? end_scale + moved[k] : end_scale;
+      for (int l = 0; l < chunk_points; l += pack_width)
+        (Pack::load(b + l) * Pack(slot_weight[k]) * Pack::load(scale + l)).store(weight + k * chunk_points + l);
+    }
+  };
+  weigh(pattern.scale_of(formulation_.weight), nullptr, s.weight);
+  if (both_ends || sampled_pairs) weigh(scale_.data() + p, shifts, s.far_weight);
   for (int k = 0; k < slots; ++k) {
-    const std::size_t at = slot + static_cast<std::size_t>(k);
-    const std::uint8_t mask = pattern.mask[at];
-    const double* const b = pattern.b_of(at);
-    const double* const far_scale = scale_.data() + p + shifts[k];
+    if (masks[k] == 0xff) continue;
     for (int l = 0; l < chunk_points; l += pack_width) {
       const int lane = k * chunk_points + l;
-      const Pack weight = Pack::load(b + l) * Pack(slot_weight_[at]);
-      (weight * Pack::load(scale + l)).store(s.weight + lane);
-      if (both_ends || sampled_pairs) (weight * Pack::load(far_scale + l)).store(s.far_weight + lane);
-      if (mask == 0xff) continue;
-      const Pack keep = Pack::load(lane_factors[mask] + l);
+      const Pack keep = Pack::load(lane_factors[masks[k]] + l);
       for (int c = 0; c < D * D; ++c) {
         (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
         if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
       }
     }
-    for (int l = 0; l < chunk_points && (sample || (!laws_.single() && s.one_law < 0)); ++l) {
-      s.owner[k * chunk_points + l] = chunk.first + l;
-      s.far[k * chunk_points + l] = static_cast<std::int32_t>((mask >> l & 1) ? p + shifts[k] + l : p + l);
-    }
   }
+  for (int k = 0; k < slots && (sample || (!laws_.single() && s.one_law < 0)); ++k)
+    for (int l = 0; l < chunk_points; ++l) {
+      s.owner[k * chunk_points + l] = chunk.first + l;
+      s.far[k * chunk_points + l] = static_cast<std::int32_t>((masks[k] >> l & 1) ? p + shifts[k] + l : p + l);
+    }
   if (pass.work.numbered()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
   const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
   pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
   if (sample) {
-    if (sampled_pairs)
-      pass.work.add_samples(lanes, s, *pass.sums, {p, shifts, pattern.mask.data() + slot});
-    else
-      pass.add_samples(lanes, s);
-    return -1;
+    pass.add_samples(lanes, s);
+    return sampled_pairs ? sample_far_ends(lanes, s, pass) : -1;
   }
   if (pass.alone()) return -1;
   choose(adjoint);
@@ -262,10 +265,20 @@ void LatticeBonds<D>::finish_stress(std::size_t b, Pass& pass) {
   }
 }
 
-/// Averages at points: what one evaluation says of a bond counts at either end, where both have the same law.
+/// Averages at points: what one evaluation says of a bond counts at either end.
 template <int D>
 bool LatticeBonds<D>::samples_pairs(const Pass& pass) const noexcept {
-  return pairs_ && pass.sums && laws_.single() && !selective_ && !pass.work.numbered();
+  return pairs_ && pass.sums && !selective_ && !pass.work.numbered();
+}
+
+/// After the samples of their owners; laws that may differ are evaluated again. Returns the first bad lane or -1.
+template <int D>
+int LatticeBonds<D>::sample_far_ends(int lanes, BatchScratch& s, Pass& pass) {
+  std::swap_ranges(s.owner, s.owner + lanes, s.far);
+  std::swap_ranges(s.weight, s.weight + lanes, s.far_weight);
+  const int bad = laws_.single() || s.one_law >= 0 ? -1 : pass.work.evaluate(lanes, s, false, nullptr);
+  if (bad < 0) pass.add_samples(lanes, s);
+  return bad;
 }
 
 /// Adds the adjoint of the point gradient, as pass `number`: of Q, or of the stress on Hbar for stored stencils.
@@ -290,7 +303,7 @@ template <int D>
 void LatticeBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
-  of_forces_ = pass.work.work() == Work::force && !pass.only;
+  last_ = pass.work.work() != Work::force || pass.work.balance() ? Last::other : pass.only ? Last::some_forces : Last::all_forces;
   if (pass.work.tangent() && direction_.size() == 0) direction_ = families_.body().make_field(D * D);
   if (pass.everywhere())
     quiet_.wake();

@@ -24,7 +24,7 @@ class LatticeBonds final : public EvaluationSpace {
   bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
-  PointFlux point_flux() const noexcept override { return of_forces_ && !stencils_ ? PointFlux{gradient_, flux_} : PointFlux(); }
+  PointFlux point_flux() const noexcept override { return last_ == Last::other || stencils_ ? PointFlux() : PointFlux{gradient_, flux_, last_ == Last::all_forces}; }
   void report(ModelReport& report) const override;
 
  private:
@@ -37,6 +37,7 @@ class LatticeBonds final : public EvaluationSpace {
   void store_corrections();
   void divergence(Pass& pass, int number) const;
   bool samples_pairs(const Pass& pass) const noexcept;
+  int sample_far_ends(int lanes, BatchScratch& s, Pass& pass);
   bool here(std::size_t b, const Pass& pass) const noexcept { return !pass.near || tiles_.marked(b, pass.near); }
   void finish_stress(std::size_t b, Pass& pass);
   // Selective map.
@@ -60,7 +61,7 @@ class LatticeBonds final : public EvaluationSpace {
   LatticeOperator<D> operator_;                 ///< order 1
   std::optional<LatticeStencils<D>> stencils_;  ///< higher orders
   Field flux_;                                  ///< the stress on Hbar, then Q
-  bool of_forces_ = false;                      ///< the last run was an evaluation of all forces
+  enum class Last { all_forces, some_forces, other } last_ = Last::other;   ///< run
   Field gradient_, direction_;                  ///< Hbar of u and of w
   Field scale_;                                 ///< V_i / N_i of bond weights
   Field volume_, pressure_;                     ///< selective: volume changes of points; pressures (and their rates) on them

@@ -143,6 +143,17 @@ void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView 
   release_->find(u, near_, owners, samples_);
 }
 
+void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldView u) {
+  if (!skip_ || !release_ || !release_->follows_from_flux()) return;
+  GroupMarks marks(own_.size(), 0);
+  for (const std::int32_t g : groups) marks[static_cast<std::size_t>(g)] = 1;
+  // The points of their families, and whatever has a bond with those.
+  marks = families_.around(families_.around(marks));
+  if (forces_.size() == 0) forces_ = body_.make_field(u.components);
+  std::fill_n(forces_.data(), forces_.size(), 0.0);
+  if (terms_.front()->add_forces_of(u, marks, families_.around(marks), forces_, nullptr) < 0) flux_ = terms_.front()->point_flux();
+}
+
 /// Of the evaluation points of these owners; kept: see BondSamples::clear.
 void BondCriterion::collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept) {
   const GroupMarks wide = families_.around(owners);
@@ -249,7 +260,8 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   found_.clear();
   found_at_ = u.data;
   const std::vector<std::int32_t> near = skip_ ? near_failure(u) : groups_;
-  flux_ = release_ && release_->follows_from_flux() && known_at(u) ? terms_.front()->point_flux() : PointFlux();
+  if (release_ && release_->follows_from_flux() && known_at(u)) flux_ = terms_.front()->point_flux();
+  if (!flux_.everywhere) flux_ = {};
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<Found>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
@@ -288,6 +300,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+  find_flux(groups, u);
   sample(groups, u);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {
@@ -295,6 +308,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
     load(bonds[k].point, u, far, m);
     values[k] = m.place.empty() ? 0.0 : m.value[0];
   }
+  flux_ = {};
 }
 
 std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {

@@ -30,7 +30,7 @@ class BondCriterion final : public BondFinder {
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }
   std::size_t bytes() const noexcept override {
-    return samples_.bytes() + 4 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
+    return samples_.bytes() + forces_.bytes() + 4 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
   }
   /// For evaluations of forces to mark the groups that need a look; null where they cannot.
   BondScreen* screen() noexcept;
@@ -59,6 +59,8 @@ class BondCriterion final : public BondFinder {
   template <class Visit>
   void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
   void sample(std::span<const std::int32_t> groups, ConstFieldView u);
+  /// Evaluates forces about these groups for the flux that they leave, where that is all that a look at bonds takes.
+  void find_flux(std::span<const std::int32_t> groups, ConstFieldView u);
   void collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept);
   /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).
   template <class Visit>
@@ -77,7 +79,8 @@ class BondCriterion final : public BondFinder {
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
   std::optional<BondRelease> release_;  ///< where the criterion asks for what bonds set free
-  PointFlux flux_;                      ///< what was sampled last has these at its points; without data: it has not
+  PointFlux flux_;                      ///< what is sampled has this at its points; without data: it is sampled in full
+  Field forces_;                        ///< that nobody reads
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
   GroupMarks own_, near_;             ///< what was sampled last: groups, and those of everything in their families
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread

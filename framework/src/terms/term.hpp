@@ -45,7 +45,7 @@ class Term {
   /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
   virtual const NearestFailure* watch(const BodyDamage& damage) = 0;
 
-  /// Of the last evaluation, where that was one of all forces, and leaves any.
+  /// Of the last evaluation, where that was one of forces, and leaves any.
   virtual PointFlux point_flux() const noexcept { return {}; }
 
   /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on.

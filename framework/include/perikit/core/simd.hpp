@@ -238,15 +238,6 @@ inline void subtract_at(double* p, std::uint8_t bits, Pack a) noexcept {
     if (bits >> i & 1) p[i] -= a.v[i];
 #endif
 }
-/// Bits of the lanes l ... l + pack_width - 1 of a mask.
-inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
-  return static_cast<std::uint8_t>(mask >> l & ((1u << pack_width) - 1));
-}
-/// to[lane] += value[lane] where the bit of the lane is set; nothing else is written, and nothing masked where all are.
-inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
-  if (mask == pack_mask(0xff, 0)) (Pack::load(to) + value).store(to);
-  else subtract_at(to, mask, -value);
-}
 /// Lane i: p[at[i]].
 inline Pack gather(const double* p, const std::int32_t* at) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
