@@ -43,7 +43,7 @@ class KrylovEquations final : public LinearisedProblem {
   SundialsContext context_;
   Field right_;
   FieldVector right_vector_;
-  KrylovSolver gmres_;
+  LinearSolver gmres_;
   Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
   int iterations_ = 0;                  ///< of the last run of GMRES
   double reached_ = 0;                  ///< linear residual over the right-hand side after it

@@ -29,7 +29,7 @@ class MixedEquations final : public LinearisedProblem {
   SundialsContext context_;
   Field right_, solution_;
   FieldVector right_vector_, solution_vector_;
-  KrylovSolver gmres_;
+  LinearSolver gmres_;
   Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
   std::string failure_;
 };

@@ -1,6 +1,4 @@
 #pragma once
-#include <sundials/sundials_linearsolver.h>
-
 #include <exception>
 #include <memory>
 #include <string>
@@ -36,9 +34,6 @@ class KinsolSolver final : public EquilibriumSolver {
   }
 
  private:
-  struct SolverDeleter {
-    void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
-  };
   static int system_function(N_Vector u, N_Vector value, void* self);
   static int tangent_action(N_Vector w, N_Vector Kw, N_Vector u, booleantype* new_u, void* self);
   static int set_up_preconditioner(N_Vector u, N_Vector, N_Vector value, N_Vector, void* self);
@@ -64,7 +59,7 @@ class KinsolSolver final : public EquilibriumSolver {
   std::unique_ptr<Preconditioner> preconditioner_;
   std::unique_ptr<TangentMatrix> matrix_;  ///< klu only
   FieldVector template_, displacement_scale_vector_, force_scale_vector_;
-  std::unique_ptr<_generic_SUNLinearSolver, SolverDeleter> linear_;
+  LinearSolver linear_;
   void* memory_ = nullptr;
   Equilibrium* equilibrium_ = nullptr;  ///< of the solve in progress
   double mass_ = 0;                     ///< m of the fixed-point map u + r/m [N/m]

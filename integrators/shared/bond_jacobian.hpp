@@ -1,8 +1,6 @@
 #pragma once
 /// Newton's method for bodies whose bonds weaken gradually, with the Jacobian of the degrading bonds.
 
-#include <sundials/sundials_linearsolver.h>
-
 #include <memory>
 #include <string_view>
 
@@ -18,11 +16,6 @@ void add_bond_jacobian_key(ParameterTable& table);
 /// Runs the load steps of `problem` with Newton's method on `equations`; with the Jacobian of the degrading bonds where `values`
 /// ask for it. Throws InputError where they do and no bond weakens gradually, or on several ranks.
 void run_newton(std::string_view integrator, const ParameterValues& values, Problem& problem, Observer& observer, LinearisedProblem& equations);
-
-struct KrylovDeleter {
-  void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
-};
-using KrylovSolver = std::unique_ptr<_generic_SUNLinearSolver, KrylovDeleter>;
 
 /// Where bonds weakened at an equilibrium they go on weakening, as the body gives way. With r the force that is out of balance and the
 /// Jacobian of Hashim et al., eqs. 50-54 (WeakeningBonds),
@@ -51,7 +44,7 @@ class BondJacobian final : public EquilibriumSolver {
   bool factorised_ = false;  ///< K, by the last solve
   Field u_, right_, du_;
   FieldVector right_vector_, solution_;
-  KrylovSolver gmres_;
+  LinearSolver gmres_;
   Equilibrium* equilibrium_ = nullptr;  ///< of the forecast in progress
 };
 
