@@ -57,6 +57,7 @@ double LatticeBonds<D>::share_of_volume(std::size_t p) const noexcept {
 
 template <int D>
 void LatticeBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
+  last_ = Last::other;
   for (const std::int32_t p : points) {
     const LatticeChunk& chunk = tiles_.chunks[static_cast<std::size_t>(tiles_.chunk_of(p))];
     if (selective_) volume_.component(volume_share)[p] = share_of_volume(static_cast<std::size_t>(p));

@@ -23,7 +23,7 @@ class PointFields {
   /// Forget what was computed: the state has changed.
   void renew() { cache_.clear(), samples_.reset(), acceleration_.reset(), reaction_.reset(); }
   const OutputField& get(const std::string& name);
-  /// The rows of these points of this rank alone, internal indices, in their order; nothing is done for others that a point needs not.
+  /// The rows of these points of this rank alone, internal indices, in their order.
   OutputField at(const std::string& name, std::span<const std::int32_t> points);
   /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
   void expect(std::span<const std::string> names);
