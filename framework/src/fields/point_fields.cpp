@@ -25,9 +25,10 @@ const std::vector<PointField>& point_fields() {
       {"cauchy", 9, true, Sampling::cauchy, "Cauchy stress", "Pa", [](From f) { return f.tensor(f.samples_->cauchy); }},
       {"von_mises", 1, true, Sampling::von_mises, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples_->von_mises); }},
       {"jacobian", 1, true, Sampling::H, "jacobian", "", [](From f) { return f.jacobian(); }},
-      {"damage", 1, false, Sampling::nothing, "damage", "", [](From f) { return f.scalar(f.problem_.terms().damage()); }},
+      {"damage", 1, false, Sampling::nothing, "damage", "",
+       [](From f) { return f.scalar(f.once("damage", [&] { return f.problem_.terms().damage(); })); }},
       {"shape_tensor_condition", 1, true, Sampling::nothing, "shape tensor condition", "",
-       [](From f) { return f.scalar(f.problem_.terms().shape_tensor_condition()); }},
+       [](From f) { return f.scalar(f.once("shape_tensor_condition", [&] { return f.problem_.terms().shape_tensor_condition(); })); }},
       {"material_id", 1, false, Sampling::nothing, "material id", "", [](From f) { return f.material_id(); }}};
   return all;
 }
@@ -120,13 +121,11 @@ OutputField PointFields::at(const std::string& name, std::span<const std::int32_
 }
 
 std::vector<double> PointFields::acceleration() {
-  if (!acceleration_) acceleration_ = dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field();
-  return vector(*acceleration_);
+  return vector(once("acceleration", [&] { return dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field(); }));
 }
 
 std::vector<double> PointFields::reaction() {
-  if (!reaction_) reaction_ = reactions(problem_, dynamic_, problem_.state().time);
-  return vector(*reaction_);
+  return vector(once("reaction", [&] { return reactions(problem_, dynamic_, problem_.state().time); }));
 }
 
 std::vector<double> PointFields::external_force() const {

@@ -21,18 +21,24 @@ class PointFields {
   static int column(const std::string& name, const std::string& component);
 
   /// Forget what was computed: the state has changed.
-  void renew() { cache_.clear(), samples_.reset(), acceleration_.reset(), reaction_.reset(); }
+  void renew() { cache_.clear(), made_.clear(), samples_.reset(); }
   const OutputField& get(const std::string& name);
   /// The rows of these points of this rank alone, internal indices, in their order.
   OutputField at(const std::string& name, std::span<const std::int32_t> points);
   /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
   void expect(std::span<const std::string> names);
   /// Frees its memory until it is asked for again.
-  void forget(const std::string& name) { cache_.erase(name); }
+  void forget(const std::string& name) { cache_.erase(name), made_.erase(name); }
 
  private:
   friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
 
+  /// The field of the whole body that rows of `name` are read from, made when it is asked for first.
+  template <class Make>
+  const Field& once(const std::string& name, Make&& make) {
+    const auto known = made_.find(name);
+    return known != made_.end() ? known->second : made_.emplace(name, make()).first->second;
+  }
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;
@@ -46,7 +52,7 @@ class PointFields {
   bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
-  std::optional<Field> acceleration_, reaction_;
+  std::map<std::string, Field> made_;    ///< by `once`
   std::span<const std::int32_t> rows_;   ///< the points that are computed for
 };
 
