@@ -25,6 +25,7 @@ class Verlet final : public Integrator {
   /// 0.9; half of the stable step where bonds may fail: what a crack takes per area is then within a few per cent of small steps.
   double safety(const Problem& problem) const;
   double stable_step(Problem& problem) const;
+  bool stays_stable(Problem& problem, double step) const;
   /// That of the beginning, estimated once for plan() and run(), which take it of the same displacement.
   double first_step(Problem& problem);
   /// Equal steps of at most `step` from `time` to the end. Throws InputError for more than can be counted.

@@ -479,7 +479,7 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
         }
 }
 
-TEST_CASE("kinematics: forces that are renewed near failed bonds are those of the whole body, bit for bit") {
+TEST_CASE("kinematics: forces and energies that are renewed near failed bonds are those of the whole body, bit for bit") {
   for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})
       for (const int d : {1, 2}) {
@@ -494,7 +494,9 @@ TEST_CASE("kinematics: forces that are renewed near failed bonds are those of th
         Noise random(23);
         set_field(body, u, [&](const Point&) { return Point{0.02 * random(), 0.02 * random()}; });
         Field force = problem.make_field(), whole = problem.make_field();
-        REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
+        double energy = 0, of_whole = 0;
+        REQUIRE(problem.evaluate_forces(u, force, &energy).ok());
+        const double before = energy;
         // One point at the middle of the body goes far from its neighbours.
         std::int32_t torn = body.internal().front();
         const auto off = [&](std::int32_t p) {
@@ -507,9 +509,25 @@ TEST_CASE("kinematics: forces that are renewed near failed bonds are those of th
         const BondUpdate update = problem.terms().update_bonds(u);
         CHECK(update.changed > 0);
         const std::vector<std::int32_t> moved{torn};
-        const EvaluationStatus renewed = problem.terms().renew_forces(u, moved, update.ends, force), anew = problem.evaluate_forces(u, whole, nullptr);
+        const EvaluationStatus renewed = problem.terms().renew_forces(u, moved, update.ends, force, &energy),
+                               anew = problem.evaluate_forces(u, whole, &of_whole);
         REQUIRE(renewed.ok() == anew.ok());
-        if (anew.ok()) CHECK(difference(body, force, whole) == 0);
+        if (!anew.ok()) continue;
+        CHECK(difference(body, force, whole) == 0);
+        CHECK(energy == of_whole);
+        CHECK(energy != before);
+        // And the tangent of the part around them.
+        const std::unique_ptr<DamagedPart> part = problem.damaged_part();
+        REQUIRE(part);
+        Field w = problem.make_field();
+        set_field(body, w, [&](const Point&) { return Point{random(), random()}; });
+        mask(part->inside(), w);
+        REQUIRE(part->tangent_action(u, w, force).ok());
+        REQUIRE(problem.tangent_action(u, w, whole).ok());
+        mask(part->inside(), force);
+        mask(part->inside(), whole);
+        CHECK(norm(whole) > 0);
+        CHECK(difference(body, force, whole) == 0);
       }
 }
 

@@ -62,6 +62,12 @@ class Foundation final : public Term {
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum* energy) override {
     return add_forces(u, force, energy);
   }
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum& energy) override {
+    return add_forces(u, force, &energy);
+  }
+  std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks&, const GroupMarks&, FieldView Kw) override {
+    return add_tangent(u, w, Kw);
+  }
   void add_bonds(ConstFieldView, const GroupMarks&, const GroupMarks&, BondSamples&) override {}
   void bonds_changed(std::span<const std::int32_t>) override {}
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }

@@ -10,6 +10,9 @@
 
 namespace perikit {
 
+/// One byte by group of eight points (internal index / 8): where something has to be evaluated.
+using GroupMarks = std::vector<std::uint8_t>;
+
 /// Units are any fixed grouping of points in which every block is one.
 struct BlockReach {
   std::size_t units = 0;

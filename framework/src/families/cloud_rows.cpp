@@ -6,6 +6,14 @@
 
 namespace perikit {
 
+void complete_pieces(GroupMarks& marks, std::size_t points) {
+  const std::size_t groups = points / padding;
+  for (std::size_t first = 0; first < marks.size(); first += groups) {
+    const std::span piece = std::span(marks).subspan(first, std::min(groups, marks.size() - first));
+    if (std::ranges::find(piece, 1) != piece.end()) std::ranges::fill(piece, std::uint8_t{1});
+  }
+}
+
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows) {
   rows.resize(points);
   parallel_for(cloud_blocks(points), [&](std::size_t b) {

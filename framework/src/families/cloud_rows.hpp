@@ -21,6 +21,9 @@ constexpr std::size_t cloud_blocks(std::size_t points) noexcept {
   return (points + cloud_block_points - 1) / cloud_block_points;
 }
 
+/// Marks all groups of the pieces of so many points that have a marked one.
+void complete_pieces(GroupMarks& marks, std::size_t points);
+
 /// rows[p] <- components of u at p, zero in the rest.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows);
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "families/family_arrays.hpp"
+#include "families/blocks.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
 #include "perikit/families/bonds.hpp"
@@ -18,9 +19,6 @@ class BondMonitor;
 class CloudFamilies;
 class LatticeFamilies;
 struct NearestFailure;
-
-/// One byte by group of eight points (internal index / 8): where something has to be evaluated.
-using GroupMarks = std::vector<std::uint8_t>;
 
 /// What is asked of families beyond their lists.
 struct FamilyNeeds {

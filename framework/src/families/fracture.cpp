@@ -173,7 +173,7 @@ bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force
   if (before.empty()) return true;
   std::vector<std::int32_t> ends;
   for (const BondChange& bond : before) ends.insert(ends.end(), {bond.bond.point, bond.bond.far});
-  const GroupMarks marks = dependent_on(ends);
+  const GroupMarks marks = dependent_on(ends, body);
   const bool known = std::isfinite(body.forces(u, marks, -1 / change, force));
   body.changed(families_.lower(after));
   const bool still = std::isfinite(body.forces(u, marks, 1 / change, force));
@@ -205,10 +205,13 @@ void Fracture::finish(BondUpdate& update) {
   if (held > 0) finder_->forget();
 }
 
-/// Groups that depend on the bonds of these points; on all ranks the same.
-GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends) const {
+/// Groups whose evaluation points depend on the bonds of these points; on all ranks the same.
+GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, const Body& body) const {
   GroupMarks marks(families_.body().stride() / padding, 0);
-  families_.mark(ends, marks);
+  if (body.owners_alone)
+    for (const std::int32_t p : ends) marks[static_cast<std::size_t>(p) / padding] = 1;
+  else
+    families_.mark(ends, marks);
   shared_.mark(marks);
   return marks;
 }
@@ -259,13 +262,7 @@ void Fracture::try_to_fail(std::vector<BondChange> changes, ConstFieldView at, c
     }
   };
   lower_all();
-  GroupMarks marks(families_.body().stride() / padding, 0);
-  if (body.owners_alone) {
-    for (const std::int32_t p : all) marks[static_cast<std::size_t>(p) / padding] = 1;
-    shared_.mark(marks);
-  } else {
-    marks = dependent_on(all);
-  }
+  const GroupMarks marks = dependent_on(all, body);
   const double after = body.energy(at, marks);
   std::vector<BondChange> tried(before.begin() + static_cast<std::ptrdiff_t>(known), before.end());
   before.resize(known);
@@ -339,7 +336,7 @@ void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double 
     }
     std::sort(ends.begin(), ends.end());
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    GroupMarks of_these = dependent_on(ends);
+    GroupMarks of_these = dependent_on(ends, body);
     const auto marked = [](std::uint8_t wanted, std::uint8_t have) { return !wanted || have; };
     if (on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
       settle();

@@ -27,9 +27,10 @@ class Fracture {
     /// force += factor times the forces of the evaluation points of the marked groups and of some others, the same ones whatever the
     /// bonds are; without data nothing is added. Their energy, over all ranks; not a number, and nothing is added, where a point is inadmissible.
     std::function<double(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
-    /// The energy alone, as `forces` has it. owners_alone: the marks are those of the groups of points whose bonds change, as
-    /// nothing else depends on them.
+    /// The energy alone, as `forces` has it.
     std::function<double(ConstFieldView u, const GroupMarks&)> energy;
+    /// Evaluation points depend on the bonds of the points that they belong to, and on no others: marks are those of the groups of
+    /// points whose bonds change; else of everything in their families, too.
     bool owners_alone = false;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
@@ -62,7 +63,7 @@ class Fracture {
   /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u; -1: they
   /// stay this time.
   std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
-  GroupMarks dependent_on(std::span<const std::int32_t> ends) const;
+  GroupMarks dependent_on(std::span<const std::int32_t> ends, const Body& body) const;
   GroupMarks widened(GroupMarks marks, std::span<const std::int32_t> ends) const;
   /// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there. With the
   /// second law, those without which the energy does not rise: what was found is tried together, then in halves, down to single

@@ -86,7 +86,7 @@ double weighted_energy(int n, const double* weight, const double* psi) noexcept 
 }  // namespace
 
 /// Of lanes first ..., with their weights.
-void BatchWork::add_energies(int n, const double* weight, const BatchScratch& s, int first, BlockEnergy* energy) const noexcept {
+void BatchWork::add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept {
   if (energy_) energy->stored += weighted_energy(n, weight, s.psi + first);
   if (dissipates()) energy->dissipated += weighted_energy(n, weight, s.dissipated + first);
 }
@@ -148,7 +148,7 @@ int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const 
   return -1;
 }
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, BlockEnergy* energy,
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, GroupEnergy* energy,
                     const LaminateLanes* laminates) const noexcept {
   const int d = dimension(laws_.space());
   const bool tangent = work_ == Work::tangent;
@@ -166,7 +166,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   return -1;
 }
 
-int BatchWork::selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* energy) const noexcept {
+int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   const bool tangent = work_ == Work::tangent;
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
@@ -242,7 +242,7 @@ void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
   }
 }
 
-int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept {
+int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept {
   if (finder_) {
     finder_->add(n, selective_ ? s.Ht : s.H, s);
     return -1;
@@ -258,7 +258,7 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* ene
   return evaluate_plain(n, s, both_ends, energy, &laminates);
 }
 
-int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy, const LaminateLanes* laminates) const noexcept {
+int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy, const LaminateLanes* laminates) const noexcept {
   const std::int32_t* owners = one_law(s) ? nullptr : s.owner;
   if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.

@@ -18,8 +18,8 @@ namespace perikit {
 
 enum class Work { force, tangent, sample };
 
-/// Of a block of evaluation points [J].
-struct BlockEnergy {
+/// Of the evaluation points of a group of eight points [J].
+struct GroupEnergy {
   double stored = 0;
   double dissipated = 0;   ///< in the step that the evaluation ends, by laws that say so
 };
@@ -150,7 +150,7 @@ class BatchWork {
   /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energies of the lanes to *energy. Returns the first bad lane or -1.
   /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
-  int evaluate(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy) const noexcept;
+  int evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
 
@@ -162,7 +162,7 @@ class BatchWork {
     const LaminatePoint* point[batch_points];
   };
 
-  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, BlockEnergy* energy,
+  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, GroupEnergy* energy,
            const LaminateLanes* laminates) const noexcept;
   void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
   void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;
@@ -170,11 +170,11 @@ class BatchWork {
   int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
   bool one_law(const BatchScratch& s) const noexcept { return laws_.single() || s.one_law >= 0; }
   bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
-  int evaluate_plain(int n, BatchScratch& s, bool both_ends, BlockEnergy* energy, const LaminateLanes* laminates) const noexcept;
-  void add_energies(int n, const double* weight, const BatchScratch& s, int first, BlockEnergy* energy) const noexcept;
+  int evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy, const LaminateLanes* laminates) const noexcept;
+  void add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
-  int selective_pass(int n, BatchScratch& s, int ends, BlockEnergy* energy) const noexcept;
+  int selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
@@ -198,7 +198,8 @@ struct Pass {
   ConstFieldView u, w;
   FieldView out;
   const SampleSums* sums = nullptr;
-  BlockEnergy* energies = nullptr;   ///< by block
+  /// By group of eight points: each has its own, or the first group of a block that of all of it (EvaluationSpace::complete).
+  GroupEnergy* energies = nullptr;
   std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
   /// By group of eight points: only the evaluation points that these own are wanted; point gradients are needed at

@@ -251,10 +251,11 @@ void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> en
     }
   }
   state().energies.external_work -= total_over_ranks(held);
-  if (energy_wanted_ || ghosts_ || images() || weak_springs_) {
-    status = evaluate_forces(u, state().internal_force(), energy_wanted_ ? &state().energies.strain : nullptr);
+  double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
+  if (ghosts_ || images() || weak_springs_) {
+    status = evaluate_forces(u, state().internal_force(), energy);
   } else {
-    status = terms().renew_forces(u, moved, ends, state().internal_force());
+    status = terms().renew_forces(u, moved, ends, state().internal_force(), energy);
     describe(status);
   }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);

@@ -9,7 +9,11 @@
 
 namespace perikit {
 
-double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
+namespace {
+
+/// action(w, Kw): Kw <- K w; false where u is inadmissible.
+template <class Action>
+double lanczos(Problem& problem, Action&& action, ConstFieldView scale, FieldView vector, bool warm) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
   Field last = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
@@ -31,7 +35,7 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
   double bound = 0;
   for (int k = 0; k < most; ++k) {
     for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
-    if (!problem.tangent_action(u, w, Kw).ok()) return 0.0;
+    if (!action(w, Kw)) return 0.0;
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
     alpha.push_back(dot(Kw, q));
     const double b = beta.empty() ? 0.0 : beta.back();
@@ -55,6 +59,19 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
   // The last Lanczos vector is rich in the top of the spectrum: a good start for the next call.
   if (q.data != vector.data) copy(q, vector);
   return bound;
+}
+
+}  // namespace
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
+  return lanczos(problem, [&](ConstFieldView w, FieldView Kw) { return problem.tangent_action(u, w, Kw).ok(); }, scale, vector, warm);
+}
+
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale) {
+  Field of_part = problem.make_field(), vector = problem.make_field();
+  copy(scale, of_part);
+  mask(part.inside(), of_part);
+  return lanczos(problem, [&](ConstFieldView w, FieldView Kw) { return part.tangent_action(u, w, Kw).ok(); }, of_part, vector, false);
 }
 
 }  // namespace perikit

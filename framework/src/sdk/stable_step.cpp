@@ -12,17 +12,29 @@
 
 namespace perikit {
 
-double largest_eigenvalue(Problem& problem, ConstFieldView u) {
+namespace {
+
+/// The diagonal of M^-1/2, restricted to the free components.
+Field root_of_masses(Problem& problem) {
   const std::span<const double> masses = problem.masses().by_point();
   const ConstFieldView free = problem.constraints().free();
-  // M^-1/2 K M^-1/2 restricted to the free components.
   Field scale = problem.make_field();
   for (std::size_t k = 0; k < free.size(); ++k) {
     const double m = masses[k % free.stride];
     scale.data()[k] = m > 0 ? free.data[k] / std::sqrt(m) : 0.0;
   }
+  return scale;
+}
+
+}  // namespace
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u) {
   const FieldView eigenvector = problem.state().declare("eigenvector");
-  return largest_eigenvalue(problem, u, scale, eigenvector, norm(eigenvector) > 0);
+  return largest_eigenvalue(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0);
+}
+
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u) {
+  return largest_eigenvalue(problem, part, u, root_of_masses(problem));
 }
 
 void allow_unstable_parameter(ParameterTable& table) {

@@ -139,7 +139,7 @@ void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, B
 }
 
 template <int D>
-int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const bool tangent = pass.work.tangent(), both_ends = pairs_ && !pass.alone();
   double* const H = selective_ ? s.Ht : s.H;
   double* const dH = selective_ ? s.dHt : s.dH;
@@ -263,11 +263,10 @@ void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
 template <int D>
 void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
-  BlockEnergy energy;
   for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+    GroupEnergy unwanted, &energy = pass.energies ? pass.energies[p / padding] : unwanted;
     if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0) return pass.report(static_cast<std::int64_t>(p));
   }
-  if (pass.energies) pass.energies[b] = energy;
 }
 
 template <int D>

@@ -15,8 +15,6 @@ class CloudBonds final : public EvaluationSpace {
   explicit CloudBonds(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
-  bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override { return families_.lists().neighbour.size(); }
@@ -25,9 +23,10 @@ class CloudBonds final : public EvaluationSpace {
   void report(ModelReport& report) const override;
 
  private:
+  std::size_t blocks() const noexcept { return cloud_blocks(points_); }
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
-  int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   void read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
   void gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du, double* A) const noexcept;
   void scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept;

@@ -27,7 +27,6 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points] = h[e][c];
   };
-  BlockEnergy energy;
   for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
@@ -49,8 +48,10 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       s.owner[l] = static_cast<std::int32_t>(p);
     }
     s.first_number = static_cast<std::int64_t>(first);
+    GroupEnergy energy;
     const int bad = pass.work.evaluate(n, s, false, &energy);
     if (bad >= 0) return pass.report(static_cast<std::int64_t>(first) + bad);
+    if (pass.energies) pass.energies[first / padding] = energy;
     for (int l = 0; l < lanes; l += static_cast<int>(padding))
       pass.work.screen(static_cast<std::int64_t>(first) + l, l, static_cast<int>(padding), s);
     if (pass.work.work() == Work::sample) {
@@ -69,7 +70,6 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       if (gradient_.shifted()) std::copy_n(S, D, &stress_[D * p]);
     }
   }
-  if (pass.energies) pass.energies[b] = energy;
 }
 
 template <int D>

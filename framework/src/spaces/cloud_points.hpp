@@ -12,14 +12,14 @@ class CloudPoints final : public EvaluationSpace {
   explicit CloudPoints(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
-  bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
+  void complete(GroupMarks& marks) const override { complete_pieces(marks, batch_points); }
   std::size_t numbers() const noexcept override { return padded(points_); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
 
  private:
+  std::size_t blocks() const noexcept { return cloud_blocks(points_); }
   void block(std::size_t b, Pass& pass);
 
   const CloudFamilies& families_;

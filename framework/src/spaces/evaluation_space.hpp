@@ -24,9 +24,8 @@ class EvaluationSpace {
   virtual ~EvaluationSpace() = default;
   /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone.
   virtual void run(Pass& pass) = 0;
-  virtual std::size_t blocks() const noexcept = 0;
-  /// Whether the points of block b are this rank's.
-  virtual bool owns(std::size_t b) const noexcept = 0;
+  /// Marks the groups whose energies a run sums up together with those of marked ones (Pass::energies).
+  virtual void complete(GroupMarks&) const {}
   /// The numbers of evaluation points lie below this.
   virtual std::size_t numbers() const noexcept = 0;
   /// What follows from the bonds of these points is to be made anew.

@@ -157,7 +157,7 @@ void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, boo
 }
 
 template <int D>
-int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const LatticeChunk& chunk = tiles_.chunks[index];
   const LatticePattern& pattern = families_.pattern(chunk);
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.alone(), sampled_pairs = samples_pairs(pass);
@@ -235,18 +235,18 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
   const std::size_t slots = (pairs_ && !pass.alone()) || samples_pairs(pass) ? families_.slots.half : families_.slots.size();
-  BlockEnergy energy;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
     if (!pass.wanted(chunk.first) || !roles_.wants(c, &ChunkRole::bonds)) continue;
+    GroupEnergy energy;
     s.one_law = roles_.chunk.empty() || pass.work.laminates_near(chunk.first) ? ChunkRole::mixed : roles_.chunk[c].law;
     for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
       const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
       const int bad = bonds_of_chunk(c, slot, n, s, pass, &energy);
       if (bad >= 0) return pass.report(chunk.first + bad % chunk_points);
     }
+    if (pass.energies) pass.energies[chunk.first / chunk_points] = energy;
   }
-  if (pass.energies) pass.energies[b] = energy;
 }
 
 /// What is left to do with the stress on Hbar once all bonds are in.

@@ -20,17 +20,16 @@ class LatticeBonds final : public EvaluationSpace {
   explicit LatticeBonds(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  std::size_t blocks() const noexcept override { return tiles_.blocks.size(); }
-  bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   PointFlux point_flux() const noexcept override { return last_ == Last::other || stencils_ ? PointFlux() : PointFlux{gradient_, flux_, last_ == Last::all_forces}; }
   void report(ModelReport& report) const override;
 
  private:
+  std::size_t blocks() const noexcept { return tiles_.blocks.size(); }
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
-  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   void number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();

@@ -25,7 +25,7 @@ LatticePoints<D>::LatticePoints(const SpaceParts& parts)
 
 /// The law of n chunks, whose gradients are in the lanes of s. Whether all of them are admissible.
 template <int D>
-bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, BlockEnergy* energy) const {
+bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, GroupEnergy* energy) const {
   for (int i = 0; i < n; ++i) {
     const int lane = i * chunk_points;
     std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
@@ -51,7 +51,7 @@ template <int D>
 void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
-  BlockEnergy energy;
+  GroupEnergy energy;
   std::int32_t index[chunks_at_once];
   int n = 0;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
@@ -71,7 +71,7 @@ void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
     }
     n = 0;
   }
-  if (pass.energies) pass.energies[b] = energy;
+  if (pass.energies) pass.energies[tiles_.first_group(b)] = energy;
 }
 
 /// Cells of a row in the memory of Q: with a gap before it and after it, zero, or Q of the chunks that families reach there.
@@ -132,7 +132,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
   Rows& r = rows_[static_cast<std::size_t>(thread_index())];
-  BlockEnergy energy, of_others;
+  GroupEnergy energy, of_others;
   std::size_t next = block.chunk_begin;
   for (std::size_t first = block.row_begin; first < block.row_end;) {
     const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
@@ -161,7 +161,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
     }
   }
   s.keep_history = true;
-  if (pass.energies) pass.energies[b] = energy;
+  if (pass.energies) pass.energies[tiles_.first_group(b)] = energy;
 }
 
 template <int D>

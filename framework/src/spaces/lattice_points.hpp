@@ -15,13 +15,13 @@ class LatticePoints final : public EvaluationSpace {
   explicit LatticePoints(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  std::size_t blocks() const noexcept override { return tiles_.blocks.size(); }
-  bool owns(std::size_t b) const noexcept override { return tiles_.owns(b); }
+  void complete(GroupMarks& marks) const override { tiles_.complete(marks); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
   void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed
   void report(ModelReport& report) const override;
 
  private:
+  std::size_t blocks() const noexcept { return tiles_.blocks.size(); }
   /// Memory of a thread for a few rows of a block.
   struct Rows {
     Field flux;                        ///< Q
@@ -31,7 +31,7 @@ class LatticePoints final : public EvaluationSpace {
   };
   void one_by_one(std::size_t b, Pass& pass);
   void by_rows(std::size_t b, Pass& pass);
-  bool evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, BlockEnergy* energy) const;
+  bool evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, GroupEnergy* energy) const;
   void place(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, Rows& r) const;
   void gradients(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept;
   std::int64_t width(const LatticeRow& row) const noexcept;

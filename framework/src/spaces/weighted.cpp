@@ -70,7 +70,7 @@ std::uint8_t Weighted<D>::lanes(const Group& g, const Pass& pass) const noexcept
 }
 
 template <int D>
-std::int32_t Weighted<D>::single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+std::int32_t Weighted<D>::single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const std::int32_t p = members_[groups_[g].first];
   if (lattice_) {
     load_class(groups_[g].family, m);
@@ -98,7 +98,7 @@ void Weighted<D>::find_numbers(std::int32_t p, const Group& g, Memory& m) const 
 }
 
 template <int D>
-std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const Place& place = place_[static_cast<std::size_t>(p)];
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
@@ -110,7 +110,7 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
 }
 
 template <int D>
-std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
   const std::size_t size = m.family.size;
   load_differences(p, u_rows_, m, m.u);
@@ -175,7 +175,7 @@ void Weighted<D>::scatter_rows(std::int32_t p, Memory& m) {
 }
 
 template <int D>
-std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const Group& g = groups_[group];
   const std::int64_t number = number_of(group);
   const MirroredStencil<D>& stencil = stencils_[static_cast<std::size_t>(g.stencil)];
@@ -237,7 +237,7 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
 }
 
 template <int D>
-std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy) {
+std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const Group& g = groups_[group];
   const std::int64_t number = number_of(group);
   const SparseStencils<D>& stencils = sparse_[b];
@@ -295,7 +295,7 @@ template <int D>
 void Weighted<D>::block(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
   Memory& m = *memory_[static_cast<std::size_t>(thread_index())];
-  BlockEnergy energy;
+  GroupEnergy energy;
   for (std::size_t g = block_first_[b]; g < block_first_[b + 1]; ++g) {
     const Group& group = groups_[g];
     if (lanes(group, pass) == 0) continue;
@@ -309,7 +309,7 @@ void Weighted<D>::block(std::size_t b, Pass& pass) {
     if (!pass.wanted(p)) continue;
     if (left(p, m, s, pass, &energy) >= 0) return pass.report(p);
   }
-  if (pass.energies) pass.energies[b] = energy;
+  if (pass.energies) pass.energies[first_group(b)] = energy;
 }
 
 template <int D>

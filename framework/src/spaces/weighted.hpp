@@ -26,8 +26,10 @@ class Weighted final : public EvaluationSpace {
   explicit Weighted(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  std::size_t blocks() const noexcept override { return block_first_.size() - 1; }
-  bool owns(std::size_t b) const noexcept override { return lattice_ ? lattice_->tiles.owns(b) : body_.owns(b * cloud_block); }
+  void complete(GroupMarks& marks) const override {
+    if (lattice_) lattice_->tiles.complete(marks);
+    else complete_pieces(marks, cloud_block);
+  }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override {
@@ -38,6 +40,9 @@ class Weighted final : public EvaluationSpace {
   void report(ModelReport& report) const override;
 
  private:
+  std::size_t blocks() const noexcept { return block_first_.size() - 1; }
+  /// Where a run puts the energy of block b.
+  std::size_t first_group(std::size_t b) const noexcept { return lattice_ ? lattice_->tiles.first_group(b) : b * cloud_block / padding; }
   static constexpr std::size_t cloud_block = 64;
   static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;  ///< cap for stored stencils
   /// Fewer points with an evaluation point at every bond are faster one by one.
@@ -88,12 +93,12 @@ class Weighted final : public EvaluationSpace {
   // Evaluation (weighted.cpp).
   void block(std::size_t b, Pass& pass);
   /// Evaluate a group; -1, or an inadmissible one of its points.
-  std::int32_t single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
-  std::int32_t together(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
-  std::int32_t side_by_side(std::size_t g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
-  std::int32_t left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  std::int32_t single(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
+  std::int32_t together(std::size_t g, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
+  std::int32_t side_by_side(std::size_t g, std::size_t b, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
+  std::int32_t left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   /// A point with the family in m; `number` is that of its first evaluation point.
-  std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, BlockEnergy* energy);
+  std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
   /// Of evaluation point k of a point of a cloud, where they belong to bonds.
   std::size_t factor_of(std::int32_t p, int k) const noexcept {

@@ -25,7 +25,6 @@ class CloudPairs final : public PairLoop {
     return &nearest_;
   }
   std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
-  bool owns(std::size_t b) const noexcept override { return families_.body().owns(b * cloud_block_points); }
   std::size_t bytes() const noexcept override {
     return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
@@ -271,14 +270,12 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
 template <int D>
 template <PairWork work>
 void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
-  double energy = 0;
   for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
     if (pass.only && !pass.only[p / padding]) continue;
-    if (run_point<work>(p, pass, energy)) continue;
-    report_bad(static_cast<std::int64_t>(p));
-    return;
+    double energy = 0;
+    if (!run_point<work>(p, pass, energy)) return report_bad(static_cast<std::int64_t>(p));
+    if (pass.energies) pass.energies[p / padding] += energy;
   }
-  if (pass.energies) pass.energies[b] = energy;
 }
 
 template <int D>

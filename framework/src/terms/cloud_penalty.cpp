@@ -31,9 +31,9 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
+  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
     mirror_rows(u, points_, u_);
-    std::vector<double> energies(energy ? cloud_blocks(points_) : 0, 0.0);
+    if (energies) energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
     const auto wanted = [&](std::size_t p) { return !only || only[p / padding]; };
@@ -41,7 +41,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
                 [&](std::size_t p) {
                   if (!wanted(p)) return;
                   gradient_.at(p, u_, &flux_[D * p]);
-                  if (energy) energies[p / cloud_block_points] += energy_of_point(p, &flux_[D * p]);
+                  if (energies) (*energies)[p / padding] += energy_of_point(p, &flux_[D * p]);
                   for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
                 });
     over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
@@ -50,8 +50,6 @@ class CloudPenalty final : public ZeroEnergyPenalty {
                   const Row f = factor * position_[p][3] * force_of_point(p);
                   for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
                 });
-    for (std::size_t b = 0; b < energies.size(); ++b)
-      if (families_.body().owns(b * cloud_block_points)) energy->add(energies[b]);
   }
 
   void add_density(ConstFieldView u, double* density) override {

@@ -41,7 +41,6 @@ class LatticePairs final : public PairLoop {
   }
 
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
-  bool owns(std::size_t b) const noexcept override { return families_.tiles.owns(b); }
   std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
 
   std::int64_t run(const PairPass& pass) override {
@@ -56,19 +55,17 @@ class LatticePairs final : public PairLoop {
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass) {
     const LatticeBlock& block = families_.tiles.blocks[b];
-    double energy = 0;
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
       const LatticeChunk& chunk = families_.tiles.chunks[c];
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
         for (int k = 0; k < pass.out.components && !pass.local; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
       }
+      double energy = 0;
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
-      if (lane < 0) continue;
-      report_bad(chunk.first + lane);
-      return;
+      if (lane >= 0) return report_bad(chunk.first + lane);
+      if (pass.energies) pass.energies[chunk.first / chunk_points] += energy;
     }
-    if (pass.energies) pass.energies[b] = energy;
   }
 
   /// Returns the first lane with a bond of zero or non-finite length, or -1.

@@ -34,18 +34,18 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
-    std::vector<double> energies(energy ? families_.tiles.blocks.size() : 0, 0.0);
+  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
+    if (energies) energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       if (!quiet_.begins(b)) return;
       for_gradients(b, u, only, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
         own_forces(chunk, u, factor, H, sums, force);
-        if (!energy) return;
+        if (!energies) return;
         double of_points[chunk_points];
         energies_of_points(chunk, u, H, of_points);
-        for (const double e : of_points) energies[b] += e;
+        for (const double e : of_points) (*energies)[static_cast<std::size_t>(chunk.first / chunk_points)] += e;
       });
     });
     families_.tiles.colouring.for_each([&](std::size_t b) {
@@ -58,7 +58,6 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       });
     });
     families_.tiles.clear_dead(force);
-    if (energy) add_owned(energies, *energy);
   }
 
   void add_density(ConstFieldView u, double* density) override {
@@ -89,10 +88,6 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   std::size_t bytes() const noexcept override { return M_.bytes() + B_.bytes() + flux_.bytes() + source_.bytes(); }
 
  private:
-  void add_owned(const std::vector<double>& energies, ExactSum& sum) const {
-    for (std::size_t b = 0; b < energies.size(); ++b)
-      if (families_.tiles.owns(b)) sum.add(energies[b]);
-  }
   template <class Body>
   void for_chunks(std::size_t b, Body&& body) const {
     for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; ++c)

@@ -135,29 +135,28 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
   }
 }
 
-/// Each block is one rank's.
-void Mechanics::add_owned(const std::vector<BlockEnergy>& energies, double BlockEnergy::* which, ExactSum& sum) const {
-  for (std::size_t b = 0; b < energies.size(); ++b)
-    if (space_->owns(b)) sum.add(energies[b].*which);
+void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const {
+  perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
 }
 
 std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
   const bool dissipates = work.dissipates(), wanted = energy || dissipates;
-  std::vector<BlockEnergy> energies(wanted ? space_->blocks() : 0);
-  Pass pass{work, u, {}, force, nullptr, wanted ? energies.data() : nullptr, -1, {}};
+  if (wanted) energies_ = no_energies();
+  Pass pass{work, u, {}, force, nullptr, wanted ? energies_.data() : nullptr, -1, {}};
   space_->run(pass);
-  if (energy) add_owned(energies, &BlockEnergy::stored, *energy);
+  if (energy) add_owned(energies_, &GroupEnergy::stored, *energy);
   if (dissipates) {
     dissipated_ = {};
-    add_owned(energies, &BlockEnergy::dissipated, dissipated_);
+    add_owned(energies_, &GroupEnergy::dissipated, dissipated_);
   }
   return pass.bad;
 }
 
-std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+/// only, near: null: all.
+std::int64_t Mechanics::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near) {
   const BatchWork work = this->work(Work::tangent, false);
-  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}};
+  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}, only, near};
   space_->run(pass);
   return pass.bad;
 }
@@ -165,10 +164,22 @@ std::int64_t Mechanics::add_tangent(ConstFieldView u, ConstFieldView w, FieldVie
 std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                       ExactSum* energy) {
   const BatchWork work = this->work(Work::force, energy != nullptr);
-  std::vector<BlockEnergy> energies(energy ? space_->blocks() : 0);
+  std::vector<GroupEnergy> energies;
+  if (energy) energies = no_energies();
   Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}, only.data(), near.data()};
   space_->run(pass);
-  if (energy) add_owned(energies, &BlockEnergy::stored, *energy);
+  if (energy) add_owned(energies, &GroupEnergy::stored, *energy);
+  return pass.bad;
+}
+
+std::int64_t Mechanics::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                     ExactSum& energy) {
+  const BatchWork work = this->work(Work::force, true);
+  std::vector<GroupEnergy> renewed = no_energies();
+  Pass pass{work, u, {}, force, nullptr, renewed.data(), -1, {}, only.data(), near.data()};
+  space_->run(pass);
+  replace(only, renewed, energies_);
+  add_owned(energies_, &GroupEnergy::stored, energy);
   return pass.bad;
 }
 

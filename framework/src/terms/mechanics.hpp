@@ -14,12 +14,19 @@ class Mechanics final : public Term {
   explicit Mechanics(const SpaceParts& parts);
 
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return tangent_of(u, w, Kw, nullptr, nullptr); }
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                              ExactSum* energy) override;
+  void complete(GroupMarks& marks) const override { space_->complete(marks); }
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                            ExactSum& energy) override;
+  std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
+                              FieldView Kw) override {
+    return tangent_of(u, w, Kw, only.data(), near.data());
+  }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
@@ -41,17 +48,22 @@ class Mechanics final : public Term {
   std::unique_ptr<VolumetricRows> make_volumetric_rows() const;
 
  private:
+  std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
   void find_laminates(GroupMarks marks, bool again);
   std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near);
-  void add_owned(const std::vector<BlockEnergy>& energies, double BlockEnergy::* which, ExactSum& sum) const;
+  /// Room for the energies of all groups, zero.
+  std::vector<GroupEnergy> no_energies() const { return std::vector<GroupEnergy>(parts_.families.body().stride() / padding); }
+  /// Of what this rank owns.
+  void add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<LawHistory> history_;
   std::unique_ptr<Laminates> laminates_;
   BondScreen* screen_ = nullptr;
+  std::vector<GroupEnergy> energies_;  ///< of the last forces with an energy
   ExactSum dissipated_;
   std::shared_ptr<const CloudConsistency> consistency_;
 };

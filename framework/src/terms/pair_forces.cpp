@@ -127,24 +127,35 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
-                                          ExactSum* energy) {
+std::int64_t PairForces<D>::forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                      std::vector<double>* energies) {
+  if (energies) energies->assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
     // At the rim of `near` dilatations are not complete, and not the same on several ranks.
-    const std::int64_t bad = dilatation(u, {}, energy, nullptr, near.data(), true, only.data());
+    const std::int64_t bad = dilatation(u, {}, energies ? energies->data() : nullptr, nullptr, near.data(), true);
     if (bad >= 0) return bad;
+    for (std::size_t g = 0; g < only.size() && energies; ++g)
+      if (!only[g]) (*energies)[g] = 0;
   }
-  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
-  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr, only.data(), true};
-  return run(pass, bonds, energy);
+  return loop_->run({PairWork::force, u, {}, q_, {}, force, energies ? energies->data() : nullptr, only.data(), true});
 }
 
-/// The loop, and the energies of its blocks.
 template <int D>
-std::int64_t PairForces<D>::run(const PairPass& pass, const std::vector<double>& energies, ExactSum* energy) {
-  const std::int64_t bad = loop_->run(pass);
-  for (std::size_t b = 0; b < energies.size(); ++b)
-    if (loop_->owns(b)) energy->add(energies[b]);
+std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                          ExactSum* energy) {
+  std::vector<double> energies;
+  const std::int64_t bad = forces_of(u, only, near, force, energy ? &energies : nullptr);
+  if (energy) add_owned(body_, energies, *energy);
+  return bad;
+}
+
+template <int D>
+std::int64_t PairForces<D>::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                         ExactSum& energy) {
+  std::vector<double> renewed;
+  const std::int64_t bad = forces_of(u, only, near, force, &renewed);
+  replace(only, renewed, energies_);
+  add_owned(body_, energies_, energy);
   return bad;
 }
 
@@ -224,19 +235,18 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                                       const std::uint8_t* only, bool local, const std::uint8_t* counted) {
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
+                                       const std::uint8_t* only, bool local) {
   const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local});
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
   if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
   if (rates) {
     if (rate_.size() == 0) rate_ = body_.make_field(1);
-    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr});
+    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr, only, local});
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
-  std::vector<ExactSum> energies(energy ? static_cast<std::size_t>(thread_count()) : 0);
   parallel_for(batches, [&](std::size_t b) {
     const std::size_t first = b * batch_points;
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
@@ -245,41 +255,42 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, Exact
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
     formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
-                                       energy || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+                                       energies || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energy && body_.alive(p) && body_.owns(p) && (!counted || counted[p / padding]))
-        energies[static_cast<std::size_t>(thread_index())].add(body_.volume(p) * phi[l]);
+      if (energies && body_.alive(p)) energies[p / padding] += body_.volume(p) * phi[l];
     }
   });
-  for (const ExactSum& of_thread : energies) energy->add(of_thread);
   return -1;
 }
 
 template <int D>
 std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
-  std::vector<double> bonds(energy ? loop_->blocks() : 0, 0.0);
+  if (energy) energies_.assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy, nullptr);
+    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr);
     if (bad >= 0) return bad;
   }
-  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? bonds.data() : nullptr};
+  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
   pass.screen = screen_;
   if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
-  return run(pass, bonds, energy);
+  const std::int64_t bad = loop_->run(pass);
+  if (energy) add_owned(body_, energies_, *energy);
+  return bad;
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+std::int64_t PairForces<D>::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only,
+                                       const std::uint8_t* near) {
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, w, nullptr, nullptr);
+    const std::int64_t bad = dilatation(u, w, nullptr, nullptr, near, near != nullptr);
     if (bad >= 0) return bad;
   }
-  return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr});
+  return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr, only, only != nullptr});
 }
 
 template <int D>

@@ -23,13 +23,19 @@ class PairForces final : public Term {
   explicit PairForces(const PairParts& parts);
 
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return tangent_of(u, w, Kw, nullptr, nullptr); }
   /// strain_energy_density, and P where it is asked for.
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override { return formulation_.dilatation ? 2 : 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                              ExactSum* energy) override;
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                            ExactSum& energy) override;
+  std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
+                              FieldView Kw) override {
+    return tangent_of(u, w, Kw, only.data(), near.data());
+  }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage& damage) override;
@@ -44,7 +50,9 @@ class PairForces final : public Term {
     AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
     AlignedVector<double> energy, force;
   };
-  std::int64_t run(const PairPass& pass, const std::vector<double>& energies, ExactSum* energy);
+  std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
+  /// energies: those of the groups in `only` [J]; null: not wanted.
+  std::int64_t forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, std::vector<double>* energies);
   void load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const;
   /// P_i = sum_j b V_j (w'/2 + omega |xi| q_i) n (x) xi: the derivative of the energy density of a point by a homogeneous deformation.
   void add_virial(ConstFieldView u, FieldView P) const;
@@ -54,11 +62,10 @@ class PairForces final : public Term {
   void set_sides();
   void renew_sides();
   PairPoint point(std::size_t p) const;
-  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; V phi by block -> energies; phi by point ->
-  /// density. only, local: see PairPass; null for all. counted: groups whose
-  /// energies count.
-  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, ExactSum* energy, double* density,
-                          const std::uint8_t* only = nullptr, bool local = false, const std::uint8_t* counted = nullptr);
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; energies += V phi by group of eight points; phi by point ->
+  /// density. only, local: see PairPass; null for all.
+  std::int64_t dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
+                          const std::uint8_t* only = nullptr, bool local = false);
 
   const Families& families_;
   const Body& body_;
@@ -75,6 +82,7 @@ class PairForces final : public Term {
   Field by_theta_;  ///< phi/theta d/m, where bonds are screened
   BondScreen* screen_ = nullptr;
   Field density_;  ///< work field
+  std::vector<double> energies_;  ///< by group of eight points, of the last forces with an energy
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;
 };

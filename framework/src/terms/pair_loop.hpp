@@ -28,7 +28,7 @@ struct PairPass {
   ConstFieldView u, w;
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
-  double* energies = nullptr;          ///< by block
+  double* energies = nullptr;          ///< += by group of eight points
   /// By group of eight points: others are left alone (dilatation); where `local`, the bonds alone that these own, each
   /// once: as in a whole loop on points whose families lie in `only`, anything elsewhere (dilatation and force).
   const std::uint8_t* only = nullptr;
@@ -100,8 +100,6 @@ class PairLoop {
   /// Bonds may fail from now on: forces leave behind how far the bonds of each point are from failing. Null: they do not.
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
-  /// Whether the points of block b are this rank's.
-  virtual bool owns(std::size_t b) const noexcept = 0;
   /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of
   /// zero or non-finite length, or -1.
   virtual std::int64_t run(const PairPass& pass) = 0;

@@ -34,10 +34,10 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only) override {
+  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
     read(u);
     force_.assign(rows_.size(), Row{});
-    std::vector<double> energies(energy ? rows_.size() : 0, 0.0);
+    if (energies) energies->assign(rows_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(1, [&](std::size_t b) {
       bool any = false;
@@ -50,13 +50,11 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       over_rows(b, [&](std::size_t r) {
         if (only && !only[rows_.point(r) / padding]) return;
         const double twice = pull(r, factor, t);
-        if (energy) energies[r] = 0.5 * twice;
+        if (energies) (*energies)[rows_.point(r) / padding] += 0.5 * twice;
       });
     });
     for (std::size_t r = 0; r < rows_.size(); ++r)
       for (int c = 0; c < D; ++c) force.component(c)[rows_.point(r)] += force_[r][c];
-    for (std::size_t r = 0; r < energies.size(); ++r)
-      if (rows_.body().owns(rows_.point(r))) energy->add(energies[r]);
   }
 
   void add_density(ConstFieldView u, double* density) override {

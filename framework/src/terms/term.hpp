@@ -38,6 +38,15 @@ class Term {
   /// *energy += their E, of what this rank owns [J], where wanted.
   virtual std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                      ExactSum* energy) = 0;
+  /// Marks the groups whose energies are summed up together with those of marked ones.
+  virtual void complete(GroupMarks&) const {}
+  /// As add_forces_of, of groups that are complete. Their energies take the place of those that the last add_forces with an energy left,
+  /// or the last of these calls; energy += E of all groups, bit for bit as add_forces has it.
+  virtual std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                    ExactSum& energy) = 0;
+  /// Kw += -d(force)/du w of the evaluation points that add_forces_of takes, with the same promise.
+  virtual std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
+                                      FieldView Kw) = 0;
   /// What the evaluation points of the points of the marked groups hold; point gradients are needed in the groups of `near`.
   virtual void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) = 0;
   /// What follows from the bonds of these points is to be computed anew.
@@ -55,5 +64,25 @@ class Term {
   virtual void report(ModelReport& report) const = 0;
   virtual QuietCounts quiet_counts() const noexcept = 0;
 };
+
+/// What a term sums up by group of eight points [J], of which each is one rank's.
+template <class Energy, class Value>
+void add_owned(const Body& body, const std::vector<Energy>& energies, Value&& value, ExactSum& sum) {
+  for (std::size_t g = 0; g < energies.size(); ++g)
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body.alive(p)) continue;
+      if (body.owns(p)) sum.add(value(energies[g]));
+      break;
+    }
+}
+inline void add_owned(const Body& body, const std::vector<double>& energies, ExactSum& sum) {
+  add_owned(body, energies, [](double energy) { return energy; }, sum);
+}
+/// kept[g] <- renewed[g] for the groups in `only`.
+template <class Energy>
+void replace(const GroupMarks& only, const std::vector<Energy>& renewed, std::vector<Energy>& kept) {
+  for (std::size_t g = 0; g < kept.size(); ++g)
+    if (only[g]) kept[g] = renewed[g];
+}
 
 }  // namespace perikit

@@ -11,6 +11,7 @@
 #include "body/interfaces.hpp"
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
+#include "families/shared_bonds.hpp"
 #include "families/vicinity.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -162,8 +163,8 @@ EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy
 }
 
 EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
-                                     FieldView force) {
-  if (!failing_ || !parts_.skip || history()) return forces(u, force, nullptr);
+                                     FieldView force, double* energy) {
+  if (!failing_ || !parts_.skip || history()) return forces(u, force, energy);
   const Body& body = parts_.families->body();
   int steps = 1;
   for (const auto& term : terms_) steps = std::max(steps, term->steps());
@@ -176,15 +177,20 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
   for (const std::int32_t p : body.internal())
     if (vicinity->holds(static_cast<std::size_t>(p))) renewed.push_back(p);
   vicinity->grow(std::max(1, steps - 1));
-  const GroupMarks only = vicinity->groups();
+  GroupMarks only = vicinity->groups();
+  for (const auto& term : terms_)
+    if (energy) term->complete(only);
   for (const std::int32_t p : body.internal())
     if (only[static_cast<std::size_t>(p) / padding]) evaluated.push_back(p);
-  if (2 * evaluated.size() > body.points()) return forces(u, force, nullptr);
+  if (2 * evaluated.size() > body.points()) return forces(u, force, energy);
   vicinity->add(evaluated, 1);
   const GroupMarks near = vicinity->groups();
   const FieldView own = failing_->cleared(force, body);
+  ExactSum sum;
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_forces_of(u, only, near, own, nullptr);
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
+    bad = energy ? (*term)->renew_forces(u, only, near, own, sum) : (*term)->add_forces_of(u, only, near, own, nullptr);
+  if (energy) *energy = total_over_ranks(sum);
   for (int c = 0; c < force.components; ++c)
     for (const std::int32_t p : renewed) force.component(c)[p] = own.component(c)[p];
   return status(bad);
@@ -194,6 +200,39 @@ EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw
   clear(Kw.data, Kw.size());
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_tangent(u, w, Kw);
+  return status(bad);
+}
+
+GroupRings Terms::near_failed_bonds() const {
+  const Families& families = *parts_.families;
+  const Body& body = families.body();
+  const SharedBonds shared(body);
+  GroupRings groups;
+  groups.inside.assign(body.stride() / padding, 0);
+  bool any = false;
+  for (const std::int32_t p : body.owned())
+    if (families.lost_bonds(static_cast<std::size_t>(p))) any = groups.inside[static_cast<std::size_t>(p) / padding] = 1;
+  if (communicator().largest(any ? 1 : 0) == 0) return {};
+  shared.mark(groups.inside);
+  const auto around = [&](const GroupMarks& marks) {
+    GroupMarks wider = families.around(marks);
+    shared.mark(wider);
+    return wider;
+  };
+  groups.inside = around(groups.inside);
+  groups.only = groups.inside;
+  int steps = 2;
+  for (const auto& term : terms_) steps = std::max(steps, term->steps());
+  for (int k = 1; k < steps; ++k) groups.only = around(groups.only);
+  groups.near = families.around(groups.only);
+  return groups;
+}
+
+EvaluationStatus Terms::tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw) {
+  clear(Kw.data, Kw.size());
+  std::int64_t bad = -1;
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
+    bad = (*term)->add_tangent_of(u, w, groups.only, groups.near, Kw);
   return status(bad);
 }
 
@@ -291,30 +330,28 @@ BondUpdate Terms::weaken_bonds(ConstFieldView u, ConstFieldView forecast) { retu
 /// What those who change bonds need of the terms. As long as it lives, before and after bonds fail, the same groups are asked for.
 Fracture::Body Terms::Failing::body(Terms& terms) {
   const Families& families = *terms.parts_.families;
-  const auto forces = [this, &terms, &families, last = GroupMarks(), only = GroupMarks(), near = GroupMarks()](
+  const auto forces = [this, &terms, &families, last = GroupMarks(), near = GroupMarks()](
                           ConstFieldView at, const GroupMarks& marks, double factor, FieldView sum) mutable {
     const FieldView own = cleared(at, families.body());
     ExactSum energy;
     if (marks != last) {
-      // A bond may be evaluated once for both ends, at either.
       last = marks;
-      only = families.around(marks);
-      near = families.around(only);
+      near = families.around(marks);
     }
     std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, only, near, own, &energy));
+    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, own, &energy));
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
     if (sum.data) combine(1, sum, factor, own, sum);
     return total_over_ranks(energy);
   };
   const Formulation& f = terms.parts_.formulation;
   const bool owners_alone = !f.pairs && !(f.bond && f.far_share > 0);
-  const auto energy = [this, &terms, &families, owners_alone](ConstFieldView at, const GroupMarks& marks) {
-    const GroupMarks of = owners_alone ? marks : families.around(marks), around = families.around(of);
+  const auto energy = [this, &terms, &families](ConstFieldView at, const GroupMarks& marks) {
+    const GroupMarks near = families.around(marks);
     if (force.size() == 0) cleared(at, families.body());
     ExactSum sum;
     std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, of, around, force, &sum));
+    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, force, &sum));
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
     return total_over_ranks(sum);
   };
@@ -363,7 +400,7 @@ ModelReport Terms::report() const {
   }
   if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
   if (!conservative())
-    report.warnings.push_back(
+    report.warnings.emplace_back(
         "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
   if (parts_.damage) {
     warn_of_energy(parts_, report);

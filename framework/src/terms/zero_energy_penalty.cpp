@@ -6,9 +6,11 @@
 namespace perikit {
 
 std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
-  apply(u, 1.0, force, energy);
+  apply(u, 1.0, force, energy ? &energies_ : nullptr);
+  if (energy) add_owned(parts_.families.body(), energies_, *energy);
   return -1;
 }
+
 
 std::int64_t ZeroEnergyPenalty::add_tangent(ConstFieldView, ConstFieldView w, FieldView Kw) {
   apply(w, -1.0, Kw, nullptr);

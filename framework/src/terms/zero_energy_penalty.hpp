@@ -18,7 +18,20 @@ class ZeroEnergyPenalty : public Term {
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum* energy) final {
-    apply(u, 1.0, force, energy, only.data());
+    std::vector<double> energies;
+    apply(u, 1.0, force, energy ? &energies : nullptr, only.data());
+    if (energy) add_owned(parts_.families.body(), energies, *energy);
+    return -1;
+  }
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum& energy) final {
+    std::vector<double> renewed;
+    apply(u, 1.0, force, &renewed, only.data());
+    replace(only, renewed, energies_);
+    add_owned(parts_.families.body(), energies_, energy);
+    return -1;
+  }
+  std::int64_t add_tangent_of(ConstFieldView, ConstFieldView w, const GroupMarks& only, const GroupMarks&, FieldView Kw) final {
+    apply(w, -1.0, Kw, nullptr, only.data());
     return -1;
   }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
@@ -31,13 +44,17 @@ class ZeroEnergyPenalty : public Term {
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
-  /// force += -factor dE/du [N]; *energy += E of what this rank owns [J] where wanted. only: what add_forces_of says; null: all.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, ExactSum* energy, const std::uint8_t* only = nullptr) = 0;
+  /// force += -factor dE/du [N]; *energies: E by group of eight points [J], where wanted. only: what add_forces_of says; null: all.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies,
+                     const std::uint8_t* only = nullptr) = 0;
   /// density[p] += energy of point p per volume [J/m^3].
   virtual void add_density(ConstFieldView u, double* density) = 0;
   virtual std::size_t bytes() const noexcept = 0;
 
   PenaltyParts parts_;
+
+ private:
+  std::vector<double> energies_;  ///< of the last forces with an energy
 };
 
 /// Over the point gradient of a body.

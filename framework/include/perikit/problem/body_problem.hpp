@@ -57,6 +57,7 @@ class BodyProblem final : public Problem {
   bool constant_stiffness() const noexcept override;
   bool advance(double time_step, FieldView velocity = {}) override;
   std::unique_ptr<WeakeningBonds> weakening_bonds() override;
+  std::unique_ptr<DamagedPart> damaged_part() override;
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
@@ -95,6 +96,7 @@ class BodyProblem final : public Problem {
   std::size_t bytes() const noexcept;
 
  private:
+  class Damaged;
   class Weakening;
 
   ProblemParts parts_;

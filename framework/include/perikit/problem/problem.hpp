@@ -8,6 +8,7 @@
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/problem/constraints.hpp"
+#include "perikit/problem/damaged_part.hpp"
 #include "perikit/problem/image_map.hpp"
 #include "perikit/problem/loads.hpp"
 #include "perikit/problem/masses.hpp"
@@ -82,6 +83,9 @@ class Problem {
   /// Bonds that weaken gradually, for solvers that forecast how far they do; as long as it lives, advance() leaves that to it. Null where none
   /// do, and on several ranks. The problem must outlive it.
   virtual std::unique_ptr<WeakeningBonds> weakening_bonds() = 0;
+  /// Where bonds have failed or weakened since the set-up, as they are now; null where none have, and in bodies with images. The problem
+  /// must outlive it. All ranks must call it.
+  virtual std::unique_ptr<DamagedPart> damaged_part() = 0;
   /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
   /// Bonds of `bonds`, not empty.

@@ -46,6 +46,12 @@ struct TermParts {
   std::vector<TermMaker> further;                      ///< what acts beside the formulation
 };
 
+/// By group of eight points (internal index / 8): those that are meant, those whose evaluation points act on these, and where these need
+/// point gradients.
+struct GroupRings {
+  std::vector<std::uint8_t> inside, only, near;
+};
+
 class Terms {
  public:
   explicit Terms(TermParts parts);
@@ -53,9 +59,16 @@ class Terms {
 
   /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted.
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
-  /// The same without the energy, where `force` holds the forces before the points `moved` went to where u has them and those of
-  /// `lost` lost bonds: what has not changed is left as it is, what has has the same bits. On one rank.
-  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost, FieldView force);
+  /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds: what
+  /// has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs. On one rank.
+  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost, FieldView force,
+                                double* energy);
+  /// The groups of points whose bonds have failed or weakened since the set-up and of what lies in their families, on all ranks the same; empty
+  /// where none have.
+  GroupRings near_failed_bonds() const;
+  /// The tangent of those groups alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
+  /// anything elsewhere.
+  EvaluationStatus tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw);
   /// Kw <- -d(force)/du w [N], fully overwritten.
   EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
   /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come

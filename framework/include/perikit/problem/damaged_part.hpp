@@ -1,0 +1,21 @@
+#pragma once
+/// The part of a body where bonds have failed.
+
+#include "perikit/core/evaluation_status.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+/// Points whose bonds have failed or weakened since the set-up, and what lies in their families: what failed bonds did to the stiffness, they
+/// did there. Its tangent costs as much of that of the body as it is of the body, and two families around it.
+class DamagedPart {
+ public:
+  virtual ~DamagedPart() = default;
+  /// 1 on the components of its points, 0 elsewhere.
+  virtual ConstFieldView inside() const = 0;
+  /// Kw <- -d(force)/du . w at u [N] on its points, bit for bit as Problem::tangent_action has it, of a w that is 0 on all others; anything
+  /// elsewhere.
+  virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+};
+
+}  // namespace perikit
