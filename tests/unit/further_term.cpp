@@ -71,7 +71,7 @@ class Foundation final : public Term {
   void add_bonds(ConstFieldView, const GroupMarks&, const GroupMarks&, BondSamples&) override {}
   void bonds_changed(std::span<const std::int32_t>) override {}
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
-  void screen(BondScreen*) override {}
+  bool screen(BondScreen*) override { return false; }
   void report(ModelReport& report) const override { report.notes.emplace_back("foundation", "springs at all points"); }
   QuietCounts quiet_counts() const noexcept override { return {}; }
 

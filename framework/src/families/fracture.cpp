@@ -99,8 +99,10 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
     at_ = families_.body().make_field(d);
   }
   begin(before_);
-  reaction->impulse = families_.body().make_field(d);
-  reaction->drift = families_.body().make_field(d);
+  for (Field* field : {&reaction->impulse, &reaction->drift}) {
+    if (field->size() == 0) *field = families_.body().make_field(d);
+    else fill(0.0, *field);
+  }
   const std::vector<double> moments = this->moments(changes, before_, u);
   for (std::size_t k = 0; k < changes.size(); ++k)
     update.held += moments[k] == not_now && families_.body().owns(static_cast<std::size_t>(changes[k].bond.point));

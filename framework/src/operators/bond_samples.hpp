@@ -42,6 +42,9 @@ class BondSamples {
   void add(const Entry& entry);
   /// After the loops: in ascending order, each owner and far end once, whatever thread they came from.
   void merge();
+  /// Until the next `clear`: what is said of a directed bond is said of the bond, both ways.
+  void take_both_ways() noexcept { both_ways_ = true; }
+  bool both_ways() const noexcept { return both_ways_; }
   /// Nothing belongs to points as a whole.
   bool of_bonds_alone() const noexcept { return !any_whole_; }
   const Entry* find(std::int32_t owner, std::int32_t far) const noexcept;
@@ -58,7 +61,7 @@ class BondSamples {
   std::span<const std::uint8_t> kept_;
   std::vector<std::vector<Entry>> of_thread_;
   std::vector<Entry> all_;
-  bool any_whole_ = false;
+  bool any_whole_ = false, both_ways_ = false;
   std::int32_t lowest_ = 0;          ///< owner
   std::vector<std::size_t> first_;   ///< by owner less the lowest: its first entry, and the end of the last one's
 };

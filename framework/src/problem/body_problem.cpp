@@ -207,11 +207,10 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
     if (images()) images()->extend(before);
   };
   const bool explicit_step = velocity.data != nullptr;
-  BondReaction reaction;
   const BondUpdate update =
-      parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction);
+      parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction_);
   if (update.changed == 0) return false;
-  if (explicit_step) react(reaction, update.ends, velocity);
+  if (explicit_step) react(update.ends, velocity);
   find_pieces(true);
   return true;
 }
@@ -230,9 +229,9 @@ void BodyProblem::find_pieces(bool fresh) {
 
 /// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
 /// the impulse upon it; its work is that of all other forces, with the opposite sign.
-void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> ends, FieldView velocity) {
+void BodyProblem::react(std::span<const std::int32_t> ends, FieldView velocity) {
   EvaluationStatus status;
-  const FieldView impulse = reaction.impulse, drift = reaction.drift;
+  const FieldView impulse = reaction_.impulse, drift = reaction_.drift;
   finish(impulse, status);
   finish(drift, status);
   const FieldView u = state().displacement();
@@ -240,16 +239,18 @@ void BodyProblem::react(BondReaction& reaction, std::span<const std::int32_t> en
   const ConstFieldView free = constraints().free();
   ExactSum held;
   std::vector<std::int32_t> moved;
-  for (std::size_t k = 0; k < velocity.size(); ++k) {
-    const double mass = by_point[k % velocity.stride];
-    if (free.data[k] != 0 && mass > 0) {
-      velocity.data[k] += impulse.data[k] / mass;
-      u.data[k] += drift.data[k] / mass;
-      if (drift.data[k] != 0) moved.push_back(static_cast<std::int32_t>(k % velocity.stride));
-    } else {
-      held.add(impulse.data[k] * velocity.data[k]);
+  for (int c = 0; c < velocity.components; ++c)
+    for (std::size_t p = 0; p < velocity.stride; ++p) {
+      const double push = impulse.component(c)[p], pull = drift.component(c)[p];
+      if (push == 0 && pull == 0) continue;   // far from bonds that failed
+      if (by_point[p] > 0 && free.component(c)[p] != 0) {
+        velocity.component(c)[p] += push / by_point[p];
+        u.component(c)[p] += pull / by_point[p];
+        if (pull != 0) moved.push_back(static_cast<std::int32_t>(p));
+      } else {
+        held.add(push * velocity.component(c)[p]);
+      }
     }
-  }
   state().energies.external_work -= total_over_ranks(held);
   double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
   if (ghosts_ || images() || weak_springs_) {

@@ -43,6 +43,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
   if (damage && traits_.bound != ValueBound::none) set_screen(parts.factors);
 }
 
+/// Each term may have the same part of what a point holds.
 /// A bond holds psi_ij/N_i + psi_ji/N_j over its share, N the normaliser of its share, so that one of them is above half of the
 /// limit where it fails.
 void BondCriterion::set_screen(std::span<const double> factors) {
@@ -80,7 +81,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   };
   const auto own = [&](std::int32_t p) {
     const auto at = static_cast<std::size_t>(p);
-    return (release_ ? screened_release(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at));
+    return (release_ ? screened_release(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at) * static_cast<double>(terms_.size()));
   };
   for (const std::int32_t p : body_.owned()) {
     const auto at = static_cast<std::size_t>(p);
@@ -93,7 +94,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
 }
 
 BondScreen* BondCriterion::screen() noexcept {
-  return screen_.near.empty() || terms_.size() != 1 ? nullptr : &screen_;
+  return screen_.near.empty() ? nullptr : &screen_;
 }
 
 void BondCriterion::begin_forces(ConstFieldView u) {
@@ -104,17 +105,18 @@ void BondCriterion::begin_forces(ConstFieldView u) {
 
 /// Groups with bonds that may fail at u.
 std::vector<std::int32_t> BondCriterion::near_failure(ConstFieldView u) {
-  if (known_at(u)) return marked(screen_.near);
-  if (!by_point_ || screen_.near.empty()) return groups_;
-  // The energies of all points are no more than a look at them.
+  const bool known = known_at(u);
+  if (known && terms_.size() == 1) return marked(screen_.near);
+  if (!by_point_ || screen_.near.empty()) return known ? marked(screen_.near) : groups_;
+  // What points hold of all terms is cheaper than a look at their bonds.
   const BondSampling asked = samples_.what();
   samples_.ask(BondSampling::energy);
-  collect(u, GroupMarks(screen_.near.size(), 1), {});
+  collect(u, known ? screen_.near : GroupMarks(screen_.near.size(), 1), {});
   GroupMarks near(screen_.near.size(), 0);
   for (const BondSamples::Entry& entry : samples_.entries()) {
     const auto p = static_cast<std::size_t>(entry.owner);
     const double left = body_.volume(p) * (1 - families_.damage(p));
-    if (left > 0 && entry.energy > left * screen_.density[p]) near[p / padding] = 1;
+    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) near[p / padding] = 1;
   }
   samples_.ask(asked);
   return marked(near);
@@ -135,6 +137,7 @@ void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView 
     samples_.ask(BondSampling::energy);
     return collect(u, own_, own_);
   }
+  if (formulation_.pairs) return collect(u, own_, own_);  // both ends at once
   near_ = families_.around(own_);
   if (!release_) return collect(u, near_, own_);
   samples_.ask(BondSampling::derivative);
@@ -182,6 +185,7 @@ double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double b, doub
   for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
     if (!by_point_)
       if (const BondSamples::Entry* of_bond = samples_.find(owner, other)) energy += of_bond->energy / (b * volumes);
+    if (samples_.both_ways()) return energy;
     if (samples_.of_bonds_alone()) continue;
     const BondSamples::Entry* of_point = samples_.find(owner, -1);
     const auto i = static_cast<std::size_t>(owner);

@@ -399,20 +399,34 @@ void BondRelease::release_penalty(Owner& owner, Memory& m) const {
         if (!isotropic || a == b) sum += M[isotropic ? 0 : symmetric_index(D, a, b)] * zz[a * D + b];
     return sum;
   };
-  double M[6];
-  parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, family.inverse_shape), M);
+  const double* const inverse = family.inverse_shape;
+  const auto penalty = [&](const double* of_inverse, double* M) {
+    parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, of_inverse), M);
+  };
+  double M[6], slope[D * D] = {};  // dE/dK^-1_ab over V_i/2, a <= b
+  penalty(inverse, M);
+  const double by = step * *std::max_element(inverse, inverse + 6);
+  for (int a = 0; a < D; ++a)
+    for (int b = a; b < D; ++b)
+      for (const double sign : {1.0, -1.0}) {
+        double moved[6], at[6];
+        std::copy_n(inverse, 6, moved);
+        moved[symmetric_index(D, a, b)] += sign * by;
+        penalty(moved, at);
+        slope[a * D + b] += sign * times(at, squares) / (2 * by);
+      }
   for (std::size_t k = 0; k < n; ++k) {
     const double w = family.whole_omega(k) * family.volume[k];
-    double zz[D * D];
-    for (std::size_t a = 0; a < D; ++a)
-      for (std::size_t b = 0; b < D; ++b) zz[a * D + b] = w * m.z[D * k + a] * m.z[D * k + b];
+    double zz[D * D], Ax[D] = {};
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b) {
+        zz[a * D + b] = w * m.z[D * k + static_cast<std::size_t>(a)] * m.z[D * k + static_cast<std::size_t>(b)];
+        Ax[a] += inverse[symmetric_index(D, std::min(a, b), std::max(a, b))] * m.xi[D * k + static_cast<std::size_t>(b)];
+      }
     double change = times(M, zz);
-    for (const double by : {step, -step}) {
-      double inverse[6], at[6];
-      change_inverse<D>(family.inverse_shape, w, &m.xi[D * k], by, inverse);
-      parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, inverse), at);
-      change += (by > 0 ? 1 : -1) * times(at, squares) / (2 * step);
-    }
+    // dK^-1/db = -w K^-1 xi (x) K^-1 xi.
+    for (int a = 0; a < D; ++a)
+      for (int b = a; b < D; ++b) change -= w * slope[a * D + b] * Ax[a] * Ax[b];
     owner.released[k] += 0.5 * volume * change;
   }
 }

@@ -31,31 +31,32 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
+  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only) override {
     mirror_rows(u, points_, u_);
-    if (energies) energies->assign(families_.body().stride() / padding, 0.0);
+    if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
-    const auto wanted = [&](std::size_t p) { return !only || only[p / padding]; };
+    const auto meant = [&](std::size_t p) { return !only || only[p / padding]; };
     over_points([&](std::size_t b) { return quiet_.begins(b); },
                 [&](std::size_t p) {
-                  if (!wanted(p)) return;
+                  if (!meant(p)) return;
                   gradient_.at(p, u_, &flux_[D * p]);
-                  if (energies) (*energies)[p / padding] += energy_of_point(p, &flux_[D * p]);
+                  if (wanted.any()) take(p, energy_of_point(p, &flux_[D * p]), wanted);
                   for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
                 });
     over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
                 [&](std::size_t p) {
-                  if (!wanted(p)) return;
+                  if (!meant(p)) return;
                   const Row f = factor * position_[p][3] * force_of_point(p);
                   for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
                 });
   }
 
-  void add_density(ConstFieldView u, double* density) override {
+  void add_density(ConstFieldView u, double* density, const std::uint8_t* only) override {
     mirror_rows(u, points_, u_);
     quiet_.wake();
     over_points(everywhere, [&](std::size_t p) {
+      if (only && !only[p / padding]) return;
       gradient_.at(p, u_, &flux_[D * p]);
       density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
     });

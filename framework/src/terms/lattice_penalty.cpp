@@ -34,18 +34,19 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
-    if (energies) energies->assign(families_.body().stride() / padding, 0.0);
+  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only) override {
+    if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
       if (!quiet_.begins(b)) return;
       for_gradients(b, u, only, [&](const LatticeChunk& chunk, const double* H, const double* sums) {
         own_forces(chunk, u, factor, H, sums, force);
-        if (!energies) return;
+        if (!wanted.any()) return;
         double of_points[chunk_points];
         energies_of_points(chunk, u, H, of_points);
-        for (const double e : of_points) (*energies)[static_cast<std::size_t>(chunk.first / chunk_points)] += e;
+        for (int l = 0; l < chunk_points; ++l)
+          if (of_points[l] > 0) take(static_cast<std::size_t>(chunk.first + l), of_points[l], wanted);
       });
     });
     families_.tiles.colouring.for_each([&](std::size_t b) {
@@ -60,9 +61,9 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     families_.tiles.clear_dead(force);
   }
 
-  void add_density(ConstFieldView u, double* density) override {
+  void add_density(ConstFieldView u, double* density, const std::uint8_t* only) override {
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {
-      for_gradients(b, u, nullptr, [&](const LatticeChunk& chunk, const double* H, const double*) {
+      for_gradients(b, u, only, [&](const LatticeChunk& chunk, const double* H, const double*) {
         double of_points[chunk_points];
         energies_of_points(chunk, u, H, of_points);
         for (int l = 0; l < chunk_points; ++l) density[chunk.first + l] += of_points[l] / families_.volume;

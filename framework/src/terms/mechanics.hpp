@@ -31,7 +31,10 @@ class Mechanics final : public Term {
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
   PointFlux point_flux() const noexcept override { return space_->point_flux(); }
-  void screen(BondScreen* screen) override { screen_ = screen; }
+  bool screen(BondScreen* screen) override {
+    screen_ = screen;
+    return true;
+  }
   void report(ModelReport& report) const override;
   QuietCounts quiet_counts() const noexcept override { return space_->quiet_counts(); }
 

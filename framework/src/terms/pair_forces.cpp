@@ -204,31 +204,33 @@ void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
   });
 }
 
-/// Half of b V_i V_j w, and what the bond adds to V_i phi: that is shared as the bonds make up theta, phi_i/theta_i d theta_i.
+/// b V_i V_j w, and what the bond adds to V_i phi and V_j phi: these are shared as bonds make up theta, phi_i/theta_i d theta_i.
 template <int D>
-void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
-  if (density_.size() == 0) density_ = body_.make_field(2);
-  double* const phi = density_.component(1);
-  if (formulation_.dilatation) dilatation(u, {}, nullptr, phi, marks.data());
-  const std::size_t groups = body_.stride() / padding;
-  // What a bond has of itself is the same at both of its ends; where bonds of one end are wanted, the other need not be looked at.
-  const bool at_one_end = !formulation_.dilatation && fields_.sides.size() == 0;
-  parallel_for(groups, [&](std::size_t g) {
-    if (!marks[g] || (at_one_end && !samples.keeps_group(g))) return;
+void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+  const bool dilates = formulation_.dilatation != nullptr;
+  if (dilates) {
+    if (density_.size() == 0) density_ = body_.make_field(1);
+    dilatation(u, {}, nullptr, density_.data(), near.data());
+  }
+  const auto by_theta = [&](std::size_t p) {
+    const double theta = scale_.data()[p] * theta_.data()[p];
+    return theta != 0 ? density_.data()[p] / theta * scale_.data()[p] : 0.0;
+  };
+  samples.take_both_ways();
+  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+    if (!marks[g] || !samples.keeps_group(g)) return;
     Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
       if (!body_.alive(p)) continue;
       load_bonds(p, u, bonds);
       const FamilyArrays& family = bonds.family;
-      const auto own = static_cast<std::int32_t>(p);
-      const double theta = formulation_.dilatation ? scale_.data()[p] * theta_.data()[p] : 0.0;
-      const double by_theta = theta != 0 ? phi[p] / theta * scale_.data()[p] : 0.0;
+      const double of_own = dilates ? by_theta(p) : 0.0;
       for (std::size_t k = 0; k < family.far.size(); ++k) {
-        const double strain = fields_.own_strain(p, static_cast<std::size_t>(family.far[k]));
-        const double w = 0.5 * bonds.energy[k] + by_theta * bonds.omega[k] * family.length[k] * strain * bonds.extension[k];
-        const double energy = body_.volume(p) * family.volume[k] * family.b(k) * w;
-        samples.add({own, family.far[k], 0.0, energy});
-        if (at_one_end && !samples.keeps_group(static_cast<std::size_t>(family.far[k]) / padding)) samples.add({family.far[k], own, 0.0, energy});
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        double w = bonds.energy[k];
+        if (dilates)
+          w += (of_own * fields_.own_strain(p, far) + by_theta(far) * fields_.own_strain(far, p)) * bonds.omega[k] * family.length[k] * bonds.extension[k];
+        samples.add({static_cast<std::int32_t>(p), family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w});
       }
     }
   });

@@ -39,7 +39,10 @@ class PairForces final : public Term {
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   const NearestFailure* watch(const BodyDamage& damage) override;
-  void screen(BondScreen* screen) override { screen_ = screen; }
+  bool screen(BondScreen* screen) override {
+    screen_ = screen;
+    return true;
+  }
   void report(ModelReport& report) const override;
   QuietCounts quiet_counts() const noexcept override { return loop_->quiet_counts(); }
 

@@ -34,10 +34,11 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies, const std::uint8_t* only) override {
+  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only) override {
     read(u);
     force_.assign(rows_.size(), Row{});
-    if (energies) energies->assign(rows_.body().stride() / padding, 0.0);
+    energy_.assign(wanted.any() ? rows_.size() : 0, 0.0);
+    if (wanted.energies) wanted.energies->assign(rows_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(1, [&](std::size_t b) {
       bool any = false;
@@ -50,19 +51,21 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       over_rows(b, [&](std::size_t r) {
         if (only && !only[rows_.point(r) / padding]) return;
         const double twice = pull(r, factor, t);
-        if (energies) (*energies)[rows_.point(r) / padding] += 0.5 * twice;
+        if (wanted.any()) energy_[r] = 0.5 * twice;
       });
     });
     for (std::size_t r = 0; r < rows_.size(); ++r)
       for (int c = 0; c < D; ++c) force.component(c)[rows_.point(r)] += force_[r][c];
+    // Blocks may share a group.
+    for (std::size_t r = 0; r < energy_.size(); ++r) take(rows_.point(r), energy_[r], wanted);
   }
 
-  void add_density(ConstFieldView u, double* density) override {
+  void add_density(ConstFieldView u, double* density, const std::uint8_t* only) override {
     read(u);
     parallel_for(blocks(), [&](std::size_t b) {
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
-        if (stencil_[r] >= 0) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
+        if (stencil_[r] >= 0 && (!only || only[rows_.point(r) / padding])) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
       });
     });
   }
@@ -198,6 +201,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   std::vector<Stencil> stencils_;
   std::int32_t whole_ = -1;            ///< that of whole families
   AlignedVector<Row> u_, force_;       ///< by row
+  std::vector<double> energy_;         ///< likewise, where it is wanted
 };
 
 }  // namespace

@@ -57,8 +57,8 @@ class Term {
   /// Of the last evaluation, where that was one of forces, and leaves any.
   virtual PointFlux point_flux() const noexcept { return {}; }
 
-  /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on.
-  virtual void screen(BondScreen* screen) = 0;
+  /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on; null: no longer. Returns whether they do.
+  virtual bool screen(BondScreen* screen) = 0;
 
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;

@@ -12,7 +12,6 @@
 #include "families/fracture.hpp"
 #include "families/lattice_families.hpp"
 #include "families/shared_bonds.hpp"
-#include "families/vicinity.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "spaces/consistency.hpp"
@@ -91,8 +90,7 @@ struct Terms::Assemblies {
 
 struct Terms::Failing {
   Fracture fracture;
-  Field force;                       ///< work field
-  std::optional<Vicinity> vicinity;  ///< made when asked for
+  Field force;  ///< work field
 
   Fracture::Body body(Terms& terms);
   FieldView cleared(ConstFieldView like, const Body& body) {
@@ -130,11 +128,14 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     finder = all.make_monitor(*parts_.damage, parts_.skip, known);
   else {
     auto criterion = std::make_unique<BondCriterion>(release_parts(parts_), asked_of(parts_), parts_.damage, terms_, parts_.skip);
-    criterion_ = parts_.skip && criterion->screen() ? criterion.get() : nullptr;
-    if (criterion_) terms_.front()->screen(criterion_->screen());
+    BondScreen* const screen = parts_.skip ? criterion->screen() : nullptr;
+    // All of them or none.
+    if (screen && std::ranges::all_of(terms_, [&](const auto& term) { return term->screen(screen); })) criterion_ = criterion.get();
+    for (const auto& term : terms_)
+      if (!criterion_) term->screen(nullptr);
     finder = std::move(criterion);
   }
-  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}, {}});
+  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
 }
 
 Terms::~Terms() = default;
@@ -165,34 +166,36 @@ EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy
 EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                      FieldView force, double* energy) {
   if (!failing_ || !parts_.skip || history()) return forces(u, force, energy);
-  const Body& body = parts_.families->body();
+  const Families& families = *parts_.families;
+  const Body& body = families.body();
   int steps = 1;
   for (const auto& term : terms_) steps = std::max(steps, term->steps());
-  std::optional<Vicinity>& vicinity = failing_->vicinity;
-  if (!vicinity) vicinity.emplace(body);
-  vicinity->clear();
-  vicinity->add(moved, steps);
-  vicinity->add(lost, std::max(1, steps - 1));
-  std::vector<std::int32_t> renewed, evaluated;
-  for (const std::int32_t p : body.internal())
-    if (vicinity->holds(static_cast<std::size_t>(p))) renewed.push_back(p);
-  vicinity->grow(std::max(1, steps - 1));
-  GroupMarks only = vicinity->groups();
+  const auto around = [&](GroupMarks marks, int times) {
+    for (int k = 0; k < times; ++k) marks = families.around(marks);
+    return marks;
+  };
+  const auto groups_of = [&](std::span<const std::int32_t> points) {
+    GroupMarks marks(body.stride() / padding, 0);
+    for (const std::int32_t p : points) marks[static_cast<std::size_t>(p) / padding] = 1;
+    return marks;
+  };
+  const int reach = std::max(1, steps - 1);   // of the evaluation points at a point
+  GroupMarks renewed = around(groups_of(lost), reach);
+  const GroupMarks pulled = around(groups_of(moved), steps);
+  for (std::size_t g = 0; g < renewed.size(); ++g) renewed[g] |= pulled[g];
+  GroupMarks only = around(renewed, reach);
   for (const auto& term : terms_)
     if (energy) term->complete(only);
-  for (const std::int32_t p : body.internal())
-    if (only[static_cast<std::size_t>(p) / padding]) evaluated.push_back(p);
-  if (2 * evaluated.size() > body.points()) return forces(u, force, energy);
-  vicinity->add(evaluated, 1);
-  const GroupMarks near = vicinity->groups();
+  if (2 * std::ranges::count(only, 1) * static_cast<std::ptrdiff_t>(padding) > std::ssize(body.internal())) return forces(u, force, energy);
+  const GroupMarks near = families.around(only);
   const FieldView own = failing_->cleared(force, body);
   ExactSum sum;
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
     bad = energy ? (*term)->renew_forces(u, only, near, own, sum) : (*term)->add_forces_of(u, only, near, own, nullptr);
   if (energy) *energy = total_over_ranks(sum);
-  for (int c = 0; c < force.components; ++c)
-    for (const std::int32_t p : renewed) force.component(c)[p] = own.component(c)[p];
+  for (std::size_t g = 0; g < renewed.size(); ++g)
+    for (int c = 0; c < force.components && renewed[g]; ++c) std::copy_n(own.component(c) + g * padding, padding, force.component(c) + g * padding);
   return status(bad);
 }
 
@@ -211,7 +214,10 @@ GroupRings Terms::near_failed_bonds() const {
   groups.inside.assign(body.stride() / padding, 0);
   bool any = false;
   for (const std::int32_t p : body.owned())
-    if (families.lost_bonds(static_cast<std::size_t>(p))) any = groups.inside[static_cast<std::size_t>(p) / padding] = 1;
+    if (families.lost_bonds(static_cast<std::size_t>(p))) {
+      groups.inside[static_cast<std::size_t>(p) / padding] = 1;
+      any = true;
+    }
   if (communicator().largest(any ? 1 : 0) == 0) return {};
   shared.mark(groups.inside);
   const auto around = [&](const GroupMarks& marks) {

@@ -6,15 +6,23 @@
 namespace perikit {
 
 std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
-  apply(u, 1.0, force, energy ? &energies_ : nullptr);
+  apply(u, 1.0, force, {energy ? &energies_ : nullptr, screen_});
   if (energy) add_owned(parts_.families.body(), energies_, *energy);
   return -1;
 }
 
 
 std::int64_t ZeroEnergyPenalty::add_tangent(ConstFieldView, ConstFieldView w, FieldView Kw) {
-  apply(w, -1.0, Kw, nullptr);
+  apply(w, -1.0, Kw, {});
   return -1;
+}
+
+void ZeroEnergyPenalty::take(std::size_t p, double energy, const Wanted& wanted) const {
+  if (wanted.energies) (*wanted.energies)[p / padding] += energy;
+  if (!wanted.screen) return;
+  const Families& families = parts_.families;
+  const double left = families.body().volume(p) * (1 - families.damage(p));
+  if (energy > left * wanted.screen->density[p]) wanted.screen->near[p / padding] = 1;
 }
 
 std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samples) {
@@ -27,7 +35,7 @@ void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, con
   if (samples.what() == BondSampling::derivative) return;  // terms/bond_release.hpp knows what it does
   const Body& body = parts_.families.body();
   Field density = body.make_field(1);
-  add_density(u, density.data());
+  add_density(u, density.data(), marks.data());
   for (const std::int32_t p : body.internal()) {
     const auto at = static_cast<std::size_t>(p);
     if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at)});

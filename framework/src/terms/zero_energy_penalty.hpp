@@ -19,42 +19,53 @@ class ZeroEnergyPenalty : public Term {
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum* energy) final {
     std::vector<double> energies;
-    apply(u, 1.0, force, energy ? &energies : nullptr, only.data());
+    apply(u, 1.0, force, {energy ? &energies : nullptr}, only.data());
     if (energy) add_owned(parts_.families.body(), energies, *energy);
     return -1;
   }
   std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum& energy) final {
     std::vector<double> renewed;
-    apply(u, 1.0, force, &renewed, only.data());
+    apply(u, 1.0, force, {&renewed}, only.data());
     replace(only, renewed, energies_);
     add_owned(parts_.families.body(), energies_, energy);
     return -1;
   }
   std::int64_t add_tangent_of(ConstFieldView, ConstFieldView w, const GroupMarks& only, const GroupMarks&, FieldView Kw) final {
-    apply(w, -1.0, Kw, nullptr, only.data());
+    apply(w, -1.0, Kw, {}, only.data());
     return -1;
   }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
   int steps() const noexcept final { return 2; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
   const NearestFailure* watch(const BodyDamage&) final { return nullptr; }
-  void screen(BondScreen*) final {}  // where there is a penalty, bonds are not screened
+  bool screen(BondScreen* screen) final {
+    screen_ = screen;
+    return true;
+  }
   void report(ModelReport& report) const final;
   QuietCounts quiet_counts() const noexcept final { return {}; }  // counted with the gradients
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
-  /// force += -factor dE/du [N]; *energies: E by group of eight points [J], where wanted. only: what add_forces_of says; null: all.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, std::vector<double>* energies,
-                     const std::uint8_t* only = nullptr) = 0;
-  /// density[p] += energy of point p per volume [J/m^3].
-  virtual void add_density(ConstFieldView u, double* density) = 0;
+  /// What is wanted beside forces.
+  struct Wanted {
+    std::vector<double>* energies = nullptr;   ///< E by group of eight points [J]
+    BondScreen* screen = nullptr;              ///< groups with a point that holds too much are marked
+    bool any() const noexcept { return energies || screen; }
+  };
+  /// force += -factor dE/du [N]. only: what add_forces_of says; null: all.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only = nullptr) = 0;
+  /// Takes the energy of point p.
+  void take(std::size_t p, double energy, const Wanted& wanted) const;
+  /// density[p] += energy of point p per volume [J/m^3]. only: by group of eight points, where it is needed; null: everywhere.
+  virtual void add_density(ConstFieldView u, double* density, const std::uint8_t* only = nullptr) = 0;
   virtual std::size_t bytes() const noexcept = 0;
 
   PenaltyParts parts_;
 
  private:
   std::vector<double> energies_;  ///< of the last forces with an energy
+  BondScreen* screen_ = nullptr;
 };
 
 /// Over the point gradient of a body.

@@ -133,9 +133,10 @@ class BodyProblem final : public Problem {
   /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
   void find_pieces(bool fresh);
   /// What bonds that failed inside of the last step mean for forces, velocity and work.
-  void react(BondReaction& reaction, std::span<const std::int32_t> ends, FieldView velocity);
+  void react(std::span<const std::int32_t> ends, FieldView velocity);
 
   Field seen_, seen_direction_;
+  BondReaction reaction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
