@@ -141,14 +141,14 @@ double Verlet::stable_step(Problem& problem) const {
   return eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
 }
 
-/// Whether bonds that have failed leave a step stable, within 1 %; where it cannot be told from the part around them, or they do not, the
+/// Whether bonds that have failed leave a step stable; where it cannot be told from the part around them, or they do not, the
 /// whole body must be asked.
 bool Verlet::stays_stable(Problem& problem, double step) const {
   if (options_.bond_based) return true;
   const std::unique_ptr<DamagedPart> part = problem.damaged_part();
   if (!part) return false;
   const double eigenvalue = largest_eigenvalue(problem, *part, problem.state().displacement());
-  return eigenvalue > 0 && safety(problem) * 2 / std::sqrt(eigenvalue) >= 0.99 * step;
+  return eigenvalue > 0 && safety(problem) * 2 / std::sqrt(eigenvalue) >= step;
 }
 
 double Verlet::steps_to_end(double time, double step) const {

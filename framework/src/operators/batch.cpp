@@ -299,7 +299,8 @@ void BatchWork::screen(std::int64_t first_point, int first_lane, int lanes, cons
   const double* limit = screen_->density.data() + first_point;
   bool near = false;
   for (int l = 0; l < lanes; ++l) near |= s.highest[first_lane + l] > limit[l % group];
-  if (near) screen_->near[static_cast<std::size_t>(first_point) / padding] = 1;
+  for (int l = 0; l < lanes && near; ++l)
+    if (s.highest[first_lane + l] > limit[l % group]) screen_->mark(static_cast<std::size_t>(first_point + l % group));
 }
 
 void BatchWork::screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept {
@@ -307,7 +308,7 @@ void BatchWork::screen(const std::int32_t* points, int count, int lanes, const B
   for (int l = 0; l < lanes; ++l) {
     if (count > 1 && l % 8 >= count) continue;
     const auto p = static_cast<std::size_t>(points[count > 1 ? l % 8 : 0]);
-    if (s.highest[l] > screen_->density[p]) std::atomic_ref(screen_->near[p / padding]).store(1, std::memory_order_relaxed);
+    if (s.highest[l] > screen_->density[p]) screen_->mark(p);
   }
 }
 

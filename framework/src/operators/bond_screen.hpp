@@ -1,7 +1,8 @@
 #pragma once
-/// What evaluations of forces leave behind for those who look for failing bonds by their energy: groups of eight points with a
-/// bond that may hold too much. All other groups need no look.
+/// What evaluations of forces leave behind for those who look for failing bonds by their energy: points with a bond that may hold too much.
+/// All others need no look.
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -16,9 +17,14 @@ struct BondScreen {
   /// Of pair laws: the least limit of the energy of a bond over its share, or of its energy.
   double limit = 0;
   bool over_share = true;
-  std::vector<std::uint8_t> near;  ///< by group of eight points
+  std::vector<std::uint8_t> near;  ///< by group of eight points: bit l: point l of it has one
   AlignedVector<double> u;         ///< the displacement that `near` belongs to
   bool known = false;              ///< near is of this u
+
+  /// From any thread.
+  void mark(std::size_t p) noexcept {
+    std::atomic_ref(near[p / padding]).fetch_or(static_cast<std::uint8_t>(1u << p % padding), std::memory_order_relaxed);
+  }
 };
 
 }  // namespace perikit

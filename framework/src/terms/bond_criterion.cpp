@@ -40,6 +40,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
+  looked_at_.assign(count, 0xff);
   if (damage && traits_.bound != ValueBound::none) set_screen(parts.factors);
 }
 
@@ -103,11 +104,11 @@ void BondCriterion::begin_forces(ConstFieldView u) {
   screen_.u.assign(u.data, u.data + u.size());
 }
 
-/// Groups with bonds that may fail at u.
-std::vector<std::int32_t> BondCriterion::near_failure(ConstFieldView u) {
+/// By group of eight points: the points with bonds that may fail at u, as bits.
+GroupMarks BondCriterion::near_failure(ConstFieldView u) {
   const bool known = known_at(u);
-  if (known && terms_.size() == 1) return marked(screen_.near);
-  if (!by_point_ || screen_.near.empty()) return known ? marked(screen_.near) : groups_;
+  if (known && terms_.size() == 1) return screen_.near;
+  if (!by_point_ || screen_.near.empty()) return known ? screen_.near : GroupMarks(own_.size(), 0xff);
   // What points hold of all terms is cheaper than a look at their bonds.
   const BondSampling asked = samples_.what();
   samples_.ask(BondSampling::energy);
@@ -116,10 +117,10 @@ std::vector<std::int32_t> BondCriterion::near_failure(ConstFieldView u) {
   for (const BondSamples::Entry& entry : samples_.entries()) {
     const auto p = static_cast<std::size_t>(entry.owner);
     const double left = body_.volume(p) * (1 - families_.damage(p));
-    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) near[p / padding] = 1;
+    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) near[p / padding] |= static_cast<std::uint8_t>(1u << p % padding);
   }
   samples_.ask(asked);
-  return marked(near);
+  return near;
 }
 
 std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
@@ -201,7 +202,7 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const std::
   for (std::size_t k = 0; k < m.family.far.size(); ++k) {
     const std::int32_t far = m.family.far[k];
     // A bond is looked at once: at its lower end, or at the one whose group is looked at.
-    const bool here = named.empty() ? p < far || !own_[static_cast<std::size_t>(far) / padding]
+    const bool here = named.empty() ? p < far || !looks_at(static_cast<std::size_t>(far))
                                     : std::binary_search(named.begin(), named.end(), far);
     if (here) m.place.push_back(k);
   }
@@ -253,7 +254,7 @@ void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit
   Bonds& m = *memory_[static_cast<std::size_t>(thread_index())];
   for (std::size_t l = 0; l < padding; ++l) {
     const std::size_t p = static_cast<std::size_t>(group) * padding + l;
-    if (!body_.alive(p)) continue;
+    if (!body_.alive(p) || !looks_at(p)) continue;
     load(static_cast<std::int32_t>(p), u, {}, m);
     if (!m.place.empty()) visit(static_cast<std::int32_t>(p), m);
   }
@@ -263,7 +264,11 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   std::vector<BondChange> all;
   found_.clear();
   found_at_ = u.data;
-  const std::vector<std::int32_t> near = skip_ ? near_failure(u) : groups_;
+  looked_at_ = skip_ ? near_failure(u) : GroupMarks(own_.size(), 0xff);
+  // What bonds set free also comes from those around them: whole groups, as the bound is one of experience.
+  if (release_)
+    for (std::uint8_t& points : looked_at_) points = points != 0 ? 0xff : 0;
+  const std::vector<std::int32_t> near = marked(looked_at_);
   if (release_ && release_->follows_from_flux() && known_at(u)) flux_ = terms_.front()->point_flux();
   if (!flux_.everywhere) flux_ = {};
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
@@ -317,6 +322,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
 
 std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
   std::vector<BondEnergy> all;
+  looked_at_.assign(own_.size(), 0xff);
   by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<BondEnergy>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {

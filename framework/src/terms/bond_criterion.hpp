@@ -30,7 +30,7 @@ class BondCriterion final : public BondFinder {
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }
   std::size_t bytes() const noexcept override {
-    return samples_.bytes() + forces_.bytes() + 4 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
+    return samples_.bytes() + forces_.bytes() + 5 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
   }
   /// For evaluations of forces to mark the groups that need a look; null where they cannot.
   BondScreen* screen() noexcept;
@@ -52,8 +52,9 @@ class BondCriterion final : public BondFinder {
 
   void set_screen(std::span<const double> factors);
   /// Whether the last evaluation of forces with a screen was at u.
+  bool looks_at(std::size_t p) const noexcept { return own_[p / padding] && (looked_at_[p / padding] >> p % padding & 1); }
   bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
-  std::vector<std::int32_t> near_failure(ConstFieldView u);
+  GroupMarks near_failure(ConstFieldView u);
   std::vector<std::int32_t> marked(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
   template <class Visit>
@@ -82,6 +83,7 @@ class BondCriterion final : public BondFinder {
   PointFlux flux_;                      ///< what is sampled has this at its points; without data: it is sampled in full
   Field forces_;                        ///< that nobody reads
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
+  GroupMarks looked_at_;              ///< by group of eight points: those whose bonds are looked at, as bits
   GroupMarks own_, near_;             ///< what was sampled last: groups, and those of everything in their families
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;

@@ -254,7 +254,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     }
   }
   if (screened && highest > pass.screen->limit + pass.screen->density[p])
-    std::atomic_ref(pass.screen->near[p / padding]).store(1, std::memory_order_relaxed);
+    pass.screen->mark(p);
   if (work == PairWork::force && fails) {
     alignas(64) double lanes[pack_width];
     excess.store(lanes);

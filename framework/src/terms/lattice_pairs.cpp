@@ -127,7 +127,7 @@ std::array<Pack, 2> LatticePairs<D>::own_strains(std::int64_t p, std::int64_t q,
   return {Pack::load(of_own), Pack::load(of_far)};
 }
 
-/// Marks the chunk where a bond holds too much: its energy, over its share where that is asked for.
+/// Marks the points where a bond holds too much: its energy, over its share where that is asked for.
 template <int D>
 void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept {
   Pack highest[chunk_points / pack_width];
@@ -150,9 +150,9 @@ void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern
       highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value * per_share));
     }
   }
-  bool near = false;
-  for (int l = 0; l < chunk_points; ++l) near |= highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)];
-  if (near) pass.screen->near[static_cast<std::size_t>(p) / padding] = 1;
+  for (int l = 0; l < chunk_points; ++l)
+    if (highest[l / pack_width][l % pack_width] > pass.screen->limit + pass.screen->density[static_cast<std::size_t>(p + l)])
+      pass.screen->mark(static_cast<std::size_t>(p + l));
 }
 
 template <int D>

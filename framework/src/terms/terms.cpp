@@ -90,13 +90,20 @@ struct Terms::Assemblies {
 
 struct Terms::Failing {
   Fracture fracture;
-  Field force;  ///< work field
+  Field force;  ///< work field, 0 between its uses
 
   Fracture::Body body(Terms& terms);
-  FieldView cleared(ConstFieldView like, const Body& body) {
+  FieldView work(ConstFieldView like, const Body& body) {
     if (force.size() == 0) force = body.make_field(like.components);
-    clear(force.data(), force.size());
     return force;
+  }
+  /// to += factor times what a loop over evaluation points has left in the groups near them, where there are `to`; what it has left elsewhere is
+  /// the same before and after bonds have failed.
+  void take(const GroupMarks& near, double factor, FieldView to) {
+    for (std::size_t g = 0; g < near.size() && to.data; ++g)
+      for (int c = 0; c < force.components() && near[g]; ++c)
+        for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) to.component(c)[p] += factor * force.component(c)[p];
+    clear(force.data(), force.size());
   }
 };
 
@@ -188,7 +195,7 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
     if (energy) term->complete(only);
   if (2 * std::ranges::count(only, 1) * static_cast<std::ptrdiff_t>(padding) > std::ssize(body.internal())) return forces(u, force, energy);
   const GroupMarks near = families.around(only);
-  const FieldView own = failing_->cleared(force, body);
+  const FieldView own = failing_->work(force, body);
   ExactSum sum;
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
@@ -196,6 +203,7 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
   if (energy) *energy = total_over_ranks(sum);
   for (std::size_t g = 0; g < renewed.size(); ++g)
     for (int c = 0; c < force.components && renewed[g]; ++c) std::copy_n(own.component(c) + g * padding, padding, force.component(c) + g * padding);
+  failing_->take(near, 0, {});
   return status(bad);
 }
 
@@ -338,7 +346,7 @@ Fracture::Body Terms::Failing::body(Terms& terms) {
   const Families& families = *terms.parts_.families;
   const auto forces = [this, &terms, &families, last = GroupMarks(), near = GroupMarks()](
                           ConstFieldView at, const GroupMarks& marks, double factor, FieldView sum) mutable {
-    const FieldView own = cleared(at, families.body());
+    const FieldView own = work(at, families.body());
     ExactSum energy;
     if (marks != last) {
       last = marks;
@@ -346,18 +354,19 @@ Fracture::Body Terms::Failing::body(Terms& terms) {
     }
     std::int64_t bad = -1;
     for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, own, &energy));
-    if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
-    if (sum.data) combine(1, sum, factor, own, sum);
-    return total_over_ranks(energy);
+    const bool ok = communicator().largest(bad >= 0 ? 1 : 0) == 0;
+    take(near, factor, ok ? sum : FieldView{});
+    return ok ? total_over_ranks(energy) : std::numeric_limits<double>::quiet_NaN();
   };
   const Formulation& f = terms.parts_.formulation;
-  const bool owners_alone = !f.pairs && !(f.bond && f.far_share > 0);
+  const bool owners_alone = !f.dilatation && !(f.bond && f.far_share > 0);
   const auto energy = [this, &terms, &families](ConstFieldView at, const GroupMarks& marks) {
     const GroupMarks near = families.around(marks);
-    if (force.size() == 0) cleared(at, families.body());
+    const FieldView own = work(at, families.body());
     ExactSum sum;
     std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, force, &sum));
+    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, own, &sum));
+    take(near, 0, {});
     if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
     return total_over_ranks(sum);
   };

@@ -22,7 +22,7 @@ void ZeroEnergyPenalty::take(std::size_t p, double energy, const Wanted& wanted)
   if (!wanted.screen) return;
   const Families& families = parts_.families;
   const double left = families.body().volume(p) * (1 - families.damage(p));
-  if (energy > left * wanted.screen->density[p]) wanted.screen->near[p / padding] = 1;
+  if (energy > left * wanted.screen->density[p]) wanted.screen->mark(p);
 }
 
 std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samples) {
