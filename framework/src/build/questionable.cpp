@@ -99,7 +99,7 @@ std::array<double, 64> sampled(const InfluenceFunction& influence) {
 
 void find_no_neighbours(const Scene& scene, const Families& families, std::vector<std::string>& found) {
   const Body& body = families.body();
-  if (!families.needs().influence || !scene.body.lattice) return;
+  if (!families.needs().influence) return;
   const double r = std::min(1.0, body.spacing() / body.horizon());
   double omega = 0;
   families.influence()->evaluate({&r, 1}, {&omega, 1});
@@ -107,7 +107,7 @@ void find_no_neighbours(const Scene& scene, const Families& families, std::vecto
   if (omega >= 0.01 * largest) return;
   found.push_back(
       fmt::format("influence \"{}\" is {:.2g} of its largest value at the nearest neighbours, {:.4g} of the horizon away: "
-                  "families are almost empty; a larger horizon_ratio helps",
+                  "families are almost empty; a larger horizon helps",
                   scene.influence->type, omega / largest, r));
 }
 
