@@ -28,20 +28,33 @@ double power(double x, int n) {
   return value;
 }
 
-bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
-  const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
-  const auto terms = exponents(family.dimension, order);
-  const auto size = static_cast<Eigen::Index>(terms.size());
-  Eigen::MatrixXd q(size, static_cast<Eigen::Index>(bonds));
-  Eigen::VectorXd weight(static_cast<Eigen::Index>(bonds));
-  for (std::size_t k = 0; k < bonds; ++k) {
-    weight(static_cast<Eigen::Index>(k)) = family.omega[k] * family.volume[k];
-    for (std::size_t t = 0; t < terms.size(); ++t) {
-      double value = 1;
-      for (std::size_t c = 0; c < d; ++c) value *= power(family.xi[c][k] / horizon, terms[t][c]);
-      q(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(k)) = value;
+/// Monomials by bond, and the weights of bonds.
+struct Monomials {
+  Eigen::MatrixXd q;        ///< a row a monomial
+  Eigen::VectorXd weight;
+
+  Monomials(const FamilyArrays& family, double horizon, int order) {
+    const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
+    const auto terms = exponents(family.dimension, order);
+    q.resize(static_cast<Eigen::Index>(terms.size()), static_cast<Eigen::Index>(bonds));
+    weight.resize(static_cast<Eigen::Index>(bonds));
+    for (std::size_t k = 0; k < bonds; ++k) {
+      weight(static_cast<Eigen::Index>(k)) = family.omega[k] * family.volume[k];
+      for (std::size_t t = 0; t < terms.size(); ++t) {
+        double value = 1;
+        for (std::size_t c = 0; c < d; ++c) value *= power(family.xi[c][k] / horizon, terms[t][c]);
+        q(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(k)) = value;
+      }
     }
   }
+};
+
+bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
+  const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
+  const Monomials monomials(family, horizon, order);
+  const Eigen::MatrixXd& q = monomials.q;
+  const Eigen::VectorXd& weight = monomials.weight;
+  const Eigen::Index size = q.rows();
   const Eigen::MatrixXd M = q * weight.asDiagonal() * q.transpose();
   const SymmetricEigen eigen(static_cast<int>(size), M.data(), false);
   if (!(eigen.largest() > 0) || !(eigen.least() >= singular_ratio * eigen.largest())) return false;
@@ -69,6 +82,18 @@ int reproducing_kernel(const FamilyArrays& family, double horizon, int order, st
   for (; order > 0; --order)
     if (exactly(family, horizon, order, g)) return order;
   return 0;
+}
+
+void kernel_residuals(const FamilyArrays& family, double horizon, int order, std::span<const double> u, std::vector<double>& z) {
+  z.assign(u.begin(), u.end());
+  if (order < 1) return;
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Monomials monomials(family, horizon, order);
+  Eigen::Map<Rows> values(z.data(), family.bonds, static_cast<Eigen::Index>(z.size()) / family.bonds);
+  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
+  const Eigen::MatrixXd weighted = root.asDiagonal() * monomials.q.transpose();
+  const Eigen::MatrixXd coefficients = weighted.householderQr().solve(root.asDiagonal() * values);
+  values -= monomials.q.transpose() * coefficients;
 }
 
 }  // namespace perikit

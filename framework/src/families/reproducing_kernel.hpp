@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "families/family_arrays.hpp"
@@ -9,5 +10,8 @@ namespace perikit {
 ///   g_k = omega V_k (M^-1 q(xi_k))_linear / delta,  M = sum_k omega V_k q q^T,  q: monomials of xi/delta of degree 1 ... order.
 /// g[k * D + e]. Takes the highest order not above `order` that the family supports; returns it, 0 (and g = 0) for none.
 int reproducing_kernel(const FamilyArrays& family, double horizon, int order, std::vector<double>& g);
+/// What the polynomial of this order that fits values u of the bonds best, by weights omega V, leaves of them: z[k * components + c], as u has
+/// them. order: one that reproducing_kernel has returned for the family.
+void kernel_residuals(const FamilyArrays& family, double horizon, int order, std::span<const double> u, std::vector<double>& z);
 
 }  // namespace perikit

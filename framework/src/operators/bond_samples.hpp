@@ -15,7 +15,7 @@ enum class BondSampling { energy, stress, derivative };
 
 class BondSamples {
  public:
-  /// Of the directed bond from owner to far, or of the owner as a whole (far = -1).
+  /// Of the directed bond from owner to far, of the owner as a whole (far = -1), or of a part of its family.
   struct Entry {
     std::int32_t owner, far;
     double weight = 0;  ///< sum W_q [m^3]
@@ -25,6 +25,9 @@ class BondSamples {
     double pressure = 0;  ///< derivative, selective map: sum W_q p/3 (maps/selective_map.hpp)
     double growth = 0;    ///< likewise, a - 1 of the evaluation point
   };
+
+  /// What stands for the far end of the evaluation point of part k of the owner's family.
+  static constexpr std::int32_t part(int k) noexcept { return -2 - k; }
 
   BondSamples(Space space, BondSampling what) : space_(space), what_(what) {}
   BondSampling what() const noexcept { return what_; }

@@ -135,7 +135,7 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
       const int k = first + l - owners_, original = k < 0 || m.original.empty() ? k : m.original[static_cast<std::size_t>(k)];
       s.weight[l] = volume * stencil.share(first + l) * factor(p, original);
       s.number[l] = k < 0 ? -1 : number + 8 * original;
-      if (sample) s.far[l] = k < 0 || parts_ > 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
+      if (sample) s.far[l] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
     if (pass.work.balance() && alone)
@@ -212,7 +212,7 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
           s.owner[lane] = members[l];
           s.weight[lane] = lane_weight[l] * stencil.share(end->element[i]);
           s.number[lane] = k < 0 || !(here >> l & 1) ? -1 : number + 8 * k + l;
-          if (sample) s.far[lane] = k < 0 || parts_ > 0 ? -1 : members[l] + points.shift[k];
+          if (sample) s.far[lane] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : members[l] + points.shift[k];
         }
     }
     if (selective_ && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
@@ -278,7 +278,7 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
     if (bad >= 0) return s.owner[bad];
     pass.work.screen(members.data(), static_cast<int>(members.size()), 8 * n, s);
     if (sample) {
-      std::fill_n(s.far, 8 * n, -1);
+      for (int l = 0; l < 8 * n; ++l) s.far[l] = far_of_part(first + l / 8 - owners_, pass);
       pass.add_samples(8 * n, s);
     }
     if (alone) continue;

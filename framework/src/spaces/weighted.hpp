@@ -9,6 +9,7 @@
 #include "families/lattice_families.hpp"
 #include "spaces/local_stencil.hpp"
 #include "spaces/mirrored_stencil.hpp"
+#include "operators/bond_samples.hpp"
 #include "spaces/evaluation_space.hpp"
 #include "spaces/sparse_stencils.hpp"
 
@@ -115,6 +116,10 @@ class Weighted final : public EvaluationSpace {
   std::uint8_t lanes(const Group& g, const Pass& pass) const noexcept;
   /// W of an evaluation point of p with a share of 1.
   double weight(std::int32_t p) const noexcept;
+  /// The far end that samples of part k have: none, or the part by name where derivatives of each are asked for (BondSamples::part).
+  std::int32_t far_of_part(int k, const Pass& pass) const noexcept {
+    return k >= 0 && !rules_.at_points() && pass.bonds && pass.bonds->what() == BondSampling::derivative ? BondSamples::part(k) : -1;
+  }
   /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch. share: c of the
   /// selective map; 1 in groups, which points leave with the first bond that fails.
   void keep_owner_gradients(int points, double share, Memory& m, BatchScratch& s, bool tangent) const noexcept;

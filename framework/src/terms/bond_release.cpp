@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "families/lattice_families.hpp"
+#include "families/reproducing_kernel.hpp"
 #include "families/shape_tensor.hpp"
 #include "maps/selective_map.hpp"
 #include "perikit/core/dimension.hpp"
@@ -74,7 +75,7 @@ struct BondRelease::Memory {
   std::vector<double> xi, u, z;       ///< bond vectors, relative displacements, and what is not affine of them
   std::vector<double> g, gradient;    ///< corrections of the bonds, and the point gradient
   AlignedVector<double> correction, shares;
-  std::vector<double> weighted;
+  std::vector<double> weighted, shifted;
   double H[9];                        ///< [c * dimension + e]
   LocalStencil<1> line;
   LocalStencil<2> plane;
@@ -92,10 +93,11 @@ BondRelease::BondRelease(const ReleaseParts& parts)
       mirrored_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws) && parts.factors.empty()) {}
 BondRelease::~BondRelease() = default;
 
-const char* BondRelease::unknown(const Formulation& f, int dimension) {
+const char* BondRelease::unknown(const Formulation& f, int dimension, bool stabilized) {
   if (f.pairs) return "of pair laws";
-  if (f.weighted && f.parts(dimension) > 0) return "of gradients of parts of families";
-  if (f.order > 1) return "of gradients of orders above 1";
+  if (f.selective() && f.weighted && f.parts(dimension) > 0) return "of selective gradients of parts of families";
+  if (f.selective() && f.order > 1) return "of selective gradients of orders above 1";
+  if (stabilized && f.order > 1) return "of penalties over gradients of orders above 1";
   if (f.force_state == ForceState::local) return "of local force states";
   return nullptr;
 }
@@ -217,8 +219,10 @@ void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m)
       m.u[D * k + c] = component[m.family.far[k]] - component[p];
     }
   // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
-  point_gradient(m.family, parts_.families.body().horizon(), 1, m.gradient);
+  const double horizon = parts_.families.body().horizon();
+  const int order = point_gradient(m.family, horizon, parts_.formulation.order, m.gradient);
   sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
+  if (parts_.formulation.order > 1) return kernel_residuals(m.family, horizon, order, m.u, m.z);
   m.z = m.u;
   for (std::size_t k = 0; k < n; ++k) subtract<D>(m.H, &m.xi[D * k], &m.z[D * k]);
   if (!parts_.shift.data) return;
@@ -243,11 +247,11 @@ void BondRelease::find_onto(Owner& owner, const BondSamples& samples, Memory& m)
 
 template <int D>
 void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) const {
-  const auto p = static_cast<std::size_t>(owner.point);
-  const FamilyArrays& family = m.family;
   owner.released.assign(owner.far.size(), 0.0);
   double S[D * D] = {};  // dE/dH of the owner
-  if (parts_.formulation.weighted) {
+  if (parts_.formulation.weighted && parts_.formulation.parts(D) > 0) {
+    release_parts<D>(owner, samples, m);
+  } else if (parts_.formulation.weighted) {
     release_weighted<D>(owner, samples, m);
     release_shares<D>(owner, samples, m, S);
   } else if (parts_.formulation.bond) {
@@ -255,12 +259,49 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
     release_shares<D>(owner, samples, m, S);
   } else if (const BondSamples::Entry* const entry = samples.find(owner.point, -1)) {
     std::copy_n(entry->tensor, D * D, S);
-    const double left = (1 - parts_.families.damage(p)) * parts_.families.normaliser(p, BondWeight::kernel);
-    for (std::size_t k = 0; k < owner.far.size() && left > 0; ++k)
-      owner.released[k] += entry->energy * family.whole_omega(k) * family.volume[k] / left;
+    release_weight(owner, entry->energy, m);
   }
-  for (std::size_t k = 0; k < owner.far.size(); ++k) owner.released[k] += work<D>(S, &m.z[D * k], &m.gradient[D * k]) / family.b(k);
+  for (std::size_t k = 0; k < owner.far.size(); ++k) owner.released[k] += work<D>(S, &m.z[D * k], &m.gradient[D * k]) / m.family.b(k);
   if (parts_.stabilization) release_penalty<D>(owner, m);
+}
+
+void BondRelease::release_weight(Owner& owner, double stored, const Memory& m) const {
+  const auto p = static_cast<std::size_t>(owner.point);
+  const double left = (1 - parts_.families.damage(p)) * parts_.families.normaliser(p, BondWeight::kernel);
+  for (std::size_t k = 0; k < owner.far.size() && left > 0; ++k)
+    owner.released[k] += stored * m.family.whole_omega(k) * m.family.volume[k] / left;
+}
+
+/// The gradient of each part is the fit to its bonds; the shares of parts do not depend on b.
+template <int D>
+void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const std::size_t n = owner.far.size();
+  if (n == 0) return;
+  LocalStencil<D>& stencil = m.stencil<D>();
+  const StencilRules rules{&parts_.formulation, parts_.families.body().horizon()};
+  stencil.build(rules, m.family, nullptr, 0, nullptr);
+  stencil.expand(m.weighted);
+  const std::vector<double>* g = &m.weighted;
+  if (parts_.shift.data) {   // it moves the gradients, not what the fits leave
+    stencil.build({rules.formulation, rules.horizon, parts_.shift}, m.family, nullptr, 0, nullptr);
+    stencil.expand(m.shifted);
+    g = &m.shifted;
+  }
+  double stored = 0;
+  for (std::size_t q = 0; q < static_cast<std::size_t>(stencil.points()); ++q) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, BondSamples::part(static_cast<int>(q)));
+    if (!entry) continue;
+    stored += entry->energy;
+    double H[D * D];
+    sum_gradient<D>(n, m.u.data(), m.weighted.data() + q * n * D, H);
+    for (std::size_t k = 0; k < n; ++k) {
+      double z[D];
+      std::copy_n(&m.u[D * k], D, z);
+      subtract<D>(H, &m.xi[D * k], z);
+      owner.released[k] += work<D>(entry->tensor, z, g->data() + (q * n + k) * D) / m.family.b(k);
+    }
+  }
+  release_weight(owner, stored, m);
 }
 
 template <int D>

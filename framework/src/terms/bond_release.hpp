@@ -34,7 +34,7 @@ struct ReleaseParts {
 class BondRelease {
  public:
   /// Why it is not known of this formulation; null where it is.
-  static const char* unknown(const Formulation& formulation, int dimension);
+  static const char* unknown(const Formulation& formulation, int dimension, bool stabilized);
 
   explicit BondRelease(const ReleaseParts& parts);
   ~BondRelease();
@@ -83,6 +83,11 @@ class BondRelease {
   void release_corrections(Owner& owner, const BondSamples& samples, Memory& m) const;
   template <int D>
   void release_weighted(Owner& owner, const BondSamples& samples, Memory& m) const;
+  /// Of evaluation points at parts of the family.
+  template <int D>
+  void release_parts(Owner& owner, const BondSamples& samples, Memory& m) const;
+  /// What goes with the weight that is left to the owner's points, which hold so much [J].
+  void release_weight(Owner& owner, double stored, const Memory& m) const;
   template <int D>
   void release_penalty(Owner& owner, Memory& m) const;
   /// What the evaluation points of the bonds hold; of a selective map what they do to the owner's volume: see below.

@@ -44,7 +44,7 @@ ReleaseParts release_parts(const TermParts& parts) {
 /// What the criterion looks at with these kinematics.
 DamageTraits asked_of(const TermParts& parts) {
   DamageTraits traits = parts.damage->law->traits();
-  const bool known = BondRelease::unknown(parts.formulation, parts.families->body().dimension()) == nullptr;
+  const bool known = BondRelease::unknown(parts.formulation, parts.families->body().dimension(), parts.stabilization != nullptr) == nullptr;
   traits.released = traits.released && traits.energy && !traits.stress && known;
   return traits;
 }
@@ -54,7 +54,7 @@ void warn_of_cost(const TermParts& parts, ModelReport& report) {
   const Formulation& f = parts.formulation;
   const DamageTraits asked = asked_of(parts);
   if (!asked.energy || asked.released || f.pairs) return;
-  const char* const unknown = BondRelease::unknown(f, parts.families->body().dimension());
+  const char* const unknown = BondRelease::unknown(f, parts.families->body().dimension(), parts.stabilization != nullptr);
   report.warnings.push_back(fmt::format("a criterion by the energy that bonds hold, with gradients: a bond takes more than it holds, and cracks cost 1.4 to 5 "
                                         "times Gc and more; {}; what they cost is measured in fracture.md, \"What a crack costs\"",
                                         unknown ? fmt::format("what bonds set free is not known {}", unknown)
@@ -378,7 +378,7 @@ std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
 }
 
 std::vector<BondEnergy> Terms::released_energies(ConstFieldView u) {
-  if (const char* const reason = BondRelease::unknown(parts_.formulation, parts_.families->body().dimension()))
+  if (const char* const reason = BondRelease::unknown(parts_.formulation, parts_.families->body().dimension(), parts_.stabilization != nullptr))
     throw std::logic_error(fmt::format("what bonds set free is not known {}", reason));
   return BondCriterion(release_parts(parts_), {.energy = true, .released = true}, nullptr, terms_, parts_.skip).energies(u);
 }
