@@ -59,10 +59,8 @@ struct LatticeTiles {
       if (marks[chunks[c].first / chunk_points]) return true;
     return false;
   }
-  /// The group of its first chunk; of blocks without chunks 0.
-  std::size_t first_group(std::size_t b) const noexcept {
-    return blocks[b].chunk_begin == blocks[b].chunk_end ? 0 : static_cast<std::size_t>(chunks[blocks[b].chunk_begin].first / chunk_points);
-  }
+  /// The group of the first chunk of block b, which must have one.
+  std::size_t first_group(std::size_t b) const noexcept { return static_cast<std::size_t>(chunks[blocks[b].chunk_begin].first / chunk_points); }
   /// Marks all groups of blocks that have a marked one.
   void complete(GroupMarks& marks) const;
   /// Zero in the rows of block b; in the dead cells of all rows.

@@ -71,7 +71,7 @@ void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
     }
     n = 0;
   }
-  if (pass.energies) pass.energies[tiles_.first_group(b)] = energy;
+  if (pass.energies && block.chunk_begin < block.chunk_end) pass.energies[tiles_.first_group(b)] = energy;
 }
 
 /// Cells of a row in the memory of Q: with a gap before it and after it, zero, or Q of the chunks that families reach there.
@@ -161,7 +161,7 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
     }
   }
   s.keep_history = true;
-  if (pass.energies) pass.energies[tiles_.first_group(b)] = energy;
+  if (pass.energies && block.chunk_begin < block.chunk_end) pass.energies[tiles_.first_group(b)] = energy;
 }
 
 template <int D>

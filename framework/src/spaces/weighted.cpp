@@ -309,7 +309,7 @@ void Weighted<D>::block(std::size_t b, Pass& pass) {
     if (!pass.wanted(p)) continue;
     if (left(p, m, s, pass, &energy) >= 0) return pass.report(p);
   }
-  if (pass.energies) pass.energies[first_group(b)] = energy;
+  if (pass.energies && block_first_[b] < block_first_[b + 1]) pass.energies[first_group(b)] = energy;
 }
 
 template <int D>
