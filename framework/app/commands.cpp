@@ -13,6 +13,7 @@
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "new_project.hpp"
+#include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
@@ -124,10 +125,15 @@ void run(const Options& options) {
 void check(const Options& options) {
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
-  Simulation simulation(scene, *registry);
-  std::string summary = simulation.summary();   // which may still refuse
-  if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks);
-  if (options.explain) summary += simulation.explanation(*registry);
+  std::string summary;
+  if (options.ranks > 1 && !one_rank_holds(scene)) {
+    summary = predict_ranks(scene, *registry, options.ranks, true);
+  } else {
+    Simulation simulation(scene, *registry);
+    summary = simulation.summary();  // which may still refuse
+    if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks, false);
+    if (options.explain) summary += simulation.explanation(*registry);
+  }
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.
   std::istringstream lines(summary);

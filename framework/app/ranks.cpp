@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/serial_communicator.hpp"
 #include "perikit/run/simulation.hpp"
@@ -22,13 +23,15 @@ class LoneRank final : public SerialCommunicator {
   LoneRank(int rank, int size) : rank_(rank), size_(size) {}
   int rank() const noexcept override { return rank_; }
   int size() const noexcept override { return size_; }
+  bool complete() const noexcept override { return false; }
 
  private:
   int rank_, size_;
 };
 
 struct Share {
-  double points = 0, near = 0, ghosts = 0, bytes = 0;
+  double points = 0, near = 0, ghosts = 0, bytes = 0, of_all = 0;
+  bool placed_whole = false;
 };
 
 Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks) {
@@ -36,7 +39,12 @@ Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks
   const CommunicatorScope scope(alone);
   Simulation simulation(scene, registry);
   const Body& body = simulation.problem().body();
-  Share share{static_cast<double>(body.owned().size()), 0, 0, static_cast<double>(simulation.problem().bytes())};
+  Share share{static_cast<double>(body.owned().size()),
+              0,
+              0,
+              static_cast<double>(simulation.problem().bytes()),
+              static_cast<double>(body.points_of_all_ranks()),
+              !simulation.problem().placed_whole().empty()};
   share.ghosts = static_cast<double>(body.points()) - share.points;
   const std::size_t materials = scene.regions.size() + 1;  // far points have one more
   for (const std::int32_t p : body.internal())
@@ -69,27 +77,40 @@ std::string crowded(int threads) {
       threads, cores, cores == 1 ? "" : "s", cores, threads);
 }
 
-std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks) {
+std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks, bool heaviest_alone) {
   Scene alone = scene;
   alone.consistent = false;  // weights are found by all ranks together; they take 8 bytes a bond
   std::vector<Share> shares;
-  for (int rank = 0; rank < ranks; ++rank) shares.push_back(share_of(alone, registry, rank, ranks));
+  if (heaviest_alone)
+    shares.push_back(share_of(alone, registry, heaviest_rank(scene, ranks), ranks));
+  else
+    for (int rank = 0; rank < ranks; ++rank) shares.push_back(share_of(alone, registry, rank, ranks));
   const auto most = [&](auto&& value) { return std::ranges::max(shares, {}, value); };
-  double points = 0, exchanged = 0;
-  for (const Share& share : shares) points += share.points, exchanged += share.ghosts;
-  const double mean = points / ranks;
+  double exchanged = 0;
+  for (const Share& share : shares) exchanged += share.ghosts;
+  const double points = shares.front().of_all, mean = points / ranks;
   const Share largest = most(&Share::points), deepest = most(&Share::ghosts), heaviest = most(&Share::bytes),
               busiest = most([](const Share&share) { return share.points + share.near; });
-  return fmt::format(
-      "ranks         {}\n"
-      "balance       {:.0f} points on the largest rank, {:.3f} of the mean\n"
-      "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
-      "exchange      at most {:.3g} MB a rank and step, {:.3g} MB by all\n"
-      "work          {:.0f} points evaluated on the busiest rank: {:.2f} of the speed of {} ranks without ghosts, at best\n"
-      "memory        at most {:.3g} MB a rank of its part, and about {:.3g} MB of where all points are\n",
-      ranks, largest.points, largest.points / mean, deepest.ghosts, deepest.ghosts / mean,
-      8e-6 * scene.body.dimension * deepest.ghosts, 8e-6 * scene.body.dimension * exchanged, busiest.points + busiest.near,
-      mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, 30e-6 * points);
+  const std::string by_all =
+      heaviest_alone ? std::string() : fmt::format(", {:.3g} MB by all", 8e-6 * scene.body.dimension * exchanged);
+  const std::string whole =
+      largest.placed_whole ? fmt::format(", and about {:.3g} MB of where all points are", 30e-6 * points) : std::string();
+  const std::string parts = heaviest_alone ? fmt::format(
+                                                 "points        {:.0f}, more than one rank here can hold; each rank places its "
+                                                 "own part, of which the largest was set up\n",
+                                                 points)
+                                           : std::string();
+  return parts + fmt::format(
+                     "ranks         {}\n"
+                     "balance       {:.0f} points on the largest rank, {:.3f} of the mean\n"
+                     "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
+                     "exchange      at most {:.3g} MB a rank and step{}\n"
+                     "work          {:.0f} points evaluated on the busiest rank: {:.2f} of the speed of {} ranks without ghosts, "
+                     "at best\n"
+                     "memory        at most {:.3g} MB a rank of its part{}\n",
+                     ranks, largest.points, largest.points / mean, deepest.ghosts, deepest.ghosts / mean,
+                     8e-6 * scene.body.dimension * deepest.ghosts, by_all, busiest.points + busiest.near,
+                     mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, whole);
 }
 
 }  // namespace perikit::app

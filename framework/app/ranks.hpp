@@ -15,7 +15,7 @@ int cores_of_rank();
 std::string crowded(int threads);
 
 /// What each of so many ranks would hold and exchange, found by setting up one after the other, in lines. Throws InputError for
-/// what they would refuse.
-std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks);
+/// what they would refuse. heaviest_alone: of the one that has most, where the whole body is too much for one process.
+std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks, bool heaviest_alone);
 
 }  // namespace perikit::app

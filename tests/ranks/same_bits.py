@@ -187,6 +187,44 @@ def cases(everything):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
+    for name, text in itertools.chain(own_parts(everything), long_interfaces(everything)):
+        yield name, text, (2, 3, 4) if everything else (2, 4), threads
+
+
+OWN_PART = "own part, "
+CRACK_IN_SPACE = "[[crack]]\npolygon = [[5.0, 3.0, 2.0], [9.0, 3.5, 2.0], [9.0, 9.0, 8.0], [5.0, 8.5, 8.0]]\n"
+REGIONS = ('[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = 1.7, bulk_modulus = 3.0 }\n'
+           '[[region]]\nset = "other"\nmaterial = { type = "saint_venant_kirchhoff", density = 2.0, youngs_modulus = 5.0, poisson_ratio = 0.2 }\n')
+
+
+def with_regions(text, some, other):
+    """Three laws, which meet; the last region has what both name."""
+    return text.replace("[sets]\n", '[sets]\nsome = "%s"\nother = "%s"\n' % (some, other)) + REGIONS
+
+
+def own_parts(everything):
+    """Lattices of which each rank places its own part: with holes, regions, pre-cracks, failing bonds, and sets of single points."""
+    hole = {2: "(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6", 3: "(x - 7)^2 + (y - 6)^2 + (z - 2)^2 > 8 && x + z > 2"}
+    regions = {2: ("x > 11 && y > 7 && x < 21", "x - y > 17"), 3: ("(x - 8)^2 + (y - 6)^2 + (z - 6)^2 < 14", "x - y > 8")}
+    crack = {2: CRACK, 3: CRACK_IN_SPACE}
+    names = ("conventional", "wan", "baqp", "sub_horizon", "projection", "bond_based", "ordinary", "bond_associated") if everything else ("baqp", "ordinary")
+    for name, dimension in itertools.product(names, (2, 3)):
+        kind = OWN_PART + "%s, %dD, " % (name, dimension)
+        text = scene(KINEMATICS[name], dimension, False, 'type = "verlet"\nend_time = 2.0\ntime_step = 0.05')
+        holed = text.replace("[sets]", 'inside = "%s"\n[sets]\nlisted = { points = [70, 3, 500, 41] }' % hole[dimension])
+        holed = holed.replace("history = [", 'history = [ { name = "few", set = "listed", quantity = "displacement", component = "x", reduce = "sum" },')
+        if everything or name == "baqp":
+            yield kind + "hole", holed
+            yield kind + "hole, regions and pre-crack", with_regions(holed, *regions[dimension]) + crack[dimension]
+        pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
+        yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
+
+
+def long_interfaces(everything):
+    """Surfaces between laws that no rank sees all of."""
+    for name in ("conventional", "projection", "ordinary", "sub_horizon") if everything else ("projection",):
+        text = scene(KINEMATICS[name], 2, False, 'type = "verlet"\nend_time = 0.5\ntime_step = 0.05', cells=[430, 18])
+        yield OWN_PART + "%s, long interfaces" % name, with_regions(text, "y > 9 + 4*sin(x/13)", "(x - 215)^2 + (y - 9)^2 < 50")
 
 
 def carried(program, work, everything):
@@ -263,6 +301,8 @@ def main():
             several = "%s/%d_several" % (work, number)
             done = run(program, text, several, r, t)
             found = [done.stderr.strip()] if done.returncode != 0 else differences(one, several)
+            if done.returncode == 0 and name.startswith(OWN_PART) and "its own part" not in "".join(log_lines(several, "placed")):
+                found.append("ranks have placed the whole body")
             count += 1
             if found:
                 failed.append(name)

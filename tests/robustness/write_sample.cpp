@@ -12,7 +12,7 @@ int main(int count, char** arguments) try {
     const int p = static_cast<int>(id);
     return {{p % 4 * 1.0, p / 4 % 3 * 1.0, p / 12 * 1.0}, 1.0, p / 12};
   };
-  reference.sets["left"] = {0, 4, 8};
+  reference.sets.insert({"left", {0, 4, 8}});
   perikit::FrameWriter writer(arguments[1], reference, {"0.1.0", "sample <\"&\"> ü", std::string(100'000, '#')});
   for (int k = 0; k < 3; ++k) {
     std::vector<perikit::OutputField> fields{{"displacement", 3, {}}, {"cauchy", 9, {}}, {"damage", 1, {}}};

@@ -30,8 +30,8 @@ ReferenceData reference() {
     const auto x = static_cast<double>(p);
     return {{x, 2 * x, 3 * x}, 0.5, p < 2 ? 0 : 1};
   };
-  data.sets["left"] = {0, 2};
-  data.sets["nothing"] = {};
+  data.sets.insert({"left", {0, 2}});
+  data.sets.insert({"nothing", ReferenceData::Set(std::vector<std::int64_t>())});
   return data;
 }
 

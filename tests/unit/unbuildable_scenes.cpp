@@ -72,7 +72,7 @@ const Fault faults[]{
     {"body.lattice", "inside", "\"x < 0\"", "", 0, "body.lattice.inside", "keeps no point", "true at one point or more"},
     {"body.lattice", "inside", "\"log(-x)\"", "", 0, "body.lattice.inside", "nan at x = (0.5, 0.5, 0)", "finite values"},
     {"body.lattice", "upper", "[6, 0.4]", "", 6, "body.lattice.spacing", "about 0 points", "1 to"},
-    {"body.lattice", "spacing", "0.00002", "", 0, "body.lattice.spacing", "points", "1 to 2e+09 points"},
+    {"body.lattice", "spacing", "0.00002", "", 2, "body.lattice", "found about 6e+10 points", "at most 2e+09 on a rank"},
     {"family", "horizon_ratio", "1e30", "", 2, "family", "found a horizon of 1e+30 spacings", "at most 1e+07"},
     {"family", "horizon_ratio", "2e3", "", 2, "family", "found a horizon of 2000 spacings", "at most 1e+07"},
     {"integrator", "end_time", "1e300", "", 0, "integrator.end_time", "found 1e+300 s", "at most 1e+15 steps"},

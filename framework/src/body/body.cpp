@@ -28,9 +28,9 @@ Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
       points_of_all_ranks_(whole.points_of_all_ranks_),
       stride_of_whole_(whole.stride_),
       colours_(part.colours) {
-  const auto role = [&](std::int32_t number) { return part.roles[static_cast<std::size_t>(number)]; };
+  const auto role = [&](std::int64_t number) { return part.roles[static_cast<std::size_t>(number)]; };
   for (std::size_t n = 0; n < whole.points(); ++n)
-    if (part.roles[n] != Role::absent) numbers_.push_back(static_cast<std::int32_t>(n));
+    if (part.roles[n] != Role::absent) numbers_.push_back(static_cast<std::int64_t>(n));
   internal_.resize(numbers_.size());
   std::vector<std::int32_t> place(whole.stride_, -1);  // by internal index of the whole body: those that keep their material
   if (whole.lattice_) {
@@ -56,19 +56,80 @@ Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
     }
     number_cloud();
   }
-  places_.assign(stride_, 0);
-  own_.assign(stride_, 0);
-  for (std::size_t n = 0; n < numbers_.size(); ++n) {
-    const auto p = static_cast<std::size_t>(internal_[n]);
-    places_[p] = whole.internal_[static_cast<std::size_t>(numbers_[n])];
-    own_[p] = role(numbers_[n]) == Role::own;
-    if (role(numbers_[n]) >= Role::image) complete_.push_back(internal_[n]);
-    if (role(numbers_[n]) >= Role::near) place[static_cast<std::size_t>(places_[p])] = internal_[n];
+  whole_lattice_ = whole.lattice_;
+  std::vector<std::int64_t> places;
+  std::vector<Role> roles;
+  for (const std::int64_t number : numbers_) {
+    places.push_back(whole.internal_[static_cast<std::size_t>(number)]);
+    roles.push_back(role(number));
   }
+  keep_places(places, roles);
+  for (std::size_t n = 0; n < numbers_.size(); ++n)
+    if (roles[n] >= Role::near) place[static_cast<std::size_t>(places[n])] = internal_[n];
   copy_sets(whole, place, far_material);
   const auto foreign = [&](std::int32_t p) { return !own_[static_cast<std::size_t>(p)]; };
   std::erase_if(owned_, foreign);
   for (auto& [name, members] : sets_) std::erase_if(members, foreign);
+  for (const auto& [name, members] : whole.sets_) {
+    std::vector<std::int64_t> order;
+    for (const std::int32_t p : members) order.push_back(whole.input_of(static_cast<std::size_t>(p)));
+    if (!std::ranges::is_sorted(order)) orders_[name] = std::move(order);
+  }
+}
+
+Body::Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_t far_material)
+    : frame_(std::move(frame)),
+      points_of_all_ranks_(static_cast<std::size_t>(part.points_of_all_ranks)),
+      numbers_(std::move(part.numbers)),
+      stride_of_whole_(static_cast<std::size_t>(whole.cells)),
+      whole_lattice_(whole) {
+  const Lattice lattice = box_of(whole, part.first, part.last, frame_.horizon);
+  internal_.reserve(part.places.size());
+  for (const std::int64_t place : part.places) {
+    const auto k = whole.cell(place);
+    internal_.push_back(
+        static_cast<std::int32_t>(lattice.index(k[0] - part.first[0], k[1] - part.first[1], k[2] - part.first[2])));
+  }
+  number_lattice(lattice, std::pow(frame_.spacing, dimension()) * frame_.section);
+  keep_places(part.places, part.roles);
+  material_ids_.assign(stride_, 0);
+  for (std::size_t n = 0; n < internal_.size(); ++n) {
+    if (part.roles[n] == Role::own) owned_.push_back(internal_[n]);
+    if (part.roles[n] == Role::far) material_ids_[static_cast<std::size_t>(internal_[n])] = far_material;
+  }
+}
+
+/// Of a part, by its own input numbers: where its points lie in the whole body, and what they are to the rank.
+void Body::keep_places(const std::vector<std::int64_t>& places, const std::vector<Role>& roles) {
+  places_.assign(stride_, 0);
+  own_.assign(stride_, 0);
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    const auto p = static_cast<std::size_t>(internal_[n]);
+    places_[p] = places[n];
+    own_[p] = roles[n] == Role::own;
+    if (roles[n] >= Role::image) complete_.push_back(internal_[n]);
+  }
+}
+
+std::int32_t Body::at_place(std::int64_t place) const noexcept {
+  if (!lattice_) {  // points keep their order
+    const auto end = places_.begin() + static_cast<std::ptrdiff_t>(points());
+    const auto found = std::lower_bound(places_.begin(), end, place);
+    return found != end && *found == place ? static_cast<std::int32_t>(found - places_.begin()) : -1;
+  }
+  std::array<std::int64_t, 3> k = whole_lattice_->cell(place);
+  for (std::size_t a = 0; a < 3; ++a) {
+    k[a] -= lattice_->first[a];
+    if (k[a] < 0 || k[a] >= lattice_->extent[a]) return -1;
+  }
+  const std::int64_t index = lattice_->index(k[0], k[1], k[2]);
+  return alive(static_cast<std::size_t>(index)) ? static_cast<std::int32_t>(index) : -1;
+}
+
+std::int32_t Body::find(std::int64_t number) const noexcept {
+  if (numbers_.empty()) return number >= 0 && number < std::ssize(internal_) ? internal_[static_cast<std::size_t>(number)] : -1;
+  const auto found = std::ranges::lower_bound(numbers_, number);
+  return found != numbers_.end() && *found == number ? internal_[static_cast<std::size_t>(found - numbers_.begin())] : -1;
 }
 
 Body::Body(const Body& whole, const Images& images, std::uint16_t image_material)
@@ -196,8 +257,9 @@ bool Body::cut(const Point& a, const Point& b) const noexcept {
 }
 
 std::size_t Body::bytes() const noexcept {
-  return (internal_.size() + input_.size() + places_.size() + numbers_.size() + complete_.size()) * sizeof(std::int32_t) + own_.size() +
-         positions_.size() * sizeof(double) + alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
+  return (internal_.size() + input_.size() + complete_.size() + owned_.size()) * sizeof(std::int32_t) +
+         (places_.size() + numbers_.size()) * sizeof(std::int64_t) + own_.size() + positions_.size() * sizeof(double) +
+         alive_.size() + material_ids_.size() * sizeof(std::uint16_t);
 }
 
 }  // namespace perikit

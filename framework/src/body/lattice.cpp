@@ -14,8 +14,7 @@ std::array<std::int64_t, 3> Lattice::cell(std::int64_t index) const noexcept {
   return {rest - row * pitch[0], pitch[1] > 0 ? row % pitch[1] : row, pitch[1] > 0 ? row / pitch[1] : 0};
 }
 
-std::array<double, 3> Lattice::position(std::int64_t index) const noexcept {
-  const auto k = cell(index);
+std::array<double, 3> Lattice::centre(const std::array<std::int64_t, 3>& k) const noexcept {
   std::array<double, 3> x{};
   for (int a = 0; a < dimension; ++a) {
     x[static_cast<std::size_t>(axis[a])] =

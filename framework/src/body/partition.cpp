@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "body/cell_mask.hpp"
+#include "body/lattice_shares.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -21,108 +22,82 @@ using Cells = std::array<std::int64_t, 3>;
 /// Sizes of the blocks of points that loops over clouds run over; the first is a multiple of the others.
 constexpr std::size_t cloud_blocks[] = {256, 64};
 
-/// Ranks first ... first + ranks - 1 get the tiles low ... high - 1: cut across the longest side, near where the points divide as
-/// the ranks.
-class Bisection {
- public:
-  Bisection(const LatticeTiling& tiling, const std::vector<std::int64_t>& points)
-      : tiling_(tiling), points_(points), rank_(points.size(), 0) {}
+}  // namespace
 
-  void share(Cells low, Cells high, int first, int ranks) {
-    if (ranks == 1) return each(low, high, [&](std::size_t tile) { rank_[tile] = first; });
-    std::size_t axis = 3;
-    std::int64_t longest = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::int64_t length = (high[a] - low[a]) * tiling_.size[a] * (a == 0 ? static_cast<std::int64_t>(padding) : 1);
-      if (high[a] - low[a] > 1 && length > longest) axis = a, longest = length;
-    }
-    if (axis == 3) return;  // one tile for several ranks: one of them is left without points
-    const int lower = ranks / 2;
-    const double wanted = static_cast<double>(count(low, high)) * lower / ranks;
-    std::int64_t cut = low[axis] + 1;
-    double nearest = -1;
-    for (std::int64_t k = low[axis] + 1; k < high[axis]; ++k) {
-      Cells end = high;
-      end[axis] = k;
-      const double off = std::abs(static_cast<double>(count(low, end)) - wanted);
-      if (nearest < 0 || off < nearest) cut = k, nearest = off;
-    }
-    Cells middle_high = high, middle_low = low;
-    middle_high[axis] = middle_low[axis] = cut;
-    share(low, middle_high, first, lower);
-    share(middle_low, high, first + lower, ranks - lower);
-  }
-  int rank(std::size_t tile) const noexcept { return rank_[tile]; }
+namespace {
 
- private:
-  template <class Use>
-  void each(const Cells& low, const Cells& high, Use&& use) const {
-    for (std::int64_t c = low[2]; c < high[2]; ++c)
-      for (std::int64_t b = low[1]; b < high[1]; ++b)
-        for (std::int64_t a = low[0]; a < high[0]; ++a) use(static_cast<std::size_t>(tiling_.number({a, b, c})));
-  }
-  std::int64_t count(const Cells& low, const Cells& high) const {
-    std::int64_t sum = 0;
-    each(low, high, [&](std::size_t tile) { sum += points_[tile]; });
-    return sum;
-  }
-
-  const LatticeTiling& tiling_;
-  const std::vector<std::int64_t>& points_;
-  std::vector<int> rank_;
-};
+std::size_t count_of_ranks() {
+  const int size = communicator().size();
+  constexpr int most = std::numeric_limits<std::uint16_t>::max();
+  if (size > most) throw std::domain_error(fmt::format("found {} ranks; allowed: {} of them", size, most));
+  return static_cast<std::size_t>(size);
+}
 
 }  // namespace
 
 Partition::Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources)
-    : whole_(std::move(whole)), sources_(std::move(sources)), owner_(whole_.points(), 0) {
-  const int size = communicator().size();
-  if (size > std::numeric_limits<std::uint16_t>::max()) throw std::domain_error(fmt::format("found {} ranks; allowed: {} of them", size, std::numeric_limits<std::uint16_t>::max()));
-  whole_.lattice() ? share_lattice(size) : share_cloud(size);
-  points_.assign(static_cast<std::size_t>(size), 0);
-  const std::size_t real = whole_.points_of_all_ranks();
+    : whole_(std::move(whole)),
+      sources_(std::move(sources)),
+      images_(sources_.size()),
+      owner_(whole_->points(), 0),
+      points_(count_of_ranks(), 0) {
+  const auto size = static_cast<int>(points_.size());
+  whole_->lattice() ? share_lattice(size) : share_cloud(size);
+  const std::size_t real = whole_->points_of_all_ranks();
   for (std::size_t n = 0; n < real; ++n) ++points_[static_cast<std::size_t>(owner_[n])];
-  if (std::ranges::find(points_, 0) != points_.end())
-    throw std::domain_error(
-        fmt::format("found {} ranks for a body of {} points, which is shared out in blocks of points that are "
-                    "evaluated together; allowed: fewer ranks, and threads on each (--threads)",
-                    size, real));
-  part_.roles.assign(whole_.points(), Role::absent);
+  refuse_idle(real);
+  part_.roles.assign(whole_->points(), Role::absent);
   for (std::size_t n = 0; n < owner_.size(); ++n)
     if (owner_[n] == communicator().rank()) part_.roles[n] = Role::own;
   choose_images();
-  whole_.lattice() ? keep_cells(reach) : keep_families(reach);
-  exchange_borders();
+  whole_->lattice() ? keep_cells(reach) : keep_families(reach);
+}
+
+void Partition::refuse_idle(std::size_t real) const {
+  if (std::ranges::find(points_, 0) == points_.end()) return;
+  throw std::domain_error(
+      fmt::format("found {} ranks for a body of {} points, which is shared out in blocks of points that are "
+                  "evaluated together; allowed: fewer ranks, and threads on each (--threads)",
+                  points_.size(), real));
 }
 
 Body Partition::make_part(std::uint16_t far_material) {
-  const BodyPart part = std::move(part_);
-  return Body(whole_, part, far_material);
+  if (whole_) {
+    const BodyPart part = std::move(part_);
+    Body body(*whole_, part, far_material);
+    exchange_borders(body);
+    owner_ = {};
+    return body;
+  }
+  Body body(std::move(frame_), lattice_, std::move(lattice_part_), far_material);
+  exchange_borders(body);
+  exchange_numbers(body);
+  owner_ = {};
+  return body;
 }
 
 void Partition::share_lattice(int size) {
-  const Lattice& lattice = *whole_.lattice();
+  const Lattice& lattice = *whole_->lattice();
   const LatticeTiling tiling(lattice);
-  const auto tile = [&](std::int32_t p) { return static_cast<std::size_t>(tiling.number(tiling.of(lattice.cell(p)))); };
   std::vector<std::int64_t> points(static_cast<std::size_t>(tiling.tiles()), 0);
-  for (const std::int32_t p : whole_.owned()) ++points[tile(p)];
-  Bisection bisection(tiling, points);
-  bisection.share({}, tiling.count, 0, size);
-  for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = static_cast<std::uint16_t>(bisection.rank(tile(whole_.internal()[n])));
+  for (const std::int32_t p : whole_->owned()) ++points[static_cast<std::size_t>(tiling.number(tiling.of(lattice.cell(p))))];
+  const LatticeShares shares(lattice, std::move(points), size);
+  for (std::size_t n = 0; n < owner_.size(); ++n)
+    owner_[n] = static_cast<std::uint16_t>(shares.owner(lattice.cell(whole_->internal()[n])));
 }
 
 /// Pieces of the curve that orders the points.
 void Partition::share_cloud(int size) {
-  const std::size_t block = cloud_blocks[0], blocks = (whole_.points() + block - 1) / block;
+  const std::size_t block = cloud_blocks[0], blocks = (whole_->points() + block - 1) / block;
   for (std::size_t n = 0; n < owner_.size(); ++n) {
-    const std::size_t b = static_cast<std::size_t>(whole_.internal()[n]) / block;
+    const std::size_t b = static_cast<std::size_t>(whole_->internal()[n]) / block;
     owner_[n] = static_cast<std::uint16_t>(b * static_cast<std::size_t>(size) / blocks);
   }
 }
 
 template <class Visit>
 void Partition::over_images(Visit&& visit) const {
-  const std::size_t real = whole_.points() - sources_.size();
+  const std::size_t real = whole_->points() - sources_.size();
   for (std::size_t k = 0; k < sources_.size(); ++k) visit(real + k, static_cast<std::size_t>(sources_[k]));
 }
 
@@ -135,10 +110,10 @@ void Partition::choose_images() {
 
 /// Cells within reach of the box of the owned ones and of the images of these.
 void Partition::keep_cells(const Reach& reach) {
-  const Lattice& lattice = *whole_.lattice();
+  const Lattice& lattice = *whole_->lattice();
   const LatticeTiling tiling(lattice);
   const auto group = static_cast<std::int64_t>(padding);
-  const auto cell = [&](std::size_t n) { return lattice.cell(whole_.internal()[n]); };
+  const auto cell = [&](std::size_t n) { return lattice.cell(whole_->internal()[n]); };
   CellMask mask(lattice.extent);
   Cells low = lattice.extent, high{};
   for (std::size_t n = 0; n < owner_.size(); ++n) {
@@ -149,7 +124,7 @@ void Partition::keep_cells(const Reach& reach) {
   mask.add(low, high);
   for (std::size_t n = 0; n < owner_.size(); ++n)
     if (part_.roles[n] == Role::image) mask.add(cell(n));
-  const auto bond = static_cast<std::int64_t>(std::floor(whole_.horizon() / lattice.spacing * (1 + 1e-10)));
+  const auto bond = static_cast<std::int64_t>(std::floor(whole_->horizon() / lattice.spacing * (1 + 1e-10)));
   const auto grow = [&](std::int64_t by) {
     for (std::size_t a = 0; a < static_cast<std::size_t>(lattice.dimension); ++a) mask.grow(a, by);
   };
@@ -178,9 +153,9 @@ void Partition::keep_cells(const Reach& reach) {
 
 /// Points that bonds lead to, in whole blocks.
 void Partition::keep_families(const Reach& reach) {
-  const std::size_t points = whole_.points();
+  const std::size_t points = whole_->points();
   std::vector<std::uint8_t> reached(points, 0);  // by internal index
-  const auto at = [&](std::size_t n) -> std::uint8_t& { return reached[static_cast<std::size_t>(whole_.internal()[n])]; };
+  const auto at = [&](std::size_t n) -> std::uint8_t& { return reached[static_cast<std::size_t>(whole_->internal()[n])]; };
   const auto mark = [&](Role role) {
     for (std::size_t n = 0; n < points; ++n)
       if (at(n)) part_.roles[n] = std::max(part_.roles[n], role);
@@ -193,7 +168,7 @@ void Partition::keep_families(const Reach& reach) {
     }
   };
   const auto step = [&] {
-    reached = with_families(whole_.rows(), points, whole_.dimension(), whole_.horizon(), std::move(reached));
+    reached = with_families(whole_->rows(), points, whole_->dimension(), whole_->horizon(), std::move(reached));
   };
   for (std::size_t n = 0; n < points; ++n) at(n) = part_.roles[n] >= Role::image;
   for (int k = 1; k < reach.bonds; ++k) step();
@@ -217,39 +192,59 @@ void Partition::keep_families(const Reach& reach) {
   } while (more);
   mark(Role::far);
   for (const std::size_t block : cloud_blocks) {
-    const auto touches = block_reach(whole_, block);
+    const auto touches = block_reach(*whole_, block);
     const std::vector<std::int32_t> colours = block_colours(touches, touches.size());
     for (std::size_t b = 0; b < colours.size(); ++b)
       if (reached[b * block]) part_.colours[block].push_back(colours[b]);
   }
 }
 
-/// Each rank tells the owners of its ghosts which they are.
-void Partition::exchange_borders() {
+/// Each rank tells the owners of its ghosts which they are, by their places in the whole body.
+void Partition::exchange_borders(const Body& part) {
   const auto size = points_.size();
+  const auto me = static_cast<std::size_t>(communicator().rank());
   lent_.resize(size);
   borrowed_.resize(size);
-  for (std::size_t n = 0; n < owner_.size(); ++n)
-    if (part_.roles[n] != Role::absent && part_.roles[n] != Role::own)
-      borrowed_[static_cast<std::size_t>(owner_[n])].push_back(static_cast<std::int32_t>(n));
   std::vector<std::vector<double>> to(size), from(size);
-  std::vector<double> asked(size), wanted(size);
-  const auto exchange = [&](auto&& outgoing, auto&& incoming) {
-    std::vector<Message> messages;
-    for (std::size_t k = 0; k < size; ++k)
-      if (static_cast<int>(k) != communicator().rank()) messages.push_back({static_cast<int>(k), outgoing(k), incoming(k)});
-    communicator().exchange(messages);
-  };
-  for (std::size_t k = 0; k < size; ++k) {
-    to[k].assign(borrowed_[k].begin(), borrowed_[k].end());
-    asked[k] = static_cast<double>(to[k].size());
+  for (std::size_t n = 0; n < part.points(); ++n) {
+    const std::int32_t p = part.internal()[n];
+    const auto number = static_cast<std::size_t>(part.number(static_cast<std::size_t>(p)));
+    const std::size_t owner = owner_[whole_ ? number : n];
+    if (owner == me) continue;
+    borrowed_[owner].push_back(p);
+    to[owner].push_back(static_cast<double>(part.places().place[static_cast<std::size_t>(p)]));
   }
-  exchange([&](std::size_t k) { return std::span<const double>(&asked[k], 1); },
-           [&](std::size_t k) { return std::span(&wanted[k], 1); });
-  for (std::size_t k = 0; k < size; ++k) from[k].resize(static_cast<std::size_t>(wanted[k]));
-  exchange([&](std::size_t k) { return std::span<const double>(to[k]); }, [&](std::size_t k) { return std::span(from[k]); });
+  std::vector<double> asked(size), wanted(size);
+  for (std::size_t k = 0; k < size; ++k) asked[k] = static_cast<double>(to[k].size());
+  std::vector<Message> messages;
   for (std::size_t k = 0; k < size; ++k)
-    for (const double number : from[k]) lent_[k].push_back(static_cast<std::int32_t>(number));
+    if (k != me) messages.push_back({static_cast<int>(k), {&asked[k], 1}, {&wanted[k], 1}});
+  communicator().exchange(messages);
+  messages.clear();
+  for (std::size_t k = 0; k < size; ++k) {
+    from[k].resize(static_cast<std::size_t>(wanted[k]));
+    if (!to[k].empty() || !from[k].empty()) messages.push_back({static_cast<int>(k), to[k], from[k]});
+  }
+  communicator().exchange(messages);
+  for (std::size_t k = 0; k < size; ++k)
+    for (const double place : from[k]) lent_[k].push_back(part.at_place(static_cast<std::int64_t>(place)));
+}
+
+/// Owners know the input numbers of their points.
+void Partition::exchange_numbers(Body& part) const {
+  if (!communicator().complete()) return;
+  const auto size = points_.size();
+  std::vector<std::vector<double>> to(size), from(size);
+  std::vector<Message> messages;
+  for (std::size_t k = 0; k < size; ++k) {
+    for (const std::int32_t p : lent_[k]) to[k].push_back(static_cast<double>(part.number(static_cast<std::size_t>(p))));
+    from[k].resize(borrowed_[k].size());
+    if (!to[k].empty() || !from[k].empty()) messages.push_back({static_cast<int>(k), to[k], from[k]});
+  }
+  communicator().exchange(messages);
+  for (std::size_t k = 0; k < size; ++k)
+    for (std::size_t n = 0; n < from[k].size(); ++n)
+      part.set_number(static_cast<std::size_t>(borrowed_[k][n]), static_cast<std::int64_t>(from[k][n]));
 }
 
 }  // namespace perikit

@@ -9,6 +9,7 @@
 #include "body/positions_file.hpp"
 #include "build/held_surfaces.hpp"
 #include "build/partial_cells.hpp"
+#include "build/scene_lattice.hpp"
 #include "build/sets.hpp"
 #include "build/size_check.hpp"
 #include "build/volumes.hpp"
@@ -27,16 +28,6 @@ void check_cloud(const Scene& scene, std::size_t points, double ratio) {
   check_index(scene, static_cast<double>(points));
   check_horizon(scene, ratio);
   check_memory(scene, static_cast<double>(points), ratio, true);
-}
-
-double horizon(const Scene& scene, double spacing) {
-  return scene.horizon > 0 ? scene.horizon : scene.horizon_ratio * spacing;
-}
-
-BodyFrame frame(const Scene& scene, double spacing) {
-  BodyFrame frame{scene.body.space, scene.body.section, spacing, horizon(scene, spacing), {}};
-  for (const CrackDescription& crack : scene.cracks) frame.cracks.emplace_back(crack.vertices);
-  return frame;
 }
 
 /// Cells of the lattice along the axes of the input.
@@ -91,7 +82,7 @@ Body jittered(const Scene& scene, const Lattice& lattice, const std::vector<std:
     volumes = voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr);
   }
   for (double& volume : volumes) volume *= scene.body.section;
-  return Body(frame(scene, description.spacing), positions, volumes);
+  return Body(scene_frame(scene, description.spacing), positions, volumes);
 }
 
 /// The cells of a lattice that lie inside at least in part, as a cloud.
@@ -106,44 +97,29 @@ Body partial_cells(const Scene& scene, const Lattice& lattice) {
   const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
   for (double& volume : cells.volume) volume *= whole;
   keep_off_surfaces(scene, description.spacing, cells.position);
-  return Body(frame(scene, description.spacing), cells.position, cells.volume);
+  return Body(scene_frame(scene, description.spacing), cells.position, cells.volume);
 }
 
 Body lattice_body(const Scene& scene) {
   const LatticeDescription& description = *scene.body.lattice;
-  const int d = scene.body.dimension;
-  const double spacing = description.spacing, reach = horizon(scene, spacing), ratio = reach / spacing;
-  double estimate = 1;
-  for (int a = 0; a < d; ++a) estimate *= std::max(1.0, (description.upper[a] - description.lower[a]) / spacing + 1);
+  const double spacing = description.spacing, ratio = scene_horizon(scene, spacing) / spacing, estimate = estimated_cells(scene);
   // What `inside` leaves is known after it was asked for every cell.
   check_index(scene, estimate);
-  check_horizon(scene, ratio);
+  const Lattice lattice = scene_lattice(scene);
   if (!description.inside) check_memory(scene, estimate, ratio, description.jitter > 0);
-  const Lattice lattice = make_lattice(d, spacing, description.lower, description.upper, reach);
-  const std::array<std::int64_t, 3> cells = input_cells(lattice);
-  for (int a = 0; a < d; ++a) {
-    if (cells[static_cast<std::size_t>(a)] >= 1) continue;
-    throw InputError(
-        description.position, "body.lattice",
-        fmt::format("found no room for a point along {}; allowed: upper - lower of half a spacing or more", "xyz"[a]));
-  }
   if (scene.partial_volume) {
     check_cloud(scene, static_cast<std::size_t>(estimate), ratio);
     return partial_cells(scene, lattice);
   }
   std::vector<std::int32_t> kept = kept_cells(description, lattice);
-  if (kept.empty()) {
-    throw InputError(description.position, "body.lattice.inside",
-                     "found an expression that keeps no point of the lattice; allowed: one that is true at one point or more");
-  }
+  if (kept.empty()) refuse_empty_lattice(description);
   // Jitter needs a cloud; so does a body that fills so little of its box that dead cells would dominate.
-  const bool sparse = static_cast<double>(kept.size()) < 0.08 * static_cast<double>(cells[0] * cells[1] * cells[2]);
-  if (description.jitter > 0 || sparse) {
+  if (description.jitter > 0 || sparse(static_cast<double>(kept.size()), lattice)) {
     check_cloud(scene, kept.size(), ratio);
     return jittered(scene, lattice, kept);
   }
   check_memory(scene, static_cast<double>(lattice.cells), ratio, false);
-  return Body(frame(scene, spacing), lattice, std::move(kept));
+  return Body(scene_frame(scene, spacing), lattice, std::move(kept));
 }
 
 /// Points of a file with the volumes of their Voronoi cells.
@@ -195,32 +171,16 @@ Body file_body(const Scene& scene) {
   for (const double v : cloud.volume) total += v;
   const double spacing =
       std::pow(total / scene.body.section / static_cast<double>(cloud.volume.size()), 1.0 / scene.body.dimension);
-  const double reach = horizon(scene, spacing);
+  const double reach = scene_horizon(scene, spacing);
   check_cloud(scene, cloud.volume.size(), reach / spacing);
   if (reach < spacing) {
     throw InputError(scene.body.position, "family.horizon",
                      fmt::format("found {}; allowed: at least the mean spacing of the points, {:.6g}", reach, spacing));
   }
-  return Body(frame(scene, spacing), cloud.position, cloud.volume);
+  return Body(scene_frame(scene, spacing), cloud.position, cloud.volume);
 }
 
 }  // namespace
-
-/// Refuses keys about volumes that would change nothing.
-void check_volumes(const Scene& scene) {
-  const bool lattice = scene.body.lattice.has_value();
-  if (scene.body.voronoi && lattice && scene.body.lattice->jitter == 0)
-    throw InputError(scene.body.volume_position, "body.lattice.volume",
-                     "found \"voronoi\" on a lattice; allowed: with jitter > 0, or family.partial_volume = true");
-  if (!scene.partial_volume) return;
-  const auto refuse = [&](const char* found, const char* allowed) {
-    throw InputError(scene.partial_volume_position, "family.partial_volume",
-                     fmt::format("found true {}; allowed: {}", found, allowed));
-  };
-  if (!lattice || scene.body.lattice->jitter > 0)
-    refuse("on a cloud", "a lattice without jitter; clouds have volume = \"voronoi\"");
-  if (!scene.body.lattice->inside) refuse("on a lattice that nothing cuts", "with body.lattice.inside");
-}
 
 Body build_body(const Scene& scene) {
   check_volumes(scene);

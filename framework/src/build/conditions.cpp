@@ -26,6 +26,7 @@ namespace {
 /// A point at a held face that a layer holds too would be held at two places.
 void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
                   const std::vector<std::size_t>& boundary_of) {
+  if (std::ranges::none_of(images.terms, [](const ImageTerm& term) { return term.motion >= 0; })) return;
   std::vector<std::uint8_t> held(body.points_of_all_ranks(), 0);   // by point of the whole body, a bit a component
   for (const ImageTerm& term : images.terms)
     if (term.motion >= 0) held[static_cast<std::size_t>(term.surface)] |= static_cast<std::uint8_t>(1 << term.component);

@@ -53,7 +53,7 @@ CrossingBonds count(const FamilyArrays& family, const AlignedVector<double>& sha
 
 /// Of one point of a cloud, by its number in the whole body.
 struct OfPoint {
-  std::int32_t number;
+  std::int64_t number;
   CrossingBonds crossing;
 };
 

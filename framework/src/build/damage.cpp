@@ -99,7 +99,7 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
   if (partition) {
     Field sides = body.make_field(1);
     std::copy(damage.side.begin(), damage.side.end(), sides.data());
-    Ghosts(*partition, body, 1).forward(sides);
+    Ghosts(*partition, 1).forward(sides);
     std::transform(sides.data(), sides.data() + sides.size(), damage.side.begin(), [](double side) { return static_cast<std::uint16_t>(side); });
   }
   for (const InterfaceDescription& interface : scene.interfaces) {
@@ -172,7 +172,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
   const std::array limits_of_points{&damage->onset, &damage->failure, &damage->crack_speed};
   if (partition) {
-    Ghosts ghosts(*partition, body, 1);
+    Ghosts ghosts(*partition, 1);
     for (Field* field : limits_of_points)
       if (field->size() > 0) ghosts.forward(*field);
     equal = communicator().largest(equal ? 0 : 1) == 0;

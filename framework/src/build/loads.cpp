@@ -8,10 +8,25 @@
 #include "build/face_shares.hpp"
 #include "build/surface_areas.hpp"
 #include "families/families.hpp"
+#include "perikit/core/communicator.hpp"
 
 namespace perikit {
 
 namespace {
+
+/// The sum of the volumes of the points of a set on all ranks, which must all call it: added up as on one rank, where one follows
+/// the other.
+double total_volume(const Body& body, const std::vector<std::int32_t>& points) {
+  double total = 0;
+  if (!body.part() || !body.lattice()) {
+    for (const std::int32_t p : points) total += body.volume(static_cast<std::size_t>(p));
+    return total;
+  }
+  std::int64_t count = std::ssize(points);
+  communicator().sum({&count, 1});
+  for (; count > 0; --count) total += body.uniform_volume();
+  return total;
+}
 
 /// Points and shares of a load without its values, on the points of the body.
 Load distributed(const LoadDescription& description, const Body& body, const TermParts& parts, const ImageMap* images) {
@@ -24,8 +39,7 @@ Load distributed(const LoadDescription& description, const Body& body, const Ter
     return load;
   }
   load.points = body.set(description.set);
-  double total = 0;
-  for (const std::int32_t p : load.points) total += body.volume(static_cast<std::size_t>(p));
+  const double total = description.type == LoadDescription::Type::force ? total_volume(body, load.points) : 0.0;
   for (const std::int32_t p : load.points) {
     const double volume = body.volume(static_cast<std::size_t>(p));
     load.share.push_back(description.type == LoadDescription::Type::force ? volume / total : volume);
@@ -35,8 +49,8 @@ Load distributed(const LoadDescription& description, const Body& body, const Ter
 
 /// By internal index of the whole body: where the points are in a part whose forces it must know; -1: others. Loads on images are loads on
 /// their sources.
-std::vector<std::int32_t> own_places(const Partition& partition, const Body& part) {
-  std::vector<std::int32_t> own(partition.whole().stride(), -1);
+std::vector<std::int32_t> own_places(const Body& part) {
+  std::vector<std::int32_t> own(part.stride_of_all_ranks(), -1);
   for (const std::int32_t p : part.complete()) own[static_cast<std::size_t>(part.places().place[static_cast<std::size_t>(p)])] = p;
   return own;
 }
@@ -94,10 +108,10 @@ struct Whole {
     using Type = LoadDescription::Type;
     const bool surfaces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; });
     if (!partition || !surfaces) return;
-    families = Families::make(partition->whole(), of_rank.families->influence(), of_rank.families->needs());
+    families = Families::make(*partition->whole(), of_rank.families->influence(), of_rank.families->needs());
     parts.families = families.get();
     if (!images) return;
-    images_of_all.emplace(partition->whole(), of_whole);
+    images_of_all.emplace(*partition->whole(), of_whole);
     images = &*images_of_all;
   }
 };
@@ -108,7 +122,9 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* p
                   bool quasi_static) {
   const Body& body = parts.families->body();
   const Whole whole(scene, parts, partition, images, of_whole);
-  const std::vector<std::int32_t> own = partition ? own_places(*partition, body) : std::vector<std::int32_t>();
+  // Where a rank has the whole body shares are found there, else on its part.
+  const Body* const of_all = partition ? partition->whole() : nullptr;
+  const std::vector<std::int32_t> own = of_all ? own_places(body) : std::vector<std::int32_t>();
   std::vector<Load> loads;
   std::vector<FollowingPressure> pressures;
   for (const LoadDescription& description : scene.loads) {
@@ -117,15 +133,15 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* p
       refuse_pressure(scene, description, parts);
       const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
       SurfaceAreas areas = surface_areas(description, whole.parts, parts, whole.images);
-      if (partition) keep_owned(own, areas.points, areas.area);
+      if (of_all) keep_owned(own, areas.points, areas.area);
       if (description.follower)
         pressures.push_back({value, std::move(areas.points), std::move(areas.area)});
       else
         std::ranges::move(loads_along_axes(value, areas, body.dimension()), std::back_inserter(loads));
       continue;
     }
-    Load load = distributed(description, partition ? partition->whole() : body, whole.parts, whole.images);
-    if (partition) keep_owned(own, load.points, load.share);
+    Load load = distributed(description, of_all ? *of_all : body, whole.parts, whole.images);
+    if (of_all) keep_owned(own, load.points, load.share);
     for (std::size_t c = 0; c < description.components.size(); ++c) {
       const Expression& value = description.components[c];
       if (value.is_number() && value({}) == 0.0) continue;

@@ -12,6 +12,7 @@
 #include "build/held_surfaces.hpp"
 #include "build/image_planes.hpp"
 #include "build/interfaces.hpp"
+#include "build/local_body.hpp"
 #include "build/materials.hpp"
 #include "build/questionable.hpp"
 #include "build/several_ranks.hpp"
@@ -59,8 +60,33 @@ Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
           .sources = formulation.pairs && !scene.regions.empty()};  // bonds across interfaces know the moduli of both sides
 }
 
+/// The body of this rank, which no rank has as a whole. False where the scene is not for that.
+bool place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts,
+                Beyond& beyond) {
+  std::optional<LocalBody> local;
+  try {
+    local = build_local_body(scene, reach_of(scene, formulation), image_material(scene));
+  } catch (const std::domain_error& error) {
+    throw InputError(scene.body.position, "body", error.what());
+  }
+  if (!local) return false;
+  parts.body = std::make_unique<const Body>(std::move(local->body));
+  parts.partition = std::move(local->partition);
+  beyond.interfaces =
+      std::make_shared<const Interfaces>(build_local_interfaces(scene, factory, formulation, *parts.body, local->whole));
+  return true;
+}
+
 /// The bodies of this rank and, where there are several, of all of them.
 Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
+  if (communicator().size() > 1) {
+    parts.placed_whole = needs_whole_body(scene, quasi_static);
+    if (parts.placed_whole.empty()) {
+      Beyond beyond;
+      if (place_part(scene, factory, formulation, parts, beyond)) return beyond;
+      parts.placed_whole = "the lattice is almost empty, and its points are a cloud";
+    }
+  }
   Body whole = build_body(scene);
   std::vector<std::uint16_t> material = materials_of_points(whole);
   Beyond beyond = place_images(scene, whole, quasi_static);
@@ -84,7 +110,8 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
     beyond.here = images_of_part(beyond.images, *parts.body);
     parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);
   }
-  beyond.interfaces = std::make_shared<const Interfaces>(interfaces_of_part(*parts.body, parts.partition->whole(), *beyond.interfaces));
+  beyond.interfaces =
+      std::make_shared<const Interfaces>(interfaces_of_part(*parts.body, *parts.partition->whole(), *beyond.interfaces));
   return beyond;
 }
 
@@ -157,7 +184,7 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
   }
   auto consistency = std::make_shared<CloudConsistency>();
   constexpr int most = 4;  // components: of a place in space, and of the weights' unknowns
-  const auto ghosts = parts.partition ? std::make_shared<Ghosts>(*parts.partition, *parts.body, most) : nullptr;
+  const auto ghosts = parts.partition ? std::make_shared<Ghosts>(*parts.partition, most) : nullptr;
   const ImageMap* const images = parts.images.get();
   if (!ghosts && !images) return consistency;
   consistency->extend = [ghosts, images](FieldView u) {
@@ -193,7 +220,7 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
 }
 
 std::unique_ptr<WholeBody> build_whole(const Scene& scene, const ProblemParts& parts, const Beyond& beyond) {
-  const Body& whole = parts.partition->whole();
+  const Body& whole = *parts.partition->whole();
   std::unique_ptr<Families> families = Families::make(whole, parts.families->influence(), parts.families->needs());
   if (scene.damage) families->let_fail();
   std::unique_ptr<const ImageMap> images;
@@ -248,6 +275,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
   Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), beyond.images, quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
+  if (partition && !parts.whole) parts.partition->forget_whole();
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
+
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -16,51 +19,108 @@ std::vector<std::int32_t> where_true(const Expression& condition, const Body& bo
   return members;
 }
 
+double squared_distance(const Point& a, const Point& b) {
+  double sum = 0;
+  for (std::size_t c = 0; c < 3; ++c) sum += (a[c] - b[c]) * (a[c] - b[c]);
+  return sum;
+}
+
+/// Ties within rounding go to the first point.
+bool nearer(double squared, double best) {
+  return squared < best * (1 - 1e-12);
+}
+
 std::int32_t nearest_point(const Point& place, const Body& body) {
   std::int32_t point = -1;
   double best = std::numeric_limits<double>::infinity();
   for (const std::int32_t p : body.internal()) {
-    const Point x = body.position(static_cast<std::size_t>(p));
-    double r2 = 0;
-    for (std::size_t c = 0; c < 3; ++c) r2 += (x[c] - place[c]) * (x[c] - place[c]);
-    // Ties within rounding go to the first point.
-    if (r2 >= best * (1 - 1e-12)) continue;
-    best = r2;
+    const double squared = squared_distance(body.position(static_cast<std::size_t>(p)), place);
+    if (!nearer(squared, best)) continue;
+    best = squared;
     point = p;
   }
   return point;
 }
 
-std::vector<std::int32_t> listed(const SetDescription& description, const std::string& key, const Body& body) {
-  std::vector<std::int32_t> members;
+/// The same of all ranks: the input number. All of them must call it.
+std::int64_t nearest_of_all(const Point& place, const Body& body) {
+  struct Near {
+    std::int64_t number;
+    double squared;
+  };
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::int32_t p : body.owned())
+    least = std::min(least, squared_distance(body.position(static_cast<std::size_t>(p)), place));
+  least = -communicator().largest(-least);
+  std::vector<Near> mine;  // all that may count as equally near
+  for (const std::int32_t p : body.owned())
+    if (const double squared = squared_distance(body.position(static_cast<std::size_t>(p)), place);
+        squared <= least * (1 + 1e-11))
+      mine.push_back({body.number(static_cast<std::size_t>(p)), squared});
+  std::vector<Near> near = told_to_all(gathered<Near>(mine));
+  std::ranges::sort(near, {}, &Near::number);
+  Near first{-1, std::numeric_limits<double>::infinity()};
+  for (const Near& other : near)
+    if (nearer(other.squared, first.squared)) first = other;
+  return first.number;
+}
+
+void check_listed(const SetDescription& description, const std::string& key, const Body& body) {
+  std::set<std::int64_t> seen;
   for (const std::int64_t p : description.points) {
-    if (p < 0 || static_cast<std::size_t>(p) >= body.points())
-      throw InputError(description.position, key, fmt::format("found the point {}; allowed: 0 to {}", p, body.points() - 1));
-    const std::int32_t index = body.internal()[static_cast<std::size_t>(p)];
-    if (std::ranges::find(members, index) != members.end())
+    if (p < 0 || static_cast<std::size_t>(p) >= body.points_of_all_ranks())
+      throw InputError(description.position, key,
+                       fmt::format("found the point {}; allowed: 0 to {}", p, body.points_of_all_ranks() - 1));
+    if (!seen.insert(p).second)
       throw InputError(description.position, key, fmt::format("found the point {} twice; allowed: each point once", p));
-    members.push_back(index);
   }
+}
+
+std::vector<std::int32_t> with_numbers(const std::vector<std::int64_t>& numbers, const Body& body) {
+  std::vector<std::int32_t> members;
+  for (const std::int64_t number : numbers)
+    if (const std::int32_t p = body.find(number); p >= 0) members.push_back(p);
   return members;
+}
+
+/// Whether a set has a point on any rank. All of them must call it.
+bool any_of_all(const std::vector<std::int32_t>& members) {
+  std::int64_t count = std::ssize(members);
+  communicator().sum({&count, 1});
+  return count > 0 || !communicator().complete();
 }
 
 }  // namespace
 
-void add_sets(const std::vector<SetDescription>& sets, Body& body) {
+const Expression* set_expression(const Scene& scene, const std::string& name) {
+  const auto set = std::ranges::find(scene.sets, name, &SetDescription::name);
+  return set != scene.sets.end() && set->expression ? &*set->expression : nullptr;
+}
+
+SetMembers add_sets(const std::vector<SetDescription>& sets, Body& body) {
+  SetMembers of_all;
   for (const SetDescription& description : sets) {
     const std::string key = "sets." + description.name;
-    std::vector<std::int32_t> members;
+    std::vector<std::int32_t>& members = of_all[description.name];
     if (description.expression)
       members = where_true(*description.expression, body);
     else if (description.nearest)
-      members = {nearest_point(*description.nearest, body)};
-    else
-      members = listed(description, key, body);
-    if (members.empty())
+      members = body.part() ? with_numbers({nearest_of_all(*description.nearest, body)}, body)
+                            : std::vector{nearest_point(*description.nearest, body)};
+    else {
+      check_listed(description, key, body);
+      members = with_numbers(description.points, body);
+    }
+    std::vector<std::int32_t> own = members;
+    std::erase_if(own, [&](std::int32_t p) { return !body.owns(static_cast<std::size_t>(p)); });
+    if (!any_of_all(own)) {
       throw InputError(description.position, key,
                        "found a condition that holds at no point; allowed: one that holds at one point or more");
-    body.add_set(description.name, std::move(members));
+    }
+    const bool own_order = body.part() && !std::ranges::is_sorted(description.points);
+    body.add_set(description.name, std::move(own), own_order ? description.points : std::vector<std::int64_t>());
   }
+  return of_all;
 }
 
 }  // namespace perikit

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "build/sets.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -12,6 +15,26 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
                    fmt::format("found \"{}\" on {} ranks; allowed: integrators that need no matrix (explicit ones; Krylov solvers with "
                                "preconditioner = \"companion\" or \"none\"), or one rank with many threads (--threads)",
                                scene.integrator->type, communicator().size()));
+}
+
+std::string needs_whole_body(const Scene& scene, bool quasi_static) {
+  using Type = LoadDescription::Type;
+  if (!scene.body.lattice || scene.body.lattice->jitter > 0) return "points of a cloud are put in order together";
+  if (scene.partial_volume) return "cells that the surface cuts are a cloud";
+  if (quasi_static) return "pieces that nothing holds are looked for";
+  if (!scene.symmetries.empty() || !scene.periodics.empty())
+    return "there are images beyond planes of symmetry or periodic sides";
+  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
+    return "there are images beyond held faces or surfaces";
+  if (std::ranges::any_of(scene.loads,
+                          [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; }))
+    return "tractions and pressures share out the surface";
+  const auto by_points = [&](const RegionDescription& region) {
+    return region.set != "all" && !set_expression(scene, region.set);
+  };
+  if (scene.laminates.value_or(true) && std::ranges::any_of(scene.regions, by_points))
+    return "interfaces of regions of single points are looked for";
+  return {};
 }
 
 }  // namespace perikit

@@ -1,6 +1,8 @@
 #pragma once
 /// What a scene may not ask for on several ranks.
 
+#include <string>
+
 #include "perikit/problem/integrator.hpp"
 #include "perikit/scene/scene.hpp"
 
@@ -8,5 +10,8 @@ namespace perikit {
 
 /// Throws InputError, naming the key, for what needs the whole body on one rank. Nothing is refused where there is one.
 void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator);
+
+/// Why every rank places the whole body of the scene, in words; empty where each of them places its own part alone.
+std::string needs_whole_body(const Scene& scene, bool quasi_static);
 
 }  // namespace perikit

@@ -34,7 +34,10 @@ const char* key_of(const Scene& scene) {
 void check_index(const Scene& scene, double cells) {
   if (cells > most_points) {
     throw InputError(scene.body.position, key_of(scene),
-                     fmt::format("found about {:.3g} points; allowed: at most {:.3g}", cells, most_points));
+                     fmt::format("found about {:.3g} points; allowed: at most {:.3g} on a rank{}", cells, most_points,
+                                 scene.body.lattice && scene.body.lattice->jitter == 0
+                                     ? "; explicit runs of a lattice share it out (mpirun -np N perikit run)"
+                                     : ""));
   }
 }
 
@@ -46,7 +49,7 @@ void check_horizon(const Scene& scene, double ratio) {
                                ratio, cells, largest_ball));
 }
 
-void check_memory(const Scene& scene, double cells, double ratio, bool cloud) {
+void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bool part) {
   // Near surfaces families are smaller: an eighth at a corner.
   const double whole = std::min(ball(scene.body.dimension, ratio), cells - 1), family = cloud ? whole / 8 : whole;
   if (!cloud && whole > most_bonds) {
@@ -59,9 +62,9 @@ void check_memory(const Scene& scene, double cells, double ratio, bool cloud) {
                limit = memory_limit();
   if (bytes > limit) {
     throw InputError(scene.body.position, key_of(scene),
-                     fmt::format("found about {:.3g} points with a horizon of {:.4g} spacings, which need {:.3g} GB or more; "
+                     fmt::format("found about {:.3g} points{} with a horizon of {:.4g} spacings, which need {:.3g} GB or more; "
                                  "allowed: the {:.3g} GB that this machine offers",
-                                 cells, ratio, bytes / 1e9, limit / 1e9));
+                                 cells, part ? " on a rank" : "", ratio, bytes / 1e9, limit / 1e9));
   }
 }
 

@@ -10,7 +10,8 @@ namespace perikit {
 void check_index(const Scene& scene, double cells);
 /// Refuses families of more than 1e7 points, also where the body has fewer. ratio: horizon over spacing.
 void check_horizon(const Scene& scene, double ratio);
-/// Refuses what the memory of this machine cannot hold, whatever the kinematics.
-void check_memory(const Scene& scene, double cells, double ratio, bool cloud);
+/// Refuses what the memory of this machine cannot hold, whatever the kinematics. part: these are the cells of one of several
+/// ranks.
+void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bool part = false);
 
 }  // namespace perikit

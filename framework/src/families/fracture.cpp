@@ -368,12 +368,7 @@ std::vector<BondId> Fracture::fragments(std::span<const std::int32_t> points) co
   return shared_.of_all(bonds);
 }
 
-std::vector<BondChange> Fracture::changed() const {
-  return shared_.outward(families_.changed());
-}
-
-void Fracture::restore(std::span<const BondChange> of_all, const std::function<void(std::span<const std::int32_t>)>& changed) {
-  const std::vector<BondChange> changes = shared_.inward(of_all);
+void Fracture::restore(std::span<const BondChange> changes, const std::function<void(std::span<const std::int32_t>)>& changed) {
   changed(families_.mend());
   const std::vector<std::int32_t> ends = families_.lower(changes);
   changed(ends);

@@ -48,10 +48,7 @@ class Fracture {
   /// Those that may be forecast, as their falls form a series that ends (HastenedBonds), weaken to what they are at `forecast`, and not by more than half. Energies are those at u.
   BondUpdate weaken(ConstFieldView u, ConstFieldView forecast, const Body& body);
 
-  /// Every bond that is not as it was at the set-up, by places in the whole body: on rank 0 those of all ranks. All ranks must
-  /// call it.
-  std::vector<BondChange> changed() const;
-  /// Back to these bonds, which `changed` has named at another time. All ranks must call it.
+  /// Back to these bonds, which Families::changed has named at another time. All ranks must call it.
   void restore(std::span<const BondChange> changes, const std::function<void(std::span<const std::int32_t>)>& changed);
   /// Over all ranks, which must call it; bonds are counted once.
   BondChecks checks() const;

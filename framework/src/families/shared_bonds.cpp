@@ -8,56 +8,48 @@
 namespace perikit {
 
 /// On rank 0 those of all ranks, by places in the whole body.
-std::vector<BondChange> SharedBonds::merged(std::span<const BondChange> mine) const {
-  const auto place = body_.places().place;
-  std::vector<BondChange> named;
+std::vector<NamedChange> SharedBonds::merged(std::span<const BondChange> mine) const {
+  std::vector<NamedChange> named;
   // Points have the order here that they have in the whole body: the smaller index stays the smaller one.
-  for (const auto& [bond, integrity] : mine)
-    named.push_back({{place[static_cast<std::size_t>(bond.point)], place[static_cast<std::size_t>(bond.far)]}, integrity});
-  std::vector<BondChange> all = gathered<BondChange>(named);
-  std::ranges::sort(all, {}, &BondChange::bond);
-  const auto rest = std::ranges::unique(all, {}, &BondChange::bond);
+  for (const auto& [bond, integrity] : mine) named.push_back({{place(bond.point), place(bond.far)}, integrity});
+  std::vector<NamedChange> all = gathered<NamedChange>(named);
+  std::ranges::sort(all, {}, &NamedChange::bond);
+  const auto rest = std::ranges::unique(all, {}, &NamedChange::bond);
   all.erase(rest.begin(), rest.end());
   return all;
 }
 
 double SharedBonds::name(BondId bond) const noexcept {
-  const auto place = [&](std::int32_t p) { return part() ? body_.places().place[static_cast<std::size_t>(p)] : p; };
-  const std::size_t stride = part() ? body_.places().stride : body_.stride();
-  return static_cast<double>(place(bond.point)) * static_cast<double>(stride) + static_cast<double>(place(bond.far));
-}
-
-void SharedBonds::find_here() const {
-  if (!here_.empty()) return;
-  here_.assign(body_.places().stride, -1);
-  for (const std::int32_t p : body_.internal())
-    here_[static_cast<std::size_t>(body_.places().place[static_cast<std::size_t>(p)])] = p;
+  return static_cast<double>(place(bond.point)) * static_cast<double>(body_.stride_of_all_ranks()) +
+         static_cast<double>(place(bond.far));
 }
 
 void SharedBonds::mark(GroupMarks& marks) const {
   if (!part()) return;
-  std::vector<std::int32_t> mine;
+  std::vector<std::int64_t> mine;
   for (const std::int32_t p : body_.internal())
-    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(body_.places().place[static_cast<std::size_t>(p)]);
-  find_here();
-  for (const std::int32_t place : told_to_all(gathered<std::int32_t>(mine)))
-    if (const std::int32_t p = here_[static_cast<std::size_t>(place)]; p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
+    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(place(p));
+  for (const std::int64_t marked : told_to_all(gathered<std::int64_t>(mine)))
+    if (const std::int32_t p = body_.at_place(marked); p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
 }
 
-std::vector<BondChange> SharedBonds::outward(std::span<const BondChange> changes) const {
-  if (!part()) return {changes.begin(), changes.end()};
+std::vector<NamedChange> SharedBonds::outward(std::span<const BondChange> changes) const {
+  std::vector<NamedChange> named;
+  if (!part()) {
+    for (const auto& [bond, integrity] : changes) named.push_back({{bond.point, bond.far}, integrity});
+    return named;
+  }
   std::vector<BondChange> own;
   std::ranges::copy_if(changes, std::back_inserter(own),
                        [&](const BondChange& change) { return body_.owns(static_cast<std::size_t>(change.bond.point)); });
   return merged(own);
 }
 
-std::vector<BondChange> SharedBonds::inward(std::span<const BondChange> changes) const {
-  if (!part()) return {changes.begin(), changes.end()};
-  find_here();
+std::vector<BondChange> SharedBonds::inward(std::span<const NamedChange> changes) const {
+  const auto here = [&](std::int64_t place) { return part() ? body_.at_place(place) : static_cast<std::int32_t>(place); };
   std::vector<BondChange> in;
   for (const auto& [bond, integrity] : changes) {
-    const BondId own{here_[static_cast<std::size_t>(bond.point)], here_[static_cast<std::size_t>(bond.far)]};
+    const BondId own{here(bond.point), here(bond.far)};
     if (own.point >= 0 && own.far >= 0) in.push_back({own, integrity});
   }
   return in;

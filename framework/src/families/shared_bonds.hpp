@@ -16,11 +16,10 @@ class SharedBonds {
   /// `body` must outlive it.
   explicit SharedBonds(const Body& body) : body_(body) {}
 
-  /// The changes that all ranks have, each once, ascending, by places in the whole body: on rank 0; on the others none. All ranks
-  /// must call it.
-  std::vector<BondChange> outward(std::span<const BondChange> changes) const;
+  /// The changes that all ranks have, each once, ascending: on rank 0; on the others none. All ranks must call it.
+  std::vector<NamedChange> outward(std::span<const BondChange> changes) const;
   /// Of changes in the whole body those with both ends here.
-  std::vector<BondChange> inward(std::span<const BondChange> changes) const;
+  std::vector<BondChange> inward(std::span<const NamedChange> changes) const;
   /// Of the bonds that any rank names those with both ends here, ascending. All ranks must call it.
   std::vector<BondId> of_all(std::span<const BondId> bonds) const;
   std::vector<BondChange> of_all(std::span<const BondChange> changes) const;
@@ -29,14 +28,13 @@ class SharedBonds {
   /// A number for each bond that all ranks have for it, in the order of the bonds.
   double name(BondId bond) const noexcept;
   /// Whether other ranks have bonds, too.
-  bool part() const noexcept { return !body_.places().place.empty(); }
+  bool part() const noexcept { return body_.part(); }
 
  private:
-  std::vector<BondChange> merged(std::span<const BondChange> mine) const;
-  void find_here() const;
+  std::int64_t place(std::int32_t p) const noexcept { return part() ? body_.places().place[static_cast<std::size_t>(p)] : p; }
+  std::vector<NamedChange> merged(std::span<const BondChange> mine) const;
 
   const Body& body_;
-  mutable std::vector<std::int32_t> here_;  ///< internal index by place in the whole body, -1: not here; made when asked for
 };
 
 }  // namespace perikit

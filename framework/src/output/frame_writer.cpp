@@ -75,7 +75,16 @@ void store_reference(const fs::path& path, const ReferenceData& reference, const
   store_column<std::int64_t>(file, "id", points, 1, number);
   store_column<std::int64_t>(file, "material_id", points, 1,
                              [&](std::size_t p, Whole& values) { values.push_back(reference.point(p).material_id); });
-  for (const auto& [name, ids] : reference.sets) file.dataset("set_" + name, ids);
+  for (const auto& [name, set] : reference.sets) {
+    if (set.size() == 0) {
+      file.dataset("set_" + name, Whole());
+      continue;
+    }
+    hdf5::NewFile::Rows rows = file.rows("set_" + name, set.size(), 1, hdf5::NewFile::Numbers::whole);
+    set.each([&](std::span<const std::int64_t> ids) {
+      if (!ids.empty()) rows.append(ids);
+    });
+  }
   store_column<std::int64_t>(file, "connectivity", points, 1, number);
   file.keep();
 }

@@ -29,7 +29,7 @@ void refuse_ranks(const ProblemParts& parts) {
 
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
     : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
-  if (parts_.partition) ghosts_.emplace(*parts_.partition, body(), dimension());
+  if (parts_.partition) ghosts_.emplace(*parts_.partition, dimension());
   if (parts_.images) seen_ = make_field();
 }
 
@@ -218,10 +218,10 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
 void BodyProblem::find_pieces(bool fresh) {
   if (!weak_springs_) return;
   if (ghosts_ && parts_.fracture.damage()) {
-    const std::vector<BondChange> of_all = terms().changed_bonds();  // rank 0 has them
+    const std::vector<NamedChange> of_all = terms().changed_bonds_of_all();  // rank 0 has them
     if (parts_.whole) {
       parts_.whole->families->mend();
-      parts_.whole->families->lower(of_all);
+      parts_.whole->families->lower(SharedBonds(parts_.whole->families->body()).inward(of_all));
     }
   }
   weak_springs_->find(seen(state().displacement(), seen_), fresh);
@@ -282,23 +282,37 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   find_pieces(false);
 }
 
+namespace {
+
+/// Of snapshots, which begin with it; the first ones began with a stride, a multiple of 8.
+constexpr std::uint64_t snapshot_format = 2;
+
+std::uint64_t stride_of(ByteReader& in) {
+  if (in.value<std::uint64_t>() != snapshot_format)
+    throw InputError("the saved state has another layout than this version of perikit reads");
+  return in.value<std::uint64_t>();
+}
+
+}  // namespace
+
 std::vector<std::byte> BodyProblem::snapshot() const {
   ByteWriter out;
-  out.value(static_cast<std::uint64_t>(whole().stride()));
+  out.value(snapshot_format);
+  out.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
   values_.constraints.write(out);
   parts_.fracture.write(terms(), out);
   HistoryRecord::of(terms()).write(out);
-  values_.state.write(whole(), out);
+  values_.state.write(out);
   return out.take();
 }
 
 void BodyProblem::restore(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
-  if (in.value<std::uint64_t>() != whole().stride()) throw InputError("the saved state belongs to another body");
+  if (stride_of(in) != body().stride_of_all_ranks()) throw InputError("the saved state belongs to another body");
   constraints().read(in);
   parts_.fracture.read(terms(), in);
   HistoryRecord::read(in).restore(terms());
-  state().read(whole(), in);
+  state().read(in);
   if (!in.done()) throw InputError("the saved state is damaged");
   find_pieces(false);
 }
@@ -308,12 +322,12 @@ namespace {
 /// The beginning of a snapshot, up to the state.
 struct BeforeState {
   std::uint64_t stride = 0;
-  std::vector<BondChange> bonds;
+  std::vector<NamedChange> bonds;
   HistoryRecord history;
 
   explicit BeforeState(std::span<const std::byte> snapshot) {
     ByteReader in(snapshot);
-    stride = in.value<std::uint64_t>();
+    stride = stride_of(in);
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
     history = HistoryRecord::read(in);
@@ -329,15 +343,15 @@ BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot
 
 void BodyProblem::carry(std::span<const std::byte> snapshot) {
   const BeforeState before(snapshot);
-  if (before.stride != whole().stride()) throw InputError("the earlier run had another body");
+  if (before.stride != body().stride_of_all_ranks()) throw InputError("the earlier run had another body");
   const SharedBonds shared(body());
-  std::vector<BondChange> lost;   // of the bonds that cracks of this scene leave
-  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const BondChange& b) {
+  std::vector<NamedChange> lost;  // of the bonds that cracks of this scene leave
+  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const NamedChange& b) {
     const std::vector<BondChange> here = shared.inward({&b, 1});
     return !here.empty() && parts_.families->integrity(here.front().bond) > b.integrity;
   });
   // On several ranks all of them restore, whoever has such bonds.
-  if (!lost.empty() || (ghosts_ && !before.bonds.empty())) terms().restore_bonds(lost);
+  if (!lost.empty() || (ghosts_ && !before.bonds.empty())) terms().restore_bonds_of_all(lost);
   before.history.restore(terms());
 }
 

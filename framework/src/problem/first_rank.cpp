@@ -26,7 +26,8 @@ void unpack(std::span<const double> values, std::span<const std::int32_t> points
 
 FirstRank::FirstRank(const Body& part, std::span<const std::int32_t> points) : part_(&part), points_(points.begin(), points.end()) {
   std::vector<std::int32_t> mine;
-  for (const std::int32_t p : points_) mine.push_back(part.places().place[static_cast<std::size_t>(p)]);
+  for (const std::int32_t p : points_)
+    mine.push_back(static_cast<std::int32_t>(part.places().place[static_cast<std::size_t>(p)]));
   for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
     std::vector<std::int32_t>& places = places_.emplace_back(of_rank.size() / sizeof(std::int32_t));
     if (!of_rank.empty()) std::memcpy(places.data(), of_rank.data(), of_rank.size());
@@ -72,7 +73,9 @@ void FirstRank::scatter(ConstFieldView whole, FieldView mine) const {
 
 BlockMatrix FirstRank::gather(const BlockMatrix& mine) const {
   const std::size_t size = static_cast<std::size_t>(mine.dimension * mine.dimension);
-  const auto place = part_->places().place;
+  const auto place = [&](std::int32_t p) {
+    return static_cast<std::int32_t>(part_->places().place[static_cast<std::size_t>(p)]);
+  };
   // Of each own row: its place, how many blocks it has, and the places of their columns.
   std::vector<std::int32_t> rows;
   std::vector<double> blocks;
@@ -81,10 +84,10 @@ BlockMatrix FirstRank::gather(const BlockMatrix& mine) const {
   for (std::size_t r = 0; r < mine.rows(); ++r) {
     if (!own[static_cast<std::size_t>(mine.point[r])]) continue;
     const std::int64_t begin = mine.row_first[r], end = mine.row_first[r + 1];
-    rows.push_back(place[static_cast<std::size_t>(mine.point[r])]);
+    rows.push_back(place(mine.point[r]));
     rows.push_back(static_cast<std::int32_t>(end - begin));
     for (std::int64_t b = begin; b < end; ++b)
-      rows.push_back(place[static_cast<std::size_t>(mine.point[static_cast<std::size_t>(mine.column[static_cast<std::size_t>(b)])])]);
+      rows.push_back(place(mine.point[static_cast<std::size_t>(mine.column[static_cast<std::size_t>(b)])]));
     blocks.insert(blocks.end(), mine.values.begin() + begin * static_cast<std::int64_t>(size), mine.values.begin() + end * static_cast<std::int64_t>(size));
   }
   const std::vector<std::int32_t> all_rows = gathered<std::int32_t>(rows);

@@ -60,32 +60,22 @@ void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
   out.value(gained_);
   out.value(inside_out_);
   out.value(held_);
-  const std::vector<BondChange> bonds = terms.changed_bonds();
+  const std::vector<NamedChange> bonds = terms.changed_bonds_of_all();
   out.value(static_cast<std::uint64_t>(bonds.size()));
-  for (const BondChange& b : bonds) {  // one by one: the padding of the struct holds anything
-    out.value(b.bond.point);
-    out.value(b.bond.far);
-    out.value(b.integrity);
-  }
+  for (const NamedChange& b : bonds) out.value(b);
 }
 
 namespace {
 
-std::vector<BondChange> read_changes(ByteReader& in) {
-  std::vector<BondChange> bonds;
-  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
-    BondChange b;
-    b.bond.point = in.value<std::int32_t>();
-    b.bond.far = in.value<std::int32_t>();
-    b.integrity = in.value<double>();
-    bonds.push_back(b);
-  }
+std::vector<NamedChange> read_changes(ByteReader& in) {
+  std::vector<NamedChange> bonds;
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) bonds.push_back(in.value<NamedChange>());
   return bonds;
 }
 
 }  // namespace
 
-void FractureRecord::read_bonds(ByteReader& in, std::vector<BondChange>& bonds) {
+void FractureRecord::read_bonds(ByteReader& in, std::vector<NamedChange>& bonds) {
   FractureRecord record;
   record.read_account(in);
   bonds = read_changes(in);
@@ -100,7 +90,7 @@ void FractureRecord::read_account(ByteReader& in) {
 
 void FractureRecord::read(Terms& terms, ByteReader& in) {
   read_account(in);
-  terms.restore_bonds(read_changes(in));
+  terms.restore_bonds_of_all(read_changes(in));
 }
 
 }  // namespace perikit

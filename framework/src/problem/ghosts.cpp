@@ -2,18 +2,10 @@
 
 namespace perikit {
 
-Ghosts::Ghosts(const Partition& partition, const Body& part, int components) {
-  std::vector<std::int32_t> of_number(partition.whole().points(), -1);
-  for (const std::int32_t p : part.internal()) of_number[static_cast<std::size_t>(part.number(static_cast<std::size_t>(p)))] = p;
-  const auto internal = [&](const std::vector<std::int32_t>& numbers) {
-    std::vector<std::int32_t> points;
-    for (const std::int32_t number : numbers) points.push_back(of_number[static_cast<std::size_t>(number)]);
-    return points;
-  };
+Ghosts::Ghosts(const Partition& partition, int components) {
   for (std::size_t k = 0; k < partition.lent().size(); ++k) {
     if (partition.lent()[k].empty() && partition.borrowed()[k].empty()) continue;
-    Neighbour& neighbour =
-        neighbours_.emplace_back(static_cast<int>(k), internal(partition.lent()[k]), internal(partition.borrowed()[k]));
+    Neighbour& neighbour = neighbours_.emplace_back(static_cast<int>(k), partition.lent()[k], partition.borrowed()[k]);
     neighbour.to.resize(neighbour.lent.size() * static_cast<std::size_t>(components));
     neighbour.from.resize(neighbour.borrowed.size() * static_cast<std::size_t>(components));
   }

@@ -44,12 +44,12 @@ std::vector<std::int32_t> own_points(const Body& body) {
 
 }  // namespace
 
-void State::write(const Body& whole, ByteWriter& out) const {
+void State::write(ByteWriter& out) const {
   const std::vector<std::int32_t> owned = own_points(*body_);
   const auto places = body_->places().place;
   std::vector<double> values, to;  // of owned points; where those of all ranks go
   if (!places.empty()) {
-    for (const std::int32_t p : owned) values.push_back(places[static_cast<std::size_t>(p)]);
+    for (const std::int32_t p : owned) values.push_back(static_cast<double>(places[static_cast<std::size_t>(p)]));
     to = gathered<double>(values);
   }
   out.value(time);
@@ -72,14 +72,14 @@ void State::write(const Body& whole, ByteWriter& out) const {
       for (std::size_t n = 0; n < owned.size(); ++n) values[n] = field.component(c)[owned[n]];
       const std::vector<double> from = gathered<double>(values);
       if (from.empty()) continue;
-      std::vector<double> all(whole.stride(), 0.0);
+      std::vector<double> all(body_->stride_of_all_ranks(), 0.0);
       for (std::size_t n = 0; n < from.size(); ++n) all[static_cast<std::size_t>(to[n])] = from[n];
       out.bytes(all.data(), all.size() * sizeof(double));
     }
   }
 }
 
-void State::read(const Body& whole, ByteReader& in) {
+void State::read(ByteReader& in) {
   const auto places = body_->places().place;
   time = in.value<double>();
   step = in.value<std::int64_t>();
@@ -102,7 +102,7 @@ void State::read(const Body& whole, ByteReader& in) {
       in.bytes(field.data, field.size() * sizeof(double));
       continue;
     }
-    std::vector<double> all(whole.stride());
+    std::vector<double> all(body_->stride_of_all_ranks());
     for (int c = 0; c < field.components; ++c) {
       in.bytes(all.data(), all.size() * sizeof(double));
       for (const std::int32_t p : own_points(*body_))

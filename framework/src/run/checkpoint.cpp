@@ -31,9 +31,9 @@ std::string body_fingerprint(const ReferenceData& body) {
     add(std::array{point.volume});
     add(std::array{point.material_id});
   }
-  for (const auto& [name, points] : body.sets) {
+  for (const auto& [name, set] : body.sets) {
     add(name);
-    add(points);
+    set.each(add);
   }
   return fingerprint.text();
 }

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "perikit/core/communicator.hpp"
+
 namespace perikit {
 
 std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) {
   std::vector<std::string> lines;
-  const Body& body = problem.whole();
+  const Body& body = problem.body();
   if (scene.random_points() && !scene.consistent.value_or(true) && problem.terms().has_gradients())
     lines.push_back(
         "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
@@ -18,6 +20,7 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
   double farthest = 0;
   for (const std::int32_t p : body.internal())
     for (const double x : body.position(static_cast<std::size_t>(p))) farthest = std::max(farthest, std::abs(x));
+  farthest = communicator().largest(farthest);
   const double rounding = std::numeric_limits<double>::epsilon() * farthest / body.spacing();
   if (scene.random_points() && rounding > 1e-8)
     lines.push_back(
@@ -32,6 +35,8 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
       low = std::min(low, body.position(static_cast<std::size_t>(p))[c]);
       high = std::max(high, body.position(static_cast<std::size_t>(p))[c]);
     }
+    low = -communicator().largest(-low);
+    high = communicator().largest(high);
     const double extent = high - low + body.spacing();
     if (extent >= body.horizon()) continue;
     lines.push_back(

@@ -1,6 +1,7 @@
 #pragma once
-/// Values of points from all ranks, in the order of the input.
+/// Values of the points of all ranks, on rank 0, in the order that they have on one rank.
 
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -10,12 +11,20 @@
 
 namespace perikit {
 
-/// mine: rows of `width` numbers of the points of this rank, in input order. On rank 0 those of all points, piece by piece:
-/// use(first, rows from point `first` on). All ranks must call it.
+/// use(first point in input order, `width` numbers for each point from there on), piece by piece, on rank 0. mine: of this rank's
+/// own points. All ranks must call it.
 void gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
                    const std::function<void(std::size_t first, std::span<const double> rows)>& use);
-/// mine: a number of each point of the set that is this rank's. On rank 0 those of all points of the set, in its order; on the
-/// others nothing. All ranks must call it.
-std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine);
+/// The rows of the points first ... first + points - 1 in input order, on rank 0; nothing on the others. row(p, out): `width`
+/// numbers of the rank's own point p, internal index. All ranks must call it.
+std::vector<double> gather_rows(const Body& body, std::size_t first, std::size_t points, std::size_t width,
+                                const std::function<void(std::size_t p, double* out)>& row);
+/// `width` numbers for each point of a set, in its order, on rank 0; empty on the others. mine: of this rank's own points. All
+/// ranks must call it.
+std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine,
+                               std::size_t width = 1);
+
+/// Points whose values are sent at a time.
+inline constexpr std::size_t points_of_piece = std::size_t{1} << 17;
 
 }  // namespace perikit

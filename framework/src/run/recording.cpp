@@ -21,6 +21,7 @@
 #include "run/gathering.hpp"
 #include "run/reduction.hpp"
 #include "run/run_folder.hpp"
+#include "run/whole_reference.hpp"
 
 namespace perikit {
 
@@ -38,22 +39,6 @@ std::int64_t with_row(std::int64_t before, std::span<const double> row) {
   Fingerprint fingerprint = before == 0 ? Fingerprint() : Fingerprint(static_cast<std::uint64_t>(before));
   fingerprint.add(row);
   return static_cast<std::int64_t>(fingerprint.value());
-}
-
-ReferenceData reference_of(const BodyProblem& problem) {
-  const Body& body = problem.whole();
-  ReferenceData data;
-  data.points = body.owned().size();
-  data.point = [&body](std::size_t p) -> ReferenceData::Point {
-    const auto i = static_cast<std::size_t>(body.owned()[p]);
-    return {body.position(i), body.volume(i), body.material_ids().empty() ? 0 : body.material_ids()[i]};
-  };
-  for (const auto& [name, members] : body.sets()) {
-    std::vector<std::int64_t>& set = data.sets[name];
-    for (const std::int32_t i : members) set.push_back(body.input_of(static_cast<std::size_t>(i)));
-    std::sort(set.begin(), set.end());
-  }
-  return data;
 }
 
 /// What a run goes on from, from rank 0 to the others.
@@ -107,14 +92,16 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
   columns_ = perikit::history_columns(scene, simulation.problem().laws().dissipates());
-  const ReferenceData reference = first_ ? reference_of(simulation.problem()) : ReferenceData();
-  body_ = body_fingerprint(reference);
+  WholeReference reference(simulation.problem());
+  reference.use([&](const ReferenceData& data) { body_ = body_fingerprint(data); });
   if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = communicator().largest(first_ && start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_)) ? 1 : 0) > 0;
   if (earlier) start_from_checkpoint();
   else if (first_) start_fresh(start);
+  reference.use([&](const ReferenceData& data) {
+    writer_ = std::make_unique<FrameWriter>(folder_, data, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
+  });
   if (!first_) return;
-  writer_ = std::make_unique<FrameWriter>(folder_, reference, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
 }
 

@@ -52,14 +52,31 @@ std::array<Point, 3> orthogonalized(std::array<std::vector<double>, 3>& x) {
   return rotation;
 }
 
-double fitted(const HistoryDescription& record, const Body& body, const std::vector<double>& values) {
-  const auto& members = body.set(record.set);
-  const double n = static_cast<double>(members.size());
+/// Of the points of a set, in its order: place and volume.
+using Rows = std::vector<std::array<double, 4>>;
+
+/// On rank 0 those of all ranks. All of them must call it.
+Rows rows_of(const std::string& set, const BodyProblem& problem) {
+  const Body& body = problem.body();
+  std::vector<double> mine;
+  for (const std::int32_t index : body.set(set)) {
+    const auto p = static_cast<std::size_t>(index);
+    const Point x = body.position(p);
+    mine.insert(mine.end(), {x[0], x[1], x[2], body.volume(p)});
+  }
+  const std::vector<double> all = gather_set(problem, set, mine, 4);
+  Rows rows(all.size() / 4);
+  for (std::size_t n = 0; n < rows.size(); ++n) std::copy_n(&all[4 * n], 4, rows[n].begin());
+  return rows;
+}
+
+double fitted(const HistoryDescription& record, const Rows& rows, const std::vector<double>& values) {
+  const double n = static_cast<double>(rows.size());
   const auto mean_of = [n](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0) / n; };
   std::array<std::vector<double>, 3> x;   // places, from their centre
   Point centre{};
   for (std::size_t c = 0; c < 3; ++c) {
-    for (const std::int32_t p : members) x[c].push_back(body.position(static_cast<std::size_t>(p))[c]);
+    for (const auto& row : rows) x[c].push_back(row[c]);
     centre[c] = mean_of(x[c]);
     for (double& coordinate : x[c]) coordinate -= centre[c];
   }
@@ -79,14 +96,12 @@ double fitted(const HistoryDescription& record, const Body& body, const std::vec
   return fit;
 }
 
-double error(const HistoryDescription& record, const Body& body, const std::vector<double>& values, double t) {
-  const auto& members = body.set(record.set);
+double error(const HistoryDescription& record, const Rows& rows, const std::vector<double>& values, double t) {
   double distance = 0, size = 0;
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const auto p = static_cast<std::size_t>(members[k]);
-    const double exact = (*record.exact)(body.position(p), t), off = values[k] - exact;
-    distance += body.volume(p) * off * off;
-    size += body.volume(p) * exact * exact;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double exact = (*record.exact)({rows[k][0], rows[k][1], rows[k][2]}, t), off = values[k] - exact, volume = rows[k][3];
+    distance += volume * off * off;
+    size += volume * exact * exact;
   }
   if (distance == 0) return 0;
   if (size > 0) return std::sqrt(distance / size);
@@ -99,10 +114,10 @@ double error(const HistoryDescription& record, const Body& body, const std::vect
 
 double reduced(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields, double t) {
   const std::vector<double> values = gather_set(problem, record.set, values_of(record, problem.body(), fields));
+  const Rows rows = record.reduce == "fit" || record.reduce == "error" ? rows_of(record.set, problem) : Rows();
   if (values.empty()) return 0;  // rank 0 has them
-  const Body& body = problem.whole();
-  if (record.reduce == "fit") return fitted(record, body, values);
-  if (record.reduce == "error") return error(record, body, values, t);
+  if (record.reduce == "fit") return fitted(record, rows, values);
+  if (record.reduce == "error") return error(record, rows, values, t);
   if (record.reduce == "min") return *std::ranges::min_element(values);
   if (record.reduce == "max") return *std::ranges::max_element(values);
   const double sum = std::accumulate(values.begin(), values.end(), 0.0);

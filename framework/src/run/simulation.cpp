@@ -115,7 +115,7 @@ std::vector<std::string> said_by_all(const std::vector<std::string>& lines) {
 std::string ranks_summary(const BodyProblem& problem) {
   const Partition& partition = *problem.partition();
   const std::vector<std::int64_t>& points = partition.points();
-  const double mean = static_cast<double>(partition.whole().points_of_all_ranks()) / static_cast<double>(points.size());
+  const double mean = static_cast<double>(problem.body().points_of_all_ranks()) / static_cast<double>(points.size());
   const auto ghosts = static_cast<double>(problem.ghosts()->size());
   const auto bytes = static_cast<double>(problem.bytes());
   const double most_ghosts = communicator().largest(ghosts), most_bytes = communicator().largest(bytes);
@@ -125,10 +125,12 @@ std::string ranks_summary(const BodyProblem& problem) {
       "balance       {} points on the largest rank, {:.3f} of the mean\n"
       "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
       "exchange      at most {:.3g} MB a rank and step\n"
-      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n",
+      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n"
+      "placed        {}\n",
       points.size(), thread_count(), *std::ranges::max_element(points),
       static_cast<double>(*std::ranges::max_element(points)) / mean, most_ghosts, most_ghosts / mean, sent / 1e6,
-      most_bytes / 1e6, most_bytes / mean);
+      most_bytes / 1e6, most_bytes / mean,
+      problem.placed_whole().empty() ? "by each rank its own part" : "the whole body by each rank: " + problem.placed_whole());
 }
 
 }  // namespace
@@ -139,9 +141,8 @@ std::string Simulation::summary() {
   std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points_of_all_ranks(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
   if (problem_->images())
-    text +=
-        fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n",
-                    problem_->whole().points() - body.points_of_all_ranks());
+    text += fmt::format("images        {} points beyond faces, planes of symmetry and periodic sides\n",
+                        problem_->partition() ? problem_->partition()->images() : body.points() - body.points_of_all_ranks());
   std::int64_t singular = static_cast<std::int64_t>(report.singular_families);
   communicator().sum({&singular, 1});
   std::vector<std::string> lines;

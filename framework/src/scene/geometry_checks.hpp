@@ -3,8 +3,9 @@
 
 namespace perikit {
 
-/// Bodies above this number of points are refused.
-inline constexpr double largest_point_count = 2e9;
+/// Bodies above this number of points are refused, on however many ranks: they name points by whole numbers that a double holds.
+/// What one rank can have is known when the body is built.
+inline constexpr double largest_point_count = 4e15;
 
 /// Estimated points of the bounding box of the lattice, as a double so that nothing overflows.
 double lattice_point_count(const LatticeDescription& lattice, int dimension);

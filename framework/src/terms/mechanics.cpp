@@ -57,11 +57,13 @@ std::vector<HistoryPlace> Mechanics::history_points() {
   constexpr std::size_t at_once = 1024;  // groups, so that what is found of them takes little memory
   const Body& body = parts_.families.body();
   const Field values = body.make_field(body.dimension());
-  const auto place = [&](std::int32_t p) { return body.places().place.empty() || p < 0 ? p : body.places().place[static_cast<std::size_t>(p)]; };
+  const auto place = [&](std::int32_t p) -> std::int64_t {
+    return !body.part() || p < 0 ? p : body.places().place[static_cast<std::size_t>(p)];
+  };
   // Those of points and of parts of families have no far end.
   const bool of_bonds = parts_.formulation.bond || (parts_.formulation.weighted && parts_.formulation.parts(body.dimension()) == 0);
   std::vector<HistoryPlace> points;
-  std::map<std::int32_t, std::int32_t> parts;  // so far, of those whose evaluation points are parts of their families
+  std::map<std::int32_t, std::int64_t> parts;  // so far, of those whose evaluation points are parts of their families
   const std::size_t groups = body.stride() / padding;
   for (std::size_t first = 0; first < groups; first += at_once) {
     GroupMarks marks(groups, 0);
@@ -70,7 +72,8 @@ std::vector<HistoryPlace> Mechanics::history_points() {
     parts.clear();
     for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) {
       const bool own = body.owns(static_cast<std::size_t>(found.owner));
-      const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1, of_bonds ? 0 : parts[found.owner]++};
+      const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1,
+                               of_bonds ? std::int64_t{0} : parts[found.owner]++};
       points.push_back({point, found.number, own});
       if (found.other_number >= 0) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
     }

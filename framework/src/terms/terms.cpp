@@ -384,7 +384,15 @@ std::vector<BondEnergy> Terms::released_energies(ConstFieldView u) {
 }
 
 std::vector<BondChange> Terms::changed_bonds() const {
-  return failing_ ? failing_->fracture.changed() : parts_.families->changed();
+  return parts_.families->changed();
+}
+
+std::vector<NamedChange> Terms::changed_bonds_of_all() const {
+  return SharedBonds(parts_.families->body()).outward(changed_bonds());
+}
+
+void Terms::restore_bonds_of_all(std::span<const NamedChange> changes) {
+  restore_bonds(SharedBonds(parts_.families->body()).inward(changes));
 }
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {

@@ -41,13 +41,22 @@ struct Images;
 /// an image of one of its own, whose force it needs in full; its own.
 enum class Role : std::uint8_t { absent, far, near, image, own };
 
-/// A rank's part of a body.
+/// A rank's part of a body that the rank has as a whole.
 struct BodyPart {
   std::vector<Role> roles;                      ///< by input number
   std::array<std::int64_t, 3> first{}, last{};  ///< lattices: the box of cells that holds all but absent points
   /// Clouds: by size of the blocks of points that loops run over, the colour of each block of the part. Its blocks are whole ones
   /// of the body.
   std::map<std::size_t, std::vector<std::int32_t>> colours;
+};
+
+/// A rank's part of a lattice that no rank has as a whole.
+struct LatticePart {
+  std::array<std::int64_t, 3> first{}, last{};  ///< the box of cells that holds the part
+  std::vector<std::int64_t> places;             ///< indices in the whole lattice, in input order
+  std::vector<Role> roles;                      ///< of these points
+  std::vector<std::int64_t> numbers;            ///< their input numbers in the whole body
+  std::int64_t points_of_all_ranks = 0;
 };
 
 /// What a body is beside its points.
@@ -68,15 +77,24 @@ class Body {
   Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes);
   /// A rank's part of another body, in the same order. Far points have a material of their own; sets keep the rank's own points.
   Body(const Body& whole, const BodyPart& part, std::uint16_t far_material);
+  /// The same of a lattice; without sets, and near points have the material 0.
+  Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_t far_material);
 
   /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws std::domain_error
   /// where two points of a lattice would be one.
   Body(const Body& whole, const Images& images, std::uint16_t image_material);
 
-  /// members: internal indices, each once, in the order that the set shall have. name: not "all".
-  void add_set(const std::string& name, std::vector<std::int32_t> members) { sets_[name] = std::move(members); }
+  /// members: internal indices, each once, in the order that the set shall have. name: not "all". order: see order_of().
+  void add_set(const std::string& name, std::vector<std::int32_t> members, std::vector<std::int64_t> order = {}) {
+    sets_[name] = std::move(members);
+    if (!order.empty()) orders_[name] = std::move(order);
+  }
   /// By internal index; see material_ids().
   void set_materials(std::vector<std::uint16_t> ids) { material_ids_ = std::move(ids); }
+  /// Input number in the whole body of a ghost, which its owner knows.
+  void set_number(std::size_t internal_index, std::int64_t number) {
+    numbers_[static_cast<std::size_t>(input_[internal_index])] = number;
+  }
 
   int dimension() const noexcept { return perikit::dimension(frame_.space); }
   Space space() const noexcept { return frame_.space; }
@@ -107,11 +125,19 @@ class Body {
 
   /// Where the points lie in the fields of the whole body.
   Places places() const noexcept { return {places_, stride_of_whole_}; }
+  /// Whether this is a part of a body.
+  bool part() const noexcept { return !places_.empty(); }
+  /// Of the fields of the whole body.
+  std::size_t stride_of_all_ranks() const noexcept { return part() ? stride_of_whole_ : stride_; }
+  /// Of a part: the internal index of the point at a place of the whole body; -1 where it is not here.
+  std::int32_t at_place(std::int64_t place) const noexcept;
   /// Input number in the whole body.
-  std::int32_t number(std::size_t internal_index) const noexcept {
+  std::int64_t number(std::size_t internal_index) const noexcept {
     const std::int32_t input = input_of(internal_index);
     return numbers_.empty() || input < 0 ? input : numbers_[static_cast<std::size_t>(input)];
   }
+  /// The internal index of the point with this input number in the whole body; -1 where it is not here.
+  std::int32_t find(std::int64_t number) const noexcept;
   /// Whether no other rank owns the point.
   bool owns(std::size_t internal_index) const noexcept { return own_.empty() || own_[internal_index]; }
   /// Internal indices of the points whose forces are complete here: those of this rank, and the images of them. One rank: all.
@@ -126,6 +152,12 @@ class Body {
   const std::vector<std::int32_t>& owned() const noexcept { return owned_.empty() ? internal_ : owned_; }
   /// Internal indices in input order. "all": those that the body owns.
   const std::vector<std::int32_t>& set(const std::string& name) const { return name == "all" ? owned() : sets_.at(name); }
+  /// Of a part: the input numbers in the whole body of all members of a set, on whatever rank, in its order; empty where they
+  /// ascend.
+  std::span<const std::int64_t> order_of(const std::string& set) const noexcept {
+    const auto known = orders_.find(set);
+    return known == orders_.end() ? std::span<const std::int64_t>() : known->second;
+  }
   /// But for "all".
   const std::map<std::string, std::vector<std::int32_t>>& sets() const noexcept { return sets_; }
   /// Which of the materials of the body each point has; empty when all are 0.
@@ -140,6 +172,7 @@ class Body {
   void copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others);
   void place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions);
   void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
+  void keep_places(const std::vector<std::int64_t>& places, const std::vector<Role>& roles);
 
   BodyFrame frame_;
   std::size_t stride_ = 0, margin_ = 0;
@@ -151,14 +184,16 @@ class Body {
   std::vector<std::uint8_t> alive_;
   std::vector<std::int32_t> owned_;     ///< empty: all
   std::map<std::string, std::vector<std::int32_t>> sets_;
+  std::map<std::string, std::vector<std::int64_t>> orders_;
   std::vector<std::uint16_t> material_ids_;
   std::size_t points_of_all_ranks_ = 0;
   // Of a part; else empty.
-  std::vector<std::int32_t> places_;   ///< by internal index
-  std::vector<std::int32_t> numbers_;  ///< by input number
+  std::vector<std::int64_t> places_;   ///< by internal index
+  std::vector<std::int64_t> numbers_;  ///< by input number
   std::vector<std::uint8_t> own_;      ///< by internal index
   std::vector<std::int32_t> complete_;
   std::size_t stride_of_whole_ = 0;
+  std::optional<Lattice> whole_lattice_;
   std::map<std::size_t, std::vector<std::int32_t>> colours_;
 };
 

@@ -28,7 +28,8 @@ struct Lattice {
     return base + k0 + pitch[0] * (k1 + pitch[1] * k2);
   }
   std::array<std::int64_t, 3> cell(std::int64_t index) const noexcept;
-  std::array<double, 3> position(std::int64_t index) const noexcept;
+  std::array<double, 3> position(std::int64_t index) const noexcept { return centre(cell(index)); }
+  std::array<double, 3> centre(const std::array<std::int64_t, 3>& cell) const noexcept;
   std::int64_t shift(const std::array<int, 3>& offset) const noexcept {
     return offset[0] + pitch[0] * (offset[1] + pitch[1] * offset[2]);
   }

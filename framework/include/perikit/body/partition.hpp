@@ -4,12 +4,16 @@
 /// that they have on one rank.
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "perikit/body/body.hpp"
 
 namespace perikit {
+
+class LatticeShares;
 
 class Partition {
  public:
@@ -23,35 +27,50 @@ class Partition {
   /// All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
   /// images, and whoever owns a block has them. Throws std::domain_error where the body has too few blocks for the ranks.
   Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
+  /// Of a lattice without images that no rank has as a whole: `inside` (empty: true) is asked at the cells that the rank is to
+  /// have and no others. shares: what ranks own. All ranks must call it. Throws std::domain_error as above, and where a part has
+  /// more cells than indices can tell apart.
+  Partition(const BodyFrame& frame, const Lattice& lattice, const LatticeShares& shares,
+            const std::function<bool(const Point&)>& inside, const Reach& reach);
 
-  const Body& whole() const noexcept { return whole_; }
+  /// Null where no rank has it.
+  const Body* whole() const noexcept { return whole_ ? &*whole_ : nullptr; }
+  /// Where nobody refers to it any more.
+  void forget_whole() noexcept { whole_.reset(); }
   /// The points of this rank and its ghosts; far ones have the material number `far_material`. Once: it lets go of what it takes.
+  /// All ranks must call it.
   Body make_part(std::uint16_t far_material);
 
-  /// Input numbers of the whole body, by rank: points that rank k has as ghosts and this one owns, and the other way round.
+  /// Internal indices of the part, by rank: points that rank k has as ghosts and this one owns, and the other way round.
   const std::vector<std::vector<std::int32_t>>& lent() const noexcept { return lent_; }
   const std::vector<std::vector<std::int32_t>>& borrowed() const noexcept { return borrowed_; }
-  /// By input number: the rank that owns the point or image.
-  std::span<const std::uint16_t> owners() const noexcept { return owner_; }
   /// Points of each rank, without images.
   const std::vector<std::int64_t>& points() const noexcept { return points_; }
+  /// Images of all ranks.
+  std::size_t images() const noexcept { return images_; }
 
  private:
+  void refuse_idle(std::size_t real) const;
   void share_lattice(int size);
   void share_cloud(int size);
   void choose_images();
   void keep_cells(const Reach& reach);
   void keep_families(const Reach& reach);
-  void exchange_borders();
+  void exchange_borders(const Body& part);
+  void exchange_numbers(Body& part) const;
 
   /// visit(input number, input number of the source) of the images.
   template <class Visit>
   void over_images(Visit&& visit) const;
 
-  Body whole_;
+  std::optional<Body> whole_;
   std::vector<std::int32_t> sources_;
-  BodyPart part_;
-  std::vector<std::uint16_t> owner_;
+  std::size_t images_ = 0;
+  BodyPart part_;    ///< of the whole body
+  BodyFrame frame_;  ///< where there is none
+  Lattice lattice_;
+  LatticePart lattice_part_;
+  std::vector<std::uint16_t> owner_;  ///< by input number of the whole body, else of the part
   std::vector<std::int64_t> points_;
   std::vector<std::vector<std::int32_t>> lent_, borrowed_;
 };

@@ -25,6 +25,8 @@ class Communicator {
   virtual ~Communicator();
   virtual int rank() const noexcept = 0;
   virtual int size() const noexcept = 0;
+  /// Whether the others are there; a rank whose others are not sets up its part as if they were.
+  virtual bool complete() const noexcept { return true; }
 
   /// numbers <- their sums over all ranks. All ranks must call it.
   virtual void sum(std::span<std::int64_t> numbers) = 0;

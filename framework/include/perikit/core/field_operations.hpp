@@ -54,7 +54,7 @@ void fill(double value, FieldView x);
 void mask(ConstFieldView mask, FieldView x);
 /// Where the points of a part of a body lie in the fields of the whole one; `place` is empty where the part is the whole.
 struct Places {
-  std::span<const std::int32_t> place;
+  std::span<const std::int64_t> place;
   std::size_t stride = 0;
 };
 /// Fills x with fixed noise in [-1, 1), a hash of the index in the whole body and of the seed, where mask is not 0.

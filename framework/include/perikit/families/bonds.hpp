@@ -58,6 +58,16 @@ struct BondChange {
   double integrity = 0;
 };
 
+/// The same as all ranks name it: by the places of its ends in the whole body.
+struct NamedBond {
+  std::int64_t point = 0, far = 0;
+  friend auto operator<=>(const NamedBond&, const NamedBond&) = default;
+};
+struct NamedChange {
+  NamedBond bond;
+  double integrity = 0;
+};
+
 /// What a bond has of the stored energy.
 struct BondEnergy {
   BondId bond;

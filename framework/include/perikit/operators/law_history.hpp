@@ -12,9 +12,9 @@ namespace perikit {
 
 /// What an evaluation point is in the whole body, whatever part of it a rank has.
 struct HistoryPoint {
-  std::int32_t owner;   ///< place in the whole body
-  std::int32_t far;     ///< of a bond the place of its other end; else -1
-  std::int32_t which;   ///< of several between the same points
+  std::int64_t owner;  ///< place in the whole body
+  std::int64_t far;    ///< of a bond the place of its other end; else -1
+  std::int64_t which;  ///< of several between the same points
   auto operator<=>(const HistoryPoint&) const = default;
 };
 /// Where its history is.

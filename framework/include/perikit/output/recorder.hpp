@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "perikit/fields/point_field.hpp"
@@ -23,9 +25,24 @@ struct ReferenceData {
     double volume = 0;                ///< [m^3]
     std::int64_t material_id = 0;
   };
+  /// Ids of points, ascending, a piece at a time.
+  class Set {
+   public:
+    using Use = std::function<void(std::span<const std::int64_t>)>;
+    Set(std::initializer_list<std::int64_t> ids) : Set(std::vector<std::int64_t>(ids)) {}
+    explicit Set(std::vector<std::int64_t> ids)
+        : size_(ids.size()), pieces_([ids = std::move(ids)](const Use& use) { use(ids); }) {}
+    Set(std::size_t size, std::function<void(const Use&)> pieces) : size_(size), pieces_(std::move(pieces)) {}
+    std::size_t size() const noexcept { return size_; }
+    void each(const Use& use) const { pieces_(use); }
+
+   private:
+    std::size_t size_;
+    std::function<void(const Use&)> pieces_;
+  };
   std::size_t points = 0;
   std::function<Point(std::size_t)> point;   ///< by id, 0 to points - 1
-  std::map<std::string, std::vector<std::int64_t>> sets;   ///< ids of points
+  std::map<std::string, Set> sets;
 };
 
 struct RunAttributes {

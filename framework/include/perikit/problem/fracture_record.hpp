@@ -27,7 +27,7 @@ class FractureRecord {
   void write(const Terms& terms, ByteWriter& out) const;
   void read(Terms& terms, ByteReader& in);
   /// What `write` wrote, the bonds alone.
-  static void read_bonds(ByteReader& in, std::vector<BondChange>& bonds);
+  static void read_bonds(ByteReader& in, std::vector<NamedChange>& bonds);
 
  private:
   void read_account(ByteReader& in);

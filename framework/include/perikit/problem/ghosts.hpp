@@ -11,8 +11,8 @@ namespace perikit {
 
 class Ghosts {
  public:
-  /// `part` is that of the partition. Fields have at most so many components.
-  Ghosts(const Partition& partition, const Body& part, int components);
+  /// Of the part that the partition has made. Fields have at most so many components.
+  Ghosts(const Partition& partition, int components);
 
   /// Ghosts <- values of their owners.
   void forward(FieldView field);

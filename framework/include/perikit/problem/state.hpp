@@ -48,12 +48,11 @@ class State {
   std::span<double> declare_numbers(const std::string& name, std::size_t count);
 
   std::size_t bytes() const noexcept;
-  /// whole: the body that this one is a rank's part of; the state of all of it is then written, by rank 0 alone. All ranks must
-  /// call it.
-  void write(const Body& whole, ByteWriter& out) const;
+  /// Of all ranks, by rank 0 alone. All ranks must call it.
+  void write(ByteWriter& out) const;
   /// What was declared but not written becomes zero. Throws InputError where the bytes cannot be those of a state of the whole
   /// body.
-  void read(const Body& whole, ByteReader& in);
+  void read(ByteReader& in);
 
  private:
   const Body* body_;

@@ -120,9 +120,12 @@ class Terms {
   /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
   /// DamageTraits::released).
   std::vector<BondEnergy> released_energies(ConstFieldView u);
-  /// Every bond that is not as it was at the set-up: run state, for checkpoints.
+  /// Every bond here that is not as it was at the set-up.
   std::vector<BondChange> changed_bonds() const;
   void restore_bonds(std::span<const BondChange> changes);
+  /// The same of all ranks, on rank 0: run state, for checkpoints. All ranks must call both.
+  std::vector<NamedChange> changed_bonds_of_all() const;
+  void restore_bonds_of_all(std::span<const NamedChange> changes);
   BondChecks bond_checks() const;
 
  private:

@@ -1,0 +1,126 @@
+/// Interfaces of a lattice that no rank has as a whole.
+
+#include <algorithm>
+#include <tuple>
+
+#include "body/crossings.hpp"
+#include "body/interfaces.hpp"
+#include "perikit/core/parallel.hpp"
+#include "perikit/core/rank_values.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Two materials, and the lowest coordinates of the midpoints between them.
+struct Meeting {
+  std::uint16_t first, second;
+  Point lower;
+};
+
+/// The pair of materials that the crossing at `begin` is of: where its crossings end.
+template <class At>
+At end_of_pair(At begin, At end) {
+  return std::find_if(begin, end, [&](const Crossing& c) { return c.first != begin->first || c.second != begin->second; });
+}
+
+/// All pairs on all ranks, ascending.
+std::vector<Meeting> meetings_of_all(std::span<const Crossing> own) {
+  std::vector<Meeting> mine;
+  for (auto begin = own.begin(); begin != own.end();) {
+    const auto end = end_of_pair(begin, own.end());
+    mine.push_back({begin->first, begin->second, lowest_middle({begin, end})});
+    begin = end;
+  }
+  std::vector<Meeting> all;
+  std::vector<Meeting> found = gathered<Meeting>(mine);
+  std::ranges::stable_sort(found, {}, [](const Meeting& m) { return std::pair(m.first, m.second); });
+  for (const Meeting& meeting : found) {
+    if (all.empty() || all.back().first != meeting.first || all.back().second != meeting.second) all.push_back(meeting);
+    for (std::size_t a = 0; a < 3; ++a) all.back().lower[a] = std::min(all.back().lower[a], meeting.lower[a]);
+  }
+  return told_to_all(all);
+}
+
+/// The box around the points of a part.
+struct Bounds {
+  Point low, high;
+  explicit Bounds(const Body& body) : low(body.position(static_cast<std::size_t>(body.internal().front()))), high(low) {
+    for (const std::int32_t p : body.internal())
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double x = body.position(static_cast<std::size_t>(p))[a];
+        low[a] = std::min(low[a], x);
+        high[a] = std::max(high[a], x);
+      }
+  }
+  bool near(const Point& x, double distance) const noexcept {
+    for (std::size_t a = 0; a < 3; ++a)
+      if (x[a] < low[a] - distance || x[a] > high[a] + distance) return false;
+    return true;
+  }
+};
+
+/// What distances up to `reach` depend on: crossings a bond farther, and of each the midpoints in the window of its plane.
+double reach_of_midpoints(const Body& part, double reach) {
+  return reach + 4.1 * part.horizon();
+}
+
+}  // namespace
+
+double surroundings(const Body& part, double reach) {
+  // The ends of bonds to these midpoints, and what may be nearer to them.
+  return reach_of_midpoints(part, reach) + 1.6 * part.horizon();
+}
+
+Interfaces find_interfaces(const Body& part, const Lattice& whole, std::span<const std::uint16_t> material,
+                           const MeetingPoints& meeting, double reach) {
+  std::vector<Point> places;
+  for (const std::int64_t place : meeting.place) places.push_back(whole.position(place));
+  const Boxes boxes(std::move(places), part.horizon() * (1 + 1e-9));
+  std::vector<Crossing> crossings = find_crossings(part.horizon(), boxes, meeting.material);
+  // Farther ones may not be what they are in the whole body.
+  const Bounds bounds(part);
+  std::erase_if(crossings, [&](const Crossing& c) { return !bounds.near(c.middle, reach_of_midpoints(part, reach)); });
+  std::vector<Crossing> own;
+  std::ranges::copy_if(crossings, std::back_inserter(own),
+                       [&](const Crossing& c) { return meeting.own[static_cast<std::size_t>(c.of_first)] != 0; });
+  Interfaces found;
+  const std::vector<Meeting> all = meetings_of_all(own);
+  if (all.empty()) return found;
+  for (const Meeting& pair : all) found.pairs.emplace_back(pair.first, pair.second);
+  found.length = part.horizon();
+  found.material.assign(part.stride(), 0);
+  found.source.assign(part.stride(), -1);
+  const auto internal = part.internal();
+  for (std::size_t n = 0; n < internal.size(); ++n) {
+    found.material[static_cast<std::size_t>(internal[n])] = material[n];
+    found.source[static_cast<std::size_t>(internal[n])] = internal[n];
+  }
+  for (auto begin = crossings.begin(); begin != crossings.end();) {
+    const auto end = end_of_pair(begin, crossings.end());
+    const auto pair = std::ranges::find(all, std::pair(begin->first, begin->second),
+                                        [](const Meeting& m) { return std::pair(m.first, m.second); });
+    const MaterialSurface surface(part, {begin, end}, pair->lower, reach);
+    begin = end;
+    std::vector<Distance> distance(internal.size());
+    parallel_for(internal.size(), [&](std::size_t n) {
+      distance[n] = surface.distance(part.position(static_cast<std::size_t>(internal[n])), material[n]);
+    });
+    std::vector<std::pair<std::int32_t, std::size_t>> near;
+    for (std::size_t n = 0; n < internal.size(); ++n)
+      if (distance[n].counterpart >= 0) near.emplace_back(internal[n], n);
+    if (near.empty()) continue;
+    std::ranges::sort(near);
+    Interface& interface = found.all.emplace_back();
+    interface.first = surface.first();
+    interface.second = surface.second();
+    for (const auto& [p, n] : near) {
+      interface.point.push_back(p);
+      interface.distance.push_back(distance[n].value);
+      interface.counterpart.push_back(part.at_place(meeting.place[static_cast<std::size_t>(distance[n].counterpart)]));
+    }
+  }
+  return found;
+}
+
+}  // namespace perikit
