@@ -72,4 +72,7 @@ bool needs_one_rank(const std::string& preconditioner) noexcept;
 /// `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
+/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli.
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk);
+
 }  // namespace perikit
