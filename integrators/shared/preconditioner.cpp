@@ -200,7 +200,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
-  const double least_ratio = problem.dimension() == 3 && problem.body().lattice() ? 50 : 200;
+  const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
   return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
