@@ -9,6 +9,18 @@
 
 namespace perikit {
 
+namespace {
+
+/// Errors of volumes before and after a correction. False where there was none.
+bool say(const std::pair<double, double>& errors, std::string& note) {
+  const auto [before, after] = errors;
+  if (after >= before) return false;
+  note += fmt::format("  volumes {:.1e} to {:.1e}", before, after);
+  return true;
+}
+
+}  // namespace
+
 MixedEquations::MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes)
     : max_restarts_(options.max_restarts),
       restart_(options.restart),
@@ -60,6 +72,7 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
   const int iterations = SUNLinSolNumIters(gmres_.get());
   const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
   note += fmt::format("  gmres {:4} to {:.1e}", iterations, reached);
+  system_.took(iterations, reached);
   if (flag == SUNLS_SUCCESS || (flag == SUNLS_RES_REDUCED && reached < 0.9)) return true;
   failure = !failure_.empty() ? failure_
                               : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})",
@@ -72,20 +85,13 @@ double MixedEquations::accuracy_for_motions(double accuracy) const {
   return accuracy * std::min(1.0, 100 / std::max(1.0, system_.largest_ratio()));
 }
 
-bool MixedEquations::correct(ConstFieldView u, VolumeEquations::Volumes volumes, double enough, FieldView du, std::string& note) {
-  const auto [before, after] = system_.correct(u, volumes, enough, du);
-  if (after >= before) return false;
-  note += fmt::format("  volumes {:.1e} to {:.1e}", before, after);
-  return true;
-}
-
 void MixedEquations::refine(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
-  correct(u, VolumeEquations::Volumes::promised, 0.1 * equilibrium.tolerance() * equilibrium.reference(), du, note);
+  say(system_.correct(u, solution_, 0.1 * equilibrium.tolerance() * equilibrium.reference(), du), note);
 }
 
 bool MixedEquations::refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) {
   std::string failure;
-  return system_.linearise_volumes(equilibrium, u, failure) && correct(u, VolumeEquations::Volumes::kept, 0.0, du, note);
+  return system_.linearise_volumes(equilibrium, u, failure) && say(system_.keep_volumes(u, du), note);
 }
 
 }  // namespace perikit

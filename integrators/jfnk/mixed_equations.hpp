@@ -17,10 +17,10 @@ class MixedEquations final : public LinearisedProblem {
   bool refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) override;
   double accuracy_for_motions(double accuracy) const override;
   bool exact() const noexcept override { return false; }
+  void bonds_changed() override { system_.discard(); }
 
  private:
   static int multiply(void* self, N_Vector x, N_Vector y);
-  bool correct(ConstFieldView u, VolumeEquations::Volumes volumes, double enough, FieldView du, std::string& note);
   static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int side);
 
   int max_restarts_, restart_;

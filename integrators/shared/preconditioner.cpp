@@ -103,7 +103,7 @@ class BlockJacobi final : public Preconditioner {
 /// ranks the first one makes and applies that of the whole body: a solve takes the iterations that it takes on one.
 class CompanionCycle final : public Preconditioner {
  public:
-  explicit CompanionCycle(Problem& problem) : Preconditioner(problem) {
+  CompanionCycle(Problem& problem, double most_bulk) : Preconditioner(problem), most_bulk_(most_bulk) {
     if (communicator().size() > 1) first_rank_.emplace(problem.body(), problem.body().owned());
   }
 
@@ -116,7 +116,7 @@ class CompanionCycle final : public Preconditioner {
 
  private:
   bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
-    equilibrium.problem().assemble_companion(u, springs_, std::numeric_limits<double>::infinity());
+    equilibrium.problem().assemble_companion(u, springs_, most_bulk_);
     std::vector<Field> rigid = rigid_motions(equilibrium.problem().body(), u);
     if (!first_rank_) {
       multigrid_.make(springs_, equilibrium.free(), rigid);
@@ -130,6 +130,7 @@ class CompanionCycle final : public Preconditioner {
   }
   double patience() const noexcept override { return 1.3; }  // it is cheap
 
+  double most_bulk_;  ///< in shear moduli
   BlockMatrix springs_;
   Multigrid multigrid_;
   std::optional<FirstRank> first_rank_;  ///< where there are several
@@ -199,7 +200,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
-  const double least_ratio = problem.dimension() == 3 && problem.body().lattice() ? 50 : 200;
+  const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
   return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
@@ -212,9 +213,13 @@ std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Pro
   // The assembled tangent needs the whole body on one rank.
   if (name == "auto") chosen = communicator().size() == 1 && factorisation_pays(problem) ? "factorisation" : "companion";
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
-  if (chosen == "companion") return std::make_unique<CompanionCycle>(problem);
+  if (chosen == "companion") return make_companion_cycle(problem, std::numeric_limits<double>::infinity());
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
   return nullptr;
+}
+
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk) {
+  return std::make_unique<CompanionCycle>(problem, most_bulk);
 }
 
 }  // namespace perikit

@@ -59,8 +59,9 @@ class Preconditioner {
 /// The key `preconditioner` of an integrator. mixed: it has mixed systems (MixedSystem).
 void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 
-/// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has the
-/// volumes that they need: the bulk modulus is at least 200 shear moduli somewhere (50 on lattices in 3D), and the factorisation does not pay.
+/// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has
+/// the volumes that they need: the bulk modulus is at least 50 shear moduli somewhere (20 on lattices in 3D, 200 in 2D), and the
+/// factorisation does not pay.
 bool mixed_pays(Problem& problem);
 
 /// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.
@@ -71,5 +72,8 @@ bool needs_one_rank(const std::string& preconditioner) noexcept;
 /// most 4000 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else, and on several ranks, the companion.
 /// `chosen` <- what auto chose, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
+
+/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli.
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk);
 
 }  // namespace perikit

@@ -17,7 +17,9 @@ namespace {
 constexpr double schur_accuracy = 0.1;  // of the two solves with L: a better one saves few iterations of the outer method
 constexpr double correction_accuracy = 0.05;
 constexpr int most_products = 200, least_corrections = 3, most_corrections = 12;
-constexpr double small_pressure = 0.1;   // in shear moduli: an error of it leaves the tangent as it is
+constexpr double full_weight = 50;        // in shear moduli: errors of volumes count as forces up to such W
+constexpr double most_with_waves = 1000;  // ratio: beyond it W^-1 loses no waves of bodies of up to 30 points a side, and is faster
+constexpr double small_pressure = 0.1;    // in shear moduli: an error of it leaves the tangent as it is
 
 /// Sum of term(k) over [0, n), block by block in their order: not exact, but the same on any number of threads, and mixed systems are on one rank.
 template <class Term>
@@ -35,10 +37,10 @@ double sum_of(std::size_t n, Term&& term) {
 
 VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
     : problem_(problem), volumes_(std::move(volumes)) {
-  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_norms_, &inverse_diagonal_, &residual_, &direction_, &product_,
-                        &first_, &second_})
+  for (Field* scalar : {&W_, &inverse_W_, &active_, &row_scales_, &inverse_diagonal_, &residual_, &direction_, &product_, &first_,
+                        &second_, &compliant_})
     *scalar = problem.body().make_field(1);
-  for (Field* vector : {&inverse_D_, &force_, &action_}) *vector = problem.make_field();
+  for (Field* vector : {&inverse_D_, &force_, &action_, &power_}) *vector = problem.make_field();
 }
 
 EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix& companion, ConstFieldView free) {
@@ -60,7 +62,7 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
     }
   });
   fill(1.0, force_);
-  volumes_->squares(force_, row_norms_);
+  volumes_->squares(force_, row_scales_);
   volumes_->squares(inverse_D_, inverse_diagonal_);
   for (Field* scalar : {&W_, &inverse_W_, &active_}) fill(0.0, *scalar);
   largest_ratio_ = 0;
@@ -68,8 +70,8 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
     const auto p = static_cast<std::size_t>(index);
     const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
     const double excess = volumes_->stiffness().data[p] - ordinary * shear;
-    row_norms_.data()[p] = std::sqrt(row_norms_.data()[p]);
     if (excess <= 0) continue;
+    row_scales_.data()[p] = std::sqrt(row_scales_.data()[p]) * std::max(excess / 100, std::min(excess, full_weight * shear));
     W_.data()[p] = excess;
     inverse_W_.data()[p] = 1 / excess;
     largest_ratio_ = std::max(largest_ratio_, excess / shear);
@@ -77,6 +79,8 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
     inverse_diagonal_.data()[p] = 1 / (inverse_diagonal_.data()[p] + 1 / excess);
   }
   mask(active_, inverse_diagonal_);
+  waves_ = largest_ratio_ <= most_with_waves;
+  if (waves_) R_.make(companion, inverse_W_);
   return status;
 }
 
@@ -90,13 +94,13 @@ void VolumeEquations::forces(ConstFieldView q, FieldView f) const {
   mask(free_, f);
 }
 
-/// L p, and p . L p.
-double VolumeEquations::multiply(ConstFieldView p, FieldView Lp) {
+double VolumeEquations::multiply(ConstFieldView p, bool waves, FieldView Lp) {
   volumes_->forces(p, force_);
   mask(inverse_D_, force_);   // 0 on prescribed components
   volumes_->rates(force_, Lp);
+  if (waves) R_.multiply(p, compliant_);
   return sum_of(p.size(), [&](std::size_t k) {
-    Lp.data[k] = active_.data()[k] * Lp.data[k] + inverse_W_.data()[k] * p.data[k];
+    Lp.data[k] = active_.data()[k] * Lp.data[k] + (waves ? compliant_.data()[k] : inverse_W_.data()[k] * p.data[k]);
     return p.data[k] * Lp.data[k];
   });
 }
@@ -104,12 +108,26 @@ double VolumeEquations::multiply(ConstFieldView p, FieldView Lp) {
 void VolumeEquations::multiply_commutator(ConstFieldView p, FieldView Mp) {
   forces(p, force_);
   mask(inverse_D_, force_);
+  // M = C (1 + X)^-1, X = D^-1 C, and 1/(1 + x) by a polynomial on [0, 2], where the eigenvalues of X are.
+  copy(force_, power_);
+  for (const double coefficient : {-0.75, 0.22}) {
+    perikit::multiply(*companion_, power_, action_);
+    mask(inverse_D_, action_);
+    std::swap(power_, action_);
+    combine(1, force_, coefficient, power_, force_);
+  }
   perikit::multiply(*companion_, force_, action_);
   mask(inverse_D_, action_);
   rates(action_, Mp);
-  over_blocks(p.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) Mp.data[k] += inverse_W_.data()[k] * p.data[k];
-  });
+  if (waves_) {
+    R_.multiply(p, product_);
+    mask(W_, product_);
+    R_.multiply(product_, compliant_);
+  } else {
+    copy(p, compliant_);
+    mask(inverse_W_, compliant_);
+  }
+  combine(1, Mp, 1, compliant_, Mp);
 }
 
 double VolumeEquations::scaled_square(ConstFieldView b) const {
@@ -117,7 +135,7 @@ double VolumeEquations::scaled_square(ConstFieldView b) const {
 }
 
 /// Conjugate gradients with the diagonal of L, each step in as few passes over the fields as there are sums to wait for.
-void VolumeEquations::improve(double target, FieldView x) {
+void VolumeEquations::improve(double target, bool waves, FieldView x) {
   const std::size_t n = x.size();
   double* const residual = residual_.data();
   double* const direction = direction_.data();
@@ -127,7 +145,7 @@ void VolumeEquations::improve(double target, FieldView x) {
     over_blocks(n, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) direction[k] = scale[k] * residual[k] + (products > 0 ? size / last * direction[k] : 0.0);
     });
-    const double step = size / multiply(direction_, product_);
+    const double step = size / multiply(direction_, waves, product_);
     last = size;
     size = sum_of(n, [&](std::size_t k) {
       x.data[k] += step * direction[k];
@@ -137,14 +155,14 @@ void VolumeEquations::improve(double target, FieldView x) {
   }
 }
 
-void VolumeEquations::solve(ConstFieldView b, double accuracy, FieldView x) {
+void VolumeEquations::solve(ConstFieldView b, double accuracy, bool waves, FieldView x) {
   fill(0.0, x);
   copy(b, residual_);
-  improve(accuracy * accuracy * scaled_square(b), x);
+  improve(accuracy * accuracy * scaled_square(b), waves, x);
 }
 
 void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
-  solve(r, schur_accuracy, first_);
+  solve(r, schur_accuracy, waves_, first_);
   multiply_commutator(first_, second_);
   // The second solve begins at the multiple of the first one's result that is best in the norm of L: L first is what its residual lacks.
   const std::size_t n = r.size();
@@ -158,7 +176,7 @@ void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
       residual_.data()[k] = second_.data()[k] - share * of_first(k);
     }
   });
-  improve(schur_accuracy * schur_accuracy * scaled_square(second_), p);
+  improve(schur_accuracy * schur_accuracy * scaled_square(second_), waves_, p);
 }
 
 double VolumeEquations::largest_pressure(ConstFieldView error) const {
@@ -171,10 +189,9 @@ double VolumeEquations::largest_pressure(ConstFieldView error) const {
   return most;
 }
 
-std::pair<double, double> VolumeEquations::correct(ConstFieldView u, Volumes volumes, double enough, FieldView du) {
+std::pair<double, double> VolumeEquations::correct(ConstFieldView u, ConstFieldView growth, double enough, FieldView du) {
   Field target = problem_.body().make_field(1), error = problem_.body().make_field(1), moved = problem_.make_field();
-  if (volumes == Volumes::promised) volumes_->rates(du, target);
-  combine(1, target, 1, volumes_->logarithms(), target);
+  combine(1, growth, 1, volumes_->logarithms(), target);
   double before = 0, last = 0;
   for (int round = 0;; ++round) {
     combine(1, u, 1, du, moved);
@@ -195,7 +212,7 @@ std::pair<double, double> VolumeEquations::correct(ConstFieldView u, Volumes vol
     if (round == most_corrections || norm(force_) <= enough || (round >= least_corrections && largest_pressure(error) <= small_pressure))
       return {before, size};
     // The least motion z in the norm of D with B z = -error: z = -D^-1 B^T (B D^-1 B^T)^-1 error.
-    solve(error, correction_accuracy, first_);
+    solve(error, correction_accuracy, false, first_);
     forces(first_, action_);
     mask(inverse_D_, action_);
     combine(1, du, -1, action_, du);

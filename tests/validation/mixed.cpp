@@ -117,10 +117,10 @@ TEST_CASE("volumes that alternate between neighbours are warned of") {
   CHECK(run(*make(scene(3, 8, 1e4, jfnk("mixed")))).text.find(said) == std::string::npos);
 }
 
-TEST_CASE("auto takes mixed systems where they are faster: from a ratio of 50 on lattices in 3D, elsewhere from 200") {
+TEST_CASE("auto takes mixed systems where they are faster: in 3D from a ratio of 20 on lattices, 50 on clouds") {
   for (const char* jitter : {"0", "0.2"})
-    for (const double ratio : {40.0, 60.0, 190.0, 210.0}) {
-      const bool expected = ratio >= (jitter[1] == 0 ? 50 : 200);
+    for (const double ratio : {18.0, 22.0, 45.0, 55.0}) {
+      const bool expected = ratio >= (jitter[1] == 0 ? 20 : 50);
       INFO("jitter ", std::string(jitter), ", kappa/mu = ", ratio);
       CHECK((run(*make(scene(3, 5, ratio, jfnk("auto"), jitter))).text.find("preconditioner mixed") != std::string::npos) == expected);
     }
