@@ -11,6 +11,7 @@ namespace perikit {
 
 void BondSamples::clear(std::span<const std::uint8_t> kept) {
   kept_ = kept;
+  wanted_ = {};
   both_ways_ = false;
   all_.clear();
   of_thread_.resize(static_cast<std::size_t>(thread_count()));

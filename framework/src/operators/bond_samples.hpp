@@ -45,6 +45,9 @@ class BondSamples {
   void add(const Entry& entry);
   /// After the loops: in ascending order, each owner and far end once, whatever thread they came from.
   void merge();
+  /// Until the next `clear`: by group of eight points, as bits, the points whose bonds are wanted; empty: all of them.
+  void want(std::span<const std::uint8_t> points) noexcept { wanted_ = points; }
+  bool wants(std::size_t p) const noexcept { return wanted_.empty() || (wanted_[p / padding] >> p % padding & 1); }
   /// Until the next `clear`: what is said of a directed bond is said of the bond, both ways.
   void take_both_ways() noexcept { both_ways_ = true; }
   bool both_ways() const noexcept { return both_ways_; }
@@ -61,7 +64,7 @@ class BondSamples {
 
   Space space_;
   BondSampling what_;
-  std::span<const std::uint8_t> kept_;
+  std::span<const std::uint8_t> kept_, wanted_;
   std::vector<std::vector<Entry>> of_thread_;
   std::vector<Entry> all_;
   bool any_whole_ = false, both_ways_ = false;

@@ -63,7 +63,8 @@ void ImageMap::append_images(std::vector<std::int32_t>& points) const {
 std::vector<ImageMap::Part> ImageMap::parts_of_all(ConstFieldView reaction) const {
   std::vector<Part> parts;
   for (const Share& share : shares_)
-    parts.push_back({body_->number(static_cast<std::size_t>(share.image)), share.surface, share.component,
+    // Bodies with images are placed as a whole, whose numbers have 32 bits.
+    parts.push_back({static_cast<std::int32_t>(body_->number(static_cast<std::size_t>(share.image))), share.surface, share.component,
                      share.factor * reaction.component(share.component)[share.image]});
   if (body_->places().place.empty()) return parts;
   parts = told_to_all(gathered<Part>(parts));

@@ -325,7 +325,7 @@ void CloudConsistency::report(ModelReport& report) const {
                     "allowed: more parts, a larger horizon, or points that lie more evenly",
                     unbalanced, whole));
   if (whole + at_surfaces == 0)
-    report.warnings.push_back(
+    report.warnings.emplace_back(
         "the cloud cannot be made consistent: every point has bonds to two sides of the body or more; allowed: more points across");
 }
 

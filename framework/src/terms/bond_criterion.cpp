@@ -162,6 +162,7 @@ void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldVi
 void BondCriterion::collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept) {
   const GroupMarks wide = families_.around(owners);
   samples_.clear(kept);
+  if (formulation_.pairs) samples_.want(looked_at_);  // of others evaluation points are those of groups
   for (const auto& term : terms_) term->add_bonds(u, owners, wide, samples_);
   samples_.merge();
 }
@@ -310,6 +311,8 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
   find_flux(groups, u);
+  looked_at_.assign(own_.size(), 0);
+  for (const BondId bond : bonds) looked_at_[static_cast<std::size_t>(bond.point) / padding] |= static_cast<std::uint8_t>(1u << bond.point % static_cast<std::int32_t>(padding));
   sample(groups, u);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {

@@ -221,7 +221,7 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
     if (!marks[g] || !samples.keeps_group(g)) return;
     Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
-      if (!body_.alive(p)) continue;
+      if (!body_.alive(p) || !samples.wants(p)) continue;
       load_bonds(p, u, bonds);
       const FamilyArrays& family = bonds.family;
       const double of_own = dilates ? by_theta(p) : 0.0;
