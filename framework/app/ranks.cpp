@@ -17,18 +17,6 @@ namespace perikit::app {
 
 namespace {
 
-/// A rank without others: it sets itself up as if they were there.
-class LoneRank final : public SerialCommunicator {
- public:
-  LoneRank(int rank, int size) : rank_(rank), size_(size) {}
-  int rank() const noexcept override { return rank_; }
-  int size() const noexcept override { return size_; }
-  bool complete() const noexcept override { return false; }
-
- private:
-  int rank_, size_;
-};
-
 struct Share {
   double points = 0, near = 0, ghosts = 0, bytes = 0, of_all = 0;
   bool placed_whole = false;

@@ -159,18 +159,6 @@ TEST_CASE("local bodies: a lattice that is almost empty is a cloud, which no ran
 
 namespace {
 
-/// A rank whose others are not there.
-class LoneRank final : public SerialCommunicator {
- public:
-  LoneRank(int rank, int size) : rank_(rank), size_(size) {}
-  int rank() const noexcept override { return rank_; }
-  int size() const noexcept override { return size_; }
-  bool complete() const noexcept override { return false; }
-
- private:
-  int rank_, size_;
-};
-
 constexpr std::int64_t side = 1300;  // more than 2^31 cells in space
 const std::string large = "[1300, 1300, 1300]", sets = "low = \"x < 5\"\nsome = \"x > 1290\"";
 

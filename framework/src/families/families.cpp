@@ -34,6 +34,12 @@ void Families::let_fail() {
   make_room();
 }
 
+GroupMarks Families::groups_of(std::span<const std::int32_t> points) const {
+  GroupMarks marks(body_.stride() / padding, 0);
+  for (const std::int32_t p : points) marks[static_cast<std::size_t>(p) / padding] = 1;
+  return marks;
+}
+
 GroupMarks Families::around(const GroupMarks& marks) const {
   std::vector<std::int32_t> points;
   for (std::size_t group = 0; group < marks.size(); ++group)

@@ -77,6 +77,8 @@ class Families {
   void let_fail();
   /// Marks the groups of the points and of everything in their families, whole or not.
   virtual void mark(std::span<const std::int32_t> points, GroupMarks& marks) const = 0;
+  /// The groups of these points alone.
+  GroupMarks groups_of(std::span<const std::int32_t> points) const;
   /// The marked groups and those of everything in the families of their points.
   GroupMarks around(const GroupMarks& marks) const;
   /// known: what a loop over forces leaves behind; null: nothing. skip: see BondMonitor.

@@ -209,11 +209,8 @@ void Fracture::finish(BondUpdate& update) {
 
 /// Groups whose evaluation points depend on the bonds of these points; on all ranks the same.
 GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, const Body& body) const {
-  GroupMarks marks(families_.body().stride() / padding, 0);
-  if (body.owners_alone)
-    for (const std::int32_t p : ends) marks[static_cast<std::size_t>(p) / padding] = 1;
-  else
-    families_.mark(ends, marks);
+  GroupMarks marks = families_.groups_of(ends);
+  if (!body.owners_alone) families_.mark(ends, marks);
   shared_.mark(marks);
   return marks;
 }

@@ -53,12 +53,6 @@ LatticeTiles::LatticeTiles(const Body& body, const LatticeSlots& slots) {
   chunk_at_.assign(body.stride() / chunk_points, -1);
   for (std::size_t c = 0; c < chunks.size(); ++c)
     chunk_at_[static_cast<std::size_t>(chunks[c].first) / chunk_points] = static_cast<std::int32_t>(c);
-  for (const LatticeBlock& block : blocks) {
-    // Ranks own whole tiles: one point tells.
-    std::int64_t any = block.chunk_begin < block.chunk_end ? chunks[block.chunk_begin].first : -1;
-    while (any >= 0 && !body.alive(static_cast<std::size_t>(any))) ++any;
-    own_.push_back(any >= 0 && body.owns(static_cast<std::size_t>(any)));
-  }
   for (const LatticeRow& row : rows)
     for (int c = 0; c < row.chunks; ++c) {
       const std::int32_t at = row.first + c * chunk_points;

@@ -49,8 +49,6 @@ struct LatticeTiles {
 
   /// Index into `chunks` of the chunk with this point; -1: none.
   std::int32_t chunk_of(std::int64_t point) const noexcept { return chunk_at_[static_cast<std::size_t>(point) / chunk_points]; }
-  /// Whether the points of block b are this rank's.
-  bool owns(std::size_t b) const noexcept { return own_[b]; }
   /// Whether a point of block b moves.
   bool moves(std::size_t b, ConstFieldView u) const noexcept;
   /// Whether a group of block b is marked.
@@ -73,7 +71,6 @@ struct LatticeTiles {
   void colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Lattice& lattice,
               const LatticeSlots& slots);
 
-  std::vector<bool> own_;               ///< by block
   std::vector<std::int32_t> chunk_at_;  ///< by group of eight cells
   std::vector<std::pair<std::int32_t, std::uint8_t>>
       partly_dead_;  ///< first cells of such groups in rows, and which of them live

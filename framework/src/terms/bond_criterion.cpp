@@ -18,6 +18,10 @@ constexpr std::size_t most_at_once = std::size_t{1} << 19;
 /// point has this part of what would be needed if they did not. In running cracks of the strip of framework/docs/fracture.md the least part
 /// with which a bond failed was 0.58 (`baqp`, `projection`) and 0.26 (`bond_augmented`, `bond_associated`).
 double screened_release(const Formulation& formulation) noexcept { return formulation.bond && formulation.g_from_xi_only ? 0.25 : 0.125; }
+/// Adds point p to bits by group of eight points.
+void look_at(GroupMarks& bits, std::size_t p) noexcept {
+  bits[p / padding] |= static_cast<std::uint8_t>(1u << p % padding);
+}
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -117,7 +121,7 @@ GroupMarks BondCriterion::near_failure(ConstFieldView u) {
   for (const BondSamples::Entry& entry : samples_.entries()) {
     const auto p = static_cast<std::size_t>(entry.owner);
     const double left = body_.volume(p) * (1 - families_.damage(p));
-    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) near[p / padding] |= static_cast<std::uint8_t>(1u << p % padding);
+    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) look_at(near, p);
   }
   samples_.ask(asked);
   return near;
@@ -312,7 +316,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
   find_flux(groups, u);
   looked_at_.assign(own_.size(), 0);
-  for (const BondId bond : bonds) looked_at_[static_cast<std::size_t>(bond.point) / padding] |= static_cast<std::uint8_t>(1u << bond.point % static_cast<std::int32_t>(padding));
+  for (const BondId bond : bonds) look_at(looked_at_, static_cast<std::size_t>(bond.point));
   sample(groups, u);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {

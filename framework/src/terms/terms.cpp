@@ -181,14 +181,9 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
     for (int k = 0; k < times; ++k) marks = families.around(marks);
     return marks;
   };
-  const auto groups_of = [&](std::span<const std::int32_t> points) {
-    GroupMarks marks(body.stride() / padding, 0);
-    for (const std::int32_t p : points) marks[static_cast<std::size_t>(p) / padding] = 1;
-    return marks;
-  };
   const int reach = std::max(1, steps - 1);   // of the evaluation points at a point
-  GroupMarks renewed = around(groups_of(lost), reach);
-  const GroupMarks pulled = around(groups_of(moved), steps);
+  GroupMarks renewed = around(families.groups_of(lost), reach);
+  const GroupMarks pulled = around(families.groups_of(moved), steps);
   for (std::size_t g = 0; g < renewed.size(); ++g) renewed[g] |= pulled[g];
   GroupMarks only = around(renewed, reach);
   for (const auto& term : terms_)
@@ -218,15 +213,11 @@ GroupRings Terms::near_failed_bonds() const {
   const Families& families = *parts_.families;
   const Body& body = families.body();
   const SharedBonds shared(body);
-  GroupRings groups;
-  groups.inside.assign(body.stride() / padding, 0);
-  bool any = false;
+  std::vector<std::int32_t> lost;
   for (const std::int32_t p : body.owned())
-    if (families.lost_bonds(static_cast<std::size_t>(p))) {
-      groups.inside[static_cast<std::size_t>(p) / padding] = 1;
-      any = true;
-    }
-  if (communicator().largest(any ? 1 : 0) == 0) return {};
+    if (families.lost_bonds(static_cast<std::size_t>(p))) lost.push_back(p);
+  if (communicator().largest(lost.empty() ? 0 : 1) == 0) return {};
+  GroupRings groups{families.groups_of(lost), {}, {}};
   shared.mark(groups.inside);
   const auto around = [&](const GroupMarks& marks) {
     GroupMarks wider = families.around(marks);

@@ -1,5 +1,5 @@
 #pragma once
-/// The communicator of a process without others.
+/// The communicators of a process without others.
 
 #include <cstdlib>
 #include <span>
@@ -19,6 +19,18 @@ class SerialCommunicator : public Communicator {
   std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override { return {{bytes.begin(), bytes.end()}}; }
   void broadcast(std::vector<std::byte>&) override {}
   [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
+};
+
+/// A rank whose others are not there: it sets itself up as if they were.
+class LoneRank final : public SerialCommunicator {
+ public:
+  LoneRank(int rank, int size) : rank_(rank), size_(size) {}
+  int rank() const noexcept override { return rank_; }
+  int size() const noexcept override { return size_; }
+  bool complete() const noexcept override { return false; }
+
+ private:
+  int rank_, size_;
 };
 
 }  // namespace perikit
