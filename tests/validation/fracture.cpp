@@ -318,11 +318,17 @@ TEST_CASE("rubber sheet: the crack of a stretched, nearly incompressible sheet r
 
 TEST_CASE("rubber sheet with selective: half way through, torn families have created next to nothing") {
   // On 60 x 40 points. With the whole volume of torn families updates would raise the energy by a third of what is dissipated.
-  const auto sheet = load("fracture/rubber_sheet.toml", {"kinematics={type=\"selective\",base={type=\"baqp\"}}", "body.lattice.spacing=1e-3",
-                                                         "integrator.end_time=1.5e-3"});
-  const contract::Watch watch = contract::run(*sheet);
   // 2 % are given back, and 6 to 6.6 % where one late update does: in 7 of 28 runs with steps from 0.495 to 0.503 of the stable one.
-  check_dissipation(watch, 0.05, 0.08);
+  std::vector<double> shares;
+  for (const char* const safety : {"0.498", "0.5", "0.501"}) {
+    const auto sheet = load("fracture/rubber_sheet.toml", {"kinematics={type=\"selective\",base={type=\"baqp\"}}", "body.lattice.spacing=1e-3",
+                                                           "integrator.end_time=1.5e-3", fmt::format("integrator.safety={}", safety)});
+    const contract::Watch watch = contract::run(*sheet);
+    check_dissipation(watch, 0.05, 0.08);
+    shares.push_back(raised_by_updates(watch) / watch.energies.back().dissipated);
+  }
+  std::ranges::sort(shares);
+  CHECK(shares[1] <= 0.06);
 }
 
 TEST_CASE("rubber sheet with selective: bonds that let go gradually dissipate, and a resumed run is bitwise the run without a stop") {
