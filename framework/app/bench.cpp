@@ -1,6 +1,7 @@
 #include "bench.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -95,11 +96,14 @@ struct Row {
   double step = INFINITY, bytes = 0, set_up = INFINITY, tangent = INFINITY, assembly = NAN, operations = NAN;
 };
 
-std::string scene_of(const Row& row, const std::string& kinematics, const std::string& material, int cells, int steps) {
+/// "32", or "10 x 10 x 80" where sides differ.
+std::string sides(const std::vector<int>& cells) { return fmt::format("{}", fmt::join(cells, " x ")); }
+
+std::string scene_of(const Row& row, const std::string& kinematics, const std::string& material, const std::vector<int>& cells, int steps) {
   const int dimension = row.dimension;
-  const auto vector = [&](double value) {
+  const auto vector = [&](const std::vector<int>& of) {
     std::string text = "[";
-    for (int a = 0; a < dimension; ++a) text += fmt::format("{}{}", a > 0 ? ", " : "", value);
+    for (int a = 0; a < dimension; ++a) text += fmt::format("{}{}", a > 0 ? ", " : "", of[std::min(static_cast<std::size_t>(a), of.size() - 1)]);
     return text + "]";
   };
   const auto words = [&](const std::string& first) {
@@ -115,7 +119,7 @@ std::string scene_of(const Row& row, const std::string& kinematics, const std::s
       dimension == 2   ? "plane = \"strain\"\n"
       : dimension == 1 ? "line = \"strain\"\n"
                        : "",
-      vector(0.0), vector(cells), row.cloud ? "jitter = 0.2\n" : "",
+      vector({0}), vector(cells), row.cloud ? "jitter = 0.2\n" : "",
       row.cloud ? "consistent = false\n" : "",  // set-up is the search of families
       kinematics, material, words("1e-3 * sin(x)"), words("1e-3 * cos(x)"), 1e-4 * steps);
 }
@@ -231,12 +235,12 @@ void model_threads(Registry& registry, Row& row, const std::string& kinematics, 
 }
 
 std::string key_of(const Row& row, const BenchOptions& options) {
-  return Operations::key(row.kinematics, row.material, row.dimension, row.cloud, options.cells);
+  return Operations::key(row.kinematics, row.material, row.dimension, row.cloud, sides(options.cells));
 }
 
 void count(Registry& registry, const BenchOptions& options) {
   fmt::print("{} points a side, horizon 3.015 spacings, verlet. Floating-point operations of a step.\n\n"
-             "| kinematics | material | D | body | operations a point |\n|---|---|---|---|---|\n", options.cells);
+             "| kinematics | material | D | body | operations a point |\n|---|---|---|---|---|\n", sides(options.cells));
   Operations operations;
   for_each_row(registry, options, [&](Row& row, const std::string& kinematics, const std::string& material) {
     measure(registry, row, kinematics, material, options);
@@ -254,7 +258,7 @@ void bench(Registry& registry, const BenchOptions& options) {
   if (options.threads_model) {
     fmt::print("{} points a side, horizon 3.015 spacings, verlet. Efficiency of a step [%] on more threads, from the seconds of the blocks of its loops on\n"
                "one thread; starting a loop and waiting at its end cost nothing here, memory is as fast as for one thread. Outside: of loops.\n\n"
-               "| kinematics | material | D | body | points | loops | blocks | outside [%] |", options.cells);
+               "| kinematics | material | D | body | points | loops | blocks | outside [%] |", sides(options.cells));
     for (const int threads : modelled_threads) fmt::print(" {} |", threads);
     fmt::print("\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for_each_row(registry, options, [&](Row& row, const std::string& kinematics, const std::string& material) {
@@ -271,7 +275,7 @@ void bench(Registry& registry, const BenchOptions& options) {
              limits.triad_one, limits.multiply_add_one, limits.gather_one, limits.threads, limits.triad_all, limits.multiply_add_all, limits.gather_all);
   fmt::print("{} points a side, horizon 3.015 spacings, verlet, {} thread(s). ns a point: of the fastest step; of the set-up, the tangent action and the\n"
              "assembly of the tangent. Traffic: the bytes of a point, once a step, in GB/s and of the triad. Arithmetic: the operations of a step (-: not\n"
-             "counted for this row, see --operations), in GFLOP/s and of the multiply-add peak.\n\n", options.cells, thread_count());
+             "counted for this row, see --operations), in GFLOP/s and of the multiply-add peak.\n\n", sides(options.cells), thread_count());
   fmt::print("| kinematics | material | D | body | step [ns] | bytes a point | traffic | operations a point | arithmetic | set-up [ns] | tangent action [ns] | assembly [ns] |\n"
              "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const auto whole = [](double value) { return std::isfinite(value) ? fmt::format("{:.0f}", value) : std::string("-"); };

@@ -10,7 +10,7 @@ struct BenchOptions {
   std::vector<std::string> kinematics;                          ///< with a stabilization as "conventional+silling"; empty: all known ones
   std::vector<std::string> materials = {"saint_venant_kirchhoff"};
   std::vector<int> dimensions = {3};
-  int cells = 32;                                               ///< points along each side
+  std::vector<int> cells = {32};                                ///< points along each side, or along x, y and z
   bool threads_model = false;                                   ///< what measured blocks would take on more threads, instead of the table
   bool assembly = false;                                        ///< time the assembly of the tangent too: it may need much memory
   std::string json;                                             ///< file that the figures are written to as well

@@ -72,8 +72,9 @@ void add_commands(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 3))
       ->allow_extra_args()
       ->capture_default_str();
-  bench_command->add_option("--cells", options.bench.cells, "Points along each side")
+  bench_command->add_option("--cells", options.bench.cells, "Points along each side, or along x, y and z")
       ->check(CLI::Range(2, 100000000))
+      ->expected(1, 3)
       ->capture_default_str();
   bench_command->add_flag("--assembly", options.bench.assembly,
                           "The assembly of the tangent too; it needs memory: up to tens of kilobytes a point in 3D");

@@ -15,7 +15,7 @@ namespace {
 const std::string header = "kinematics,material,dimension,body,cells,operations";
 }
 
-std::string Operations::key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, int cells) {
+std::string Operations::key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, const std::string& cells) {
   return fmt::format("{},{},{},{},{}", kinematics, material, dimension, cloud ? "cloud" : "lattice", cells);
 }
 

@@ -9,7 +9,7 @@ namespace perikit::app {
 /// with the header kinematics,material,dimension,body,cells,operations.
 class Operations {
  public:
-  static std::string key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, int cells);
+  static std::string key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, const std::string& cells);
 
   Operations() = default;
   /// Throws InputError naming file and line where it cannot be read.

@@ -17,6 +17,8 @@ using namespace perikit::contract;
 namespace {
 
 const std::string kinematics = "type = \"baqp\"";
+/// For long vibrations on clouds, where a weak corner under `baqp` turns inside out after some hundred periods, in one of ten lengths of the step.
+const std::string firm_kinematics = "type = \"bond_associated\"";
 
 bool is_dynamic(const IntegratorTraits& traits) { return traits.dynamic; }
 bool only_evaluates(const IntegratorTraits& traits) { return !traits.dynamic && !traits.quasi_static; }
@@ -53,14 +55,14 @@ std::string driven(int d, double factor = 1.0) {
                      vector(d, fmt::format("\"{}*sin(0.7*t)\"", 0.1 * factor), fmt::format("{}", -0.05 * factor)));
 }
 
-std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrator) {
+std::unique_ptr<Simulation> build_run(BodyOptions body, const Example& integrator, const std::string& of = kinematics) {
   body.integrator = integrator_table(integrator);
-  return build(scene_text(body, kinematics));
+  return build(scene_text(body, of));
 }
 
 /// The largest step that central differences bear: 2 / omega_max [s].
-double stable_step(const BodyOptions& body) {
-  const auto simulation = build(scene_text(body, kinematics));
+double stable_step(const BodyOptions& body, const std::string& of = kinematics) {
+  const auto simulation = build(scene_text(body, of));
   return 2 / std::sqrt(largest_eigenvalue(simulation->problem(), simulation->problem().state().displacement()));
 }
 
@@ -93,10 +95,11 @@ TEST_CASE("integrator: the energy of free vibration does not drift") {
   for (const bool cloud : {false, true}) {
     BodyOptions body = body_of(2, cloud);
     body.conditions = waves(2);
-    const double h = stable_step(body) / 3;
+    const std::string& of = cloud ? firm_kinematics : kinematics;
+    const double h = stable_step(body, of) / 3;
     for (const Example& integrator : dynamic_integrators(3000 * h, h)) {
       INFO(integrator.part, std::string(cloud ? " cloud" : " lattice"));
-      const auto simulation = build_run(body, integrator);
+      const auto simulation = build_run(body, integrator, of);
       const Watch watch = run(*simulation);
       const std::size_t n = watch.energies.size(), third = n / 3;
       const double early = watch.imbalance(0, third), whole = watch.imbalance();

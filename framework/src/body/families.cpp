@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
 #include "perikit/body/body.hpp"
+#include "perikit/core/field.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/simd.hpp"
 
 namespace perikit {
 
@@ -57,9 +61,17 @@ struct CellList {
   }
   std::int64_t flat(const std::array<std::int64_t, 3>& k) const { return k[0] + count[0] * (k[1] + count[1] * k[2]); }
 
+  /// The box at this place in the list.
+  std::array<std::int64_t, 3> at(std::int64_t box) const {
+    return {box % count[0], box / count[0] % count[1], box / count[0] / count[1]};
+  }
+
   template <class Visit>
   void around(const double* x, Visit&& visit) const {
-    const auto k = of(x);
+    around(of(x), visit);
+  }
+  template <class Visit>
+  void around(const std::array<std::int64_t, 3>& k, Visit&& visit) const {
     for (std::int64_t c = std::max<std::int64_t>(k[2] - 1, 0); c <= std::min(k[2] + 1, count[2] - 1); ++c)
       for (std::int64_t b = std::max<std::int64_t>(k[1] - 1, 0); b <= std::min(k[1] + 1, count[1] - 1); ++b) {
         const auto begin = static_cast<std::size_t>(flat({std::max<std::int64_t>(k[0] - 1, 0), b, c}));
@@ -67,6 +79,57 @@ struct CellList {
         for (std::int32_t i = first[begin]; i < first[end + 1]; ++i) visit(points[static_cast<std::size_t>(i)]);
       }
   }
+};
+
+/// The points of a box and of those around it, ascending, with their places by component.
+class PointsAround {
+ public:
+  void collect(const CellList& cells, std::span<const double> rows, std::size_t box) {
+    points_.clear();
+    const std::array<std::int64_t, 3> k = cells.at(static_cast<std::int64_t>(box));
+    cells.around(k, [&](std::int32_t q) { points_.push_back(q); });
+    std::sort(points_.begin(), points_.end());
+    for (std::size_t c = 0; c < 3; ++c) {
+      place_[c].assign(padded(points_.size()), std::numeric_limits<double>::infinity());  // those that fill the last pack are far away
+      for (std::size_t i = 0; i < points_.size(); ++i) place_[c][i] = rows[4 * static_cast<std::size_t>(points_[i]) + c];
+    }
+  }
+  /// How many are within `limit` of x.
+  std::int64_t count(const double* x, double limit) const noexcept {
+    std::int64_t n = 0;
+    over_near(x, limit, [&](std::size_t, std::uint32_t bits, Pack) { n += std::popcount(bits); });
+    return n;
+  }
+  /// Writes those that are, but for `own`. Returns whether there is another one within `coincident`.
+  bool list(std::int32_t own, const double* x, double limit, double coincident, std::int32_t* out) const noexcept {
+    const Pack least(coincident * coincident);
+    int same_place = 0;
+    over_near(x, limit, [&](std::size_t first, std::uint32_t bits, Pack r2) {
+      same_place += std::popcount(lane_bits(r2 <= least));
+      for (; bits != 0; bits &= bits - 1) {
+        const std::int32_t q = points_[first + static_cast<std::size_t>(std::countr_zero(bits))];
+        if (q != own) *out++ = q;
+      }
+    });
+    return same_place > 1;
+  }
+
+ private:
+  template <class Visit>
+  void over_near(const double* x, double limit, Visit&& visit) const noexcept {
+    const Pack square(limit * limit);
+    for (std::size_t i = 0; i < points_.size(); i += pack_width) {
+      Pack r2(0.0);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Pack d = Pack::load(place_[c].data() + i) - Pack(x[c]);
+        r2 += d * d;
+      }
+      if (const std::uint32_t bits = lane_bits(r2 <= square)) visit(i, bits, r2);
+    }
+  }
+
+  std::vector<std::int32_t> points_;
+  AlignedVector<double> place_[3];
 };
 
 double squared_distance(std::span<const double> rows, std::size_t p, std::size_t q) {
@@ -82,35 +145,32 @@ double squared_distance(std::span<const double> rows, std::size_t p, std::size_t
 
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon) {
   const CellList cells(rows, points, dimension, horizon);
-  const double limit = horizon * (1 + 1e-10);
-  const auto in_family = [&](std::size_t p, std::int32_t q) {
-    return static_cast<std::size_t>(q) != p && squared_distance(rows, p, static_cast<std::size_t>(q)) <= limit * limit;
+  const double limit = horizon * (1 + 1e-10), coincident = 1e-12 * horizon;
+  // The points of a box look through the same others, eight at a time.
+  const auto over_points = [&](auto&& found) {
+    constexpr std::size_t piece = 64;
+    const std::size_t boxes = cells.first.size() - 1;
+    parallel_for((boxes + piece - 1) / piece, [&](std::size_t b) {
+      PointsAround around;
+      for (std::size_t box = b * piece; box < std::min(boxes, (b + 1) * piece); ++box) {
+        if (cells.first[box] == cells.first[box + 1]) continue;
+        around.collect(cells, rows, box);
+        for (std::int32_t i = cells.first[box]; i < cells.first[box + 1]; ++i) found(static_cast<std::size_t>(cells.points[static_cast<std::size_t>(i)]), around);
+      }
+    });
   };
-  constexpr std::size_t block = 1024;
-  const std::size_t blocks = (points + block - 1) / block;
   FamilyLists lists;
   lists.first.assign(points + 1, 0);
-  parallel_for(blocks, [&](std::size_t b) {
-    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p) {
-      cells.around(&rows[4 * p], [&](std::int32_t q) { lists.first[p + 1] += in_family(p, q); });
-    }
-  });
+  over_points([&](std::size_t p, const PointsAround& around) { lists.first[p + 1] = around.count(&rows[4 * p], limit) - 1; });
   std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
   lists.neighbour.resize(static_cast<std::size_t>(lists.first.back()));
-  std::atomic<std::int64_t> coincident{-1};
-  parallel_for(blocks, [&](std::size_t b) {
-    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p) {
-      auto next = lists.neighbour.begin() + lists.first[p];
-      cells.around(&rows[4 * p], [&](std::int32_t q) {
-        if (!in_family(p, q)) return;
-        if (squared_distance(rows, p, static_cast<std::size_t>(q)) <= 1e-24 * horizon * horizon)
-          coincident = static_cast<std::int64_t>(p);
-        *next++ = q;
-      });
-      std::sort(lists.neighbour.begin() + lists.first[p], next);
-    }
+  std::atomic<std::int64_t> twice{-1};
+  over_points([&](std::size_t p, const PointsAround& around) {
+    if (!around.list(static_cast<std::int32_t>(p), &rows[4 * p], limit, coincident, lists.neighbour.data() + lists.first[p])) return;
+    const auto found = static_cast<std::int64_t>(p);
+    for (std::int64_t known = twice; (known < 0 || found < known) && !twice.compare_exchange_weak(known, found);) {}
   });
-  if (const std::int64_t p = coincident; p >= 0) {
+  if (const std::int64_t p = twice; p >= 0) {
     const auto at = static_cast<std::size_t>(4 * p);
     throw std::domain_error(fmt::format("found two points at ({:.6g}, {:.6g}, {:.6g}); allowed: points at different places",
                                         rows[at], rows[at + 1], rows[at + 2]));

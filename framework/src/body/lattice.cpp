@@ -81,9 +81,10 @@ LatticeTiling::LatticeTiling(const Lattice& lattice) {
   while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * group)) < 16 && tile1 * tile2 > 1)
     (tile1 > tile2 ? tile1 : tile2) /= 2;
   size = {segments > 1 || n[1] * n[2] > 8 ? segment : std::max<std::int64_t>(1, groups / 16), tile1, tile2};
-  // Thin bars: pieces of a cross-section would all touch each other, pieces of the length leave every other one alone.
-  if (n[2] > 1 && std::max(n[1], n[2]) <= 16 && n[0] > 4 * std::max(n[1], n[2])) size = {2, n[1], n[2]};
-  count = {(groups + size[0] - 1) / size[0], (n[1] + tile1 - 1) / tile1, (n[2] + tile2 - 1) / tile2};
+  // Thin bars: small pieces of a cross-section would all touch each other, pieces of the length leave every other one alone. Halves of them keep
+  // two threads busy when their number is odd.
+  if (n[2] > 1 && std::max(n[1], n[2]) <= 16 && n[0] > 4 * std::max(n[1], n[2])) size = {2, n[1], (n[2] + 1) / 2};
+  for (std::size_t a = 0; a < 3; ++a) count[a] = ((a == 0 ? groups : n[a]) + size[a] - 1) / size[a];
 }
 
 std::int32_t LatticeTiling::colour(std::int64_t number, const std::array<std::int64_t, 3>& reach) const noexcept {

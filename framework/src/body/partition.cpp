@@ -20,7 +20,7 @@ namespace {
 using Cells = std::array<std::int64_t, 3>;
 
 /// Sizes of the blocks of points that loops over clouds run over; the first is a multiple of the others.
-constexpr std::size_t cloud_blocks[] = {256, 64};
+constexpr std::size_t cloud_blocks[] = {64, 32};
 
 }  // namespace
 

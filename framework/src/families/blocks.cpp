@@ -6,9 +6,11 @@
 
 namespace perikit {
 
-Colouring::Colouring(const BlockReach& reach) : Colouring(reach, block_colours(reach.touches, reach.units)) {}
+Colouring::Colouring(const BlockReach& reach)
+    : Colouring(block_colours(reach.touches, reach.units), reach.units,
+                [&](std::size_t b, std::vector<std::int32_t>& touched) { touched = reach.touches[b]; }) {}
 
-Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of) {
+Colouring::Colouring(const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch) {
   std::vector<std::vector<std::int32_t>> of_colour;
   for (std::size_t b = 0; b < colour_of.size(); ++b) {
     const auto colour = static_cast<std::size_t>(colour_of[b]);
@@ -16,20 +18,21 @@ Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& c
     of_colour[colour].push_back(static_cast<std::int32_t>(b));
   }
   colours_ = of_colour.size();
-  // Of each unit: the blocks of the last colour that touches it. They have waited for those before them.
-  std::vector<std::vector<std::int32_t>> last(reach.units), waits_for;
-  for (const std::vector<std::int32_t>& colour : of_colour) {
-    const std::size_t first = blocks_.size();
-    const auto each_unit = [&](auto&& visit) {
-      for (std::size_t i = first; i < blocks_.size(); ++i)
-        for (const std::int32_t unit : reach.touches[static_cast<std::size_t>(blocks_[i])]) visit(i, last[static_cast<std::size_t>(unit)]);
-    };
-    blocks_.insert(blocks_.end(), colour.begin(), colour.end());
-    waits_for.resize(blocks_.size());
-    each_unit([&](std::size_t i, const std::vector<std::int32_t>& before) { waits_for[i].insert(waits_for[i].end(), before.begin(), before.end()); });
-    each_unit([&](std::size_t, std::vector<std::int32_t>& of) { of.clear(); });
-    each_unit([&](std::size_t i, std::vector<std::int32_t>& of) { of.push_back(static_cast<std::int32_t>(i)); });
-  }
+  // Of each cell: the block of the last colour that touches it. It has waited for those before it.
+  std::vector<std::int32_t> last(cells, -1), touched;
+  std::vector<std::vector<std::int32_t>> waits_for;
+  for (const std::vector<std::int32_t>& colour : of_colour)
+    for (const std::int32_t b : colour) {
+      touched.clear();
+      touch(static_cast<std::size_t>(b), touched);
+      auto& before = waits_for.emplace_back();
+      for (const std::int32_t cell : touched) {
+        auto& of_cell = last[static_cast<std::size_t>(cell)];
+        if (of_cell >= 0) before.push_back(of_cell);
+        of_cell = static_cast<std::int32_t>(blocks_.size());
+      }
+      blocks_.push_back(b);
+    }
   for (std::vector<std::int32_t>& of : waits_for) {
     std::ranges::sort(of);
     of.erase(std::unique(of.begin(), of.end()), of.end());

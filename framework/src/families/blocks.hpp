@@ -4,6 +4,7 @@
 /// depend on the number of threads.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "perikit/core/parallel.hpp"
@@ -24,8 +25,10 @@ class Colouring {
  public:
   Colouring() = default;
   explicit Colouring(const BlockReach& reach);
-  /// Given colours, by block.
-  Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of);
+  /// Lists the cells that block b writes to, each once.
+  using Touch = std::function<void(std::size_t b, std::vector<std::int32_t>& touched)>;
+  /// Given colours, by block, of which none has two blocks that touch one of the cells. The smaller cells are, the fewer blocks wait without need.
+  Colouring(const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch);
 
   /// body(b) for all blocks. A block does not wait for a whole colour, only for those of lower colours that touch what it touches.
   template <class Body>

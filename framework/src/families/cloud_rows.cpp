@@ -1,6 +1,7 @@
 #include "families/cloud_rows.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "families/quiet_blocks.hpp"
 
@@ -14,12 +15,13 @@ void complete_pieces(GroupMarks& marks, std::size_t points) {
   }
 }
 
-void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows) {
+void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth) {
   rows.resize(points);
   parallel_for(cloud_blocks(points), [&](std::size_t b) {
     for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
       Row row{};
       for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
+      if (fourth) row[3] = fourth[p];
       rows[p] = row;
     }
   });
@@ -46,9 +48,22 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
   return reach;
 }
 
-Colouring cloud_colouring(const Body& body, const BlockReach& reach, std::size_t block_points) {
+Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach, std::size_t block_points) {
+  const std::size_t points = families.first.size() - 1, groups = padded(points) / padding;
   const std::vector<std::int32_t>* prescribed = body.block_colours(block_points);
-  return prescribed ? Colouring(reach, *prescribed) : Colouring(reach);
+  std::vector<std::size_t> found(groups);  // one more than the block that has listed a group last
+  const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
+    const auto add = [&](std::size_t point) {
+      const std::size_t group = point / padding;
+      if (std::exchange(found[group], b + 1) != b + 1) touched.push_back(static_cast<std::int32_t>(group));
+    };
+    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
+      add(p);
+      for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k)
+        add(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]));
+    }
+  };
+  return Colouring(prescribed ? *prescribed : block_colours(reach.touches, reach.units), groups, touch);
 }
 
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {

@@ -95,7 +95,31 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }
-  colouring = Colouring(reach, of_blocks);
+  // Cells of the colouring: groups of eight along rows; whole rows where a tile is as long.
+  const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;
+  const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
+    const auto [k1_low, k1_high] = range_of(b, &LatticeRow::k1);
+    const auto [k2_low, k2_high] = range_of(b, &LatticeRow::k2);
+    const auto bound = [&](std::size_t a, std::int64_t k) { return std::clamp<std::int64_t>(k, 0, lattice.extent[a] - 1); };
+    const LatticeRow& row = rows[blocks[b].row_begin];
+    const std::int64_t chunk = row.first / chunk_points - lattice.index(0, row.k1, row.k2) / chunk_points;
+    const std::int64_t first = along == 1 ? 0 : std::max<std::int64_t>(0, chunk - grow[0]),
+                       last = along == 1 ? 0 : std::min(along - 1, chunk + row.chunks - 1 + grow[0]);
+    for (std::int64_t k2 = bound(2, k2_low - grow[2]); k2 <= bound(2, k2_high + grow[2]); ++k2)
+      for (std::int64_t k1 = bound(1, k1_low - grow[1]); k1 <= bound(1, k1_high + grow[1]); ++k1)
+        for (std::int64_t k0 = first; k0 <= last; ++k0)
+          touched.push_back(static_cast<std::int32_t>(k0 + along * (k1 + lattice.extent[1] * k2)));
+  };
+  colouring = Colouring(of_blocks, static_cast<std::size_t>(along * lattice.extent[1] * lattice.extent[2]), touch);
+}
+
+std::pair<std::int64_t, std::int64_t> LatticeTiles::range_of(std::size_t b, std::int32_t LatticeRow::*index) const noexcept {
+  std::pair<std::int64_t, std::int64_t> range{rows[blocks[b].row_begin].*index, rows[blocks[b].row_begin].*index};
+  for (std::size_t r = blocks[b].row_begin; r < blocks[b].row_end; ++r) {
+    range.first = std::min<std::int64_t>(range.first, rows[r].*index);
+    range.second = std::max<std::int64_t>(range.second, rows[r].*index);
+  }
+  return range;
 }
 
 bool LatticeTiles::moves(std::size_t b, ConstFieldView u) const noexcept {

@@ -46,11 +46,6 @@ struct BatchScratch {
   alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
   alignas(64) double dissipated[batch_points];
-  alignas(64) double A[9 * batch_points];
-  alignas(64) double dA[9 * batch_points];
-  alignas(64) double du[3 * batch_points];
-  alignas(64) double dw[3 * batch_points];
-  alignas(64) double t[3 * batch_points];
   // Selective map: gradients before it, and where the volume changes of the owners are, by end (to be filled in by the engine),
   // `volume` a place to gather them; weighted pressures on the owners by end (result).
   alignas(64) double Ht[9 * batch_points];

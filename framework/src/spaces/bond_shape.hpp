@@ -1,6 +1,6 @@
 #pragma once
-/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, and its adjoint, on arrays over bonds of stride batch_points. The formula stands in
-/// bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes around them.
+/// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, A = (1 - s) Hbar_i + s Hbar_j, and its adjoint, t = WP g on u_b and WP - t (x) xi on A.
+/// The formula stands in bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes around them.
 
 #include <cstdint>
 
@@ -37,42 +37,6 @@ T bond_shape_row_adjoint(T (&P)[D], const T (&xi)[D], const T (&g)[D]) noexcept 
   PERIKIT_UNROLL for (int e = 1; e < D; ++e) t += P[e] * g[e];
   PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = P[e] - t * xi[e];
   return t;
-}
-
-/// H from A = (1 - s) Hbar_i + s Hbar_j and u_b = u_j - u_i. H has D*D components; lateral components are left alone.
-template <int D, bool per_slot>
-void bond_gradient(int lanes, const BondVectors& v, const double* A, const double* du, double* H) noexcept {
-  for (int l = 0; l < lanes; l += pack_width) {
-    Pack xi[D], g[D];
-    for (int e = 0; e < D; ++e) {
-      xi[e] = bond_value<per_slot>(v.xi[e], l);
-      g[e] = bond_value<per_slot>(v.g[e], l);
-    }
-    for (int c = 0; c < D; ++c) {
-      Pack a[D], h[D];
-      for (int e = 0; e < D; ++e) a[e] = Pack::load(A + (c * D + e) * batch_points + l);
-      bond_shape_row<D>(a, Pack::load(du + c * batch_points + l), xi, g, h);
-      for (int e = 0; e < D; ++e) h[e].store(H + (c * D + e) * batch_points + l);
-    }
-  }
-}
-
-/// t = WP g (on u_b) and S = WP - t (x) xi (on A), from the weighted stress WP. S may be the array of WP.
-template <int D, bool per_slot>
-void bond_adjoint(int lanes, const BondVectors& v, const double* WP, double* t, double* S) noexcept {
-  for (int l = 0; l < lanes; l += pack_width) {
-    Pack xi[D], g[D];
-    for (int e = 0; e < D; ++e) {
-      xi[e] = bond_value<per_slot>(v.xi[e], l);
-      g[e] = bond_value<per_slot>(v.g[e], l);
-    }
-    for (int c = 0; c < D; ++c) {
-      Pack p[D];
-      for (int e = 0; e < D; ++e) p[e] = Pack::load(WP + (c * D + e) * batch_points + l);
-      bond_shape_row_adjoint<D>(p, xi, g).store(t + c * batch_points + l);
-      for (int e = 0; e < D; ++e) p[e].store(S + (c * D + e) * batch_points + l);
-    }
-  }
 }
 
 /// Lattices: H of `slots` bonds of each of the eight points p ... p + 7, straight from the fields, lanes slot by slot.

@@ -23,7 +23,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       flux_(D * points_),
       force_(points_) {
   const BlockReach reach = cloud_reach(families_.lists(), points_);
-  colouring_ = cloud_colouring(families_.body(), reach);
+  colouring_ = cloud_colouring(families_.body(), families_.lists(), reach);
   quiet_ = parts.quiet_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
@@ -66,60 +66,81 @@ void CloudBonds<D>::shift_gradients(ConstFieldView lambda) {
   stress_.assign(D * points_, Row{});
 }
 
-/// u_b and A_b of n bonds. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
-template <int D>
-void CloudBonds<D>::gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du,
-                           double* A) const noexcept {
-  // Locals: what is written could be any double that a member is.
-  const std::int32_t* const neighbour = families_.lists().neighbour.data() + begin;
-  const Row *const at = u.data(), *const gradient = H.data(), here = at[p];
-  const double far_share = far_share_;
-  Row own[D];
-  for (std::size_t e = 0; e < D; ++e) own[e] = (1 - far_share) * gradient[D * p + e];
-  for (int l = 0; l < n; ++l) {
-    const auto j = static_cast<std::size_t>(neighbour[l]);
-    const Row d = at[j] - here;
-    for (int c = 0; c < D; ++c) du[c * batch_points + l] = d[c];
-    for (int e = 0; e < D; ++e) {
-      const Row h = far_share == 0 ? own[e] : own[e] + far_share * gradient[D * j + static_cast<std::size_t>(e)];
-      for (int c = 0; c < D; ++c) A[(c * D + e) * batch_points + l] = h[c];
-    }
-  }
-  for (int l = families_.fails() ? 0 : n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
-    if (l < n && families_.b(static_cast<std::size_t>(begin + l)) > 0) continue;
-    for (int c = 0; c < D; ++c) du[c * batch_points + l] = 0.0;
-    for (int c = 0; c < D * D; ++c) A[c * batch_points + l] = 0.0;
-  }
-}
-
-/// Bonds begin ... begin + n - 1 as arrays: xi, length, omega, volume, weights of both ends, and the ends.
+/// Bonds begin ... begin + n - 1 as arrays: xi, length, omega, volume, weights of both ends, and the ends. Lanes beyond them are the first
+/// bond without weight.
 template <int D>
 void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept {
   double *xi = s.bond[0], *length = s.bond[2], *omega = s.bond[2] + batch_points, *volume = s.bond[2] + 2 * batch_points;
-  const double *const influence = families_.omegas(), *const scale = scale_.data();
-  const std::int32_t* const neighbour = families_.lists().neighbour.data();
-  const Row *const position = position_, x = position[p];
-  const bool by_kernel = formulation_.weight == BondWeight::kernel;
-  const double own_scale = scale[p];
-  for (int l = 0; l < lanes; ++l) {
-    const bool real = l < n;
-    const auto k = static_cast<std::size_t>(begin + (real ? l : 0));
-    const auto j = static_cast<std::size_t>(neighbour[k]);
-    const Row far = position[j], bond = far - x;
-    for (int c = 0; c < D; ++c) xi[c * batch_points + l] = bond[c];
-    length[l] = std::sqrt(bond[0] * bond[0] + bond[1] * bond[1] + bond[2] * bond[2]);
-    omega[l] = real ? influence[k] : 0.0;
-    volume[l] = real ? far[3] : 0.0;
-    const double factor = !real ? 0.0 : by_kernel ? influence[k] : families_.b(k);
-    s.weight[l] = own_scale * far[3] * factor;
-    s.far_weight[l] = scale[j] * x[3] * factor;
-    s.owner[l] = static_cast<std::int32_t>(p);
-    s.far[l] = static_cast<std::int32_t>(j);
+  const std::int32_t* const neighbour = families_.lists().neighbour.data() + begin;
+  std::fill_n(s.owner, lanes, static_cast<std::int32_t>(p));
+  std::copy_n(neighbour, n, s.far);
+  std::fill(s.far + n, s.far + lanes, neighbour[0]);
+  const double* const influence = families_.omegas() + begin;
+  const double* const left = families_.integrities();
+  const double* const share = formulation_.weight == BondWeight::kernel ? influence : left ? left + begin : nullptr;
+  const Row *const position = position_, *const scale = u_.data(), x = position[p];
+  const Pack own_volume(x[3]), own_scale(scale[p][3]);
+  for (int l = 0; l < lanes; l += pack_width) {
+    // By bond: those of the lists, zero beyond.
+    const auto of_bonds = [&](const double* values) {
+      return l + pack_width <= n ? Pack::load(values + l) : Pack::load_first(values + l, n - l);
+    };
+    const std::uint8_t real = first_lanes(n - l);
+    const RowColumns far = RowColumns::load(position, s.far + l), far_u = RowColumns::load(scale, s.far + l);
+    Pack square(0.0);
+    for (int c = 0; c < D; ++c) {
+      const Pack bond = far[c] - Pack(x[c]);
+      bond.store(xi + c * batch_points + l);
+      square += bond * bond;
+    }
+    sqrt(square).store(length + l);
+    of_bonds(influence).store(omega + l);
+    keep(real, far[3]).store(volume + l);
+    const Pack factor = share ? of_bonds(share) : keep(real, Pack(1.0));
+    Pack weight = own_scale * far[3] * factor, far_weight = far_u[3] * own_volume * factor;
+    if (factor_) {
+      weight *= of_bonds(factor_ + begin);
+      if (pairs_) far_weight *= of_bonds(far_factor_.data() + begin);
+    }
+    weight.store(s.weight + l);
+    far_weight.store(s.far_weight + l);
   }
-  for (int l = 0; l < n && factor_; ++l) {
-    const auto k = static_cast<std::size_t>(begin + l);
-    s.weight[l] *= factor_[k];
-    if (pairs_) s.far_weight[l] *= far_factor_[k];
+}
+
+/// H of n bonds, from u and Hbar of their ends. What lies at the far end of a broken bond is nobody's business: H = 0 there, and in the padding.
+template <int D>
+void CloudBonds<D>::bond_gradients(std::size_t p, std::int64_t begin, int n, int lanes, const BatchScratch& s, const AlignedVector<Row>& u,
+                                   const AlignedVector<Row>& H, double* out) const noexcept {
+  // Locals: what is written could be any double that a member is.
+  const Row *const at = u.data(), *const gradient = H.data(), *const own_gradient = gradient + D * p, here = at[p];
+  const double* const left = families_.integrities();
+  const double far_share = far_share_;
+  Pack own[D][D];
+  for (int c = 0; c < D; ++c)
+    for (int e = 0; e < D; ++e) own[c][e] = Pack((1 - far_share) * own_gradient[e][c]);
+  for (int l = 0; l < lanes; l += pack_width) {
+    std::uint8_t whole = first_lanes(n - l);
+    for (int i = 0; i < pack_width && left; ++i)
+      if (l + i < n && !(left[begin + l + i] > 0)) whole = static_cast<std::uint8_t>(whole & ~(1u << i));
+    const bool all_whole = whole == first_lanes(pack_width);
+    RowColumns far = RowColumns::load(at, s.far + l);
+    Pack A[D][D], xi[D], g[D];
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) PERIKIT_UNROLL for (int e = 0; e < D; ++e) A[c][e] = own[c][e];
+    if (far_share != 0) {
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+        const RowColumns h = RowColumns::load(gradient + e, s.far + l, D);
+        PERIKIT_UNROLL for (int c = 0; c < D; ++c) A[c][e] += Pack(far_share) * h[c];
+      }
+    }
+    PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+      xi[e] = Pack::load(s.bond[0] + e * batch_points + l);
+      g[e] = Pack::load(s.bond[1] + e * batch_points + l);
+    }
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) {
+      Pack h[D];
+      bond_shape_row<D>(A[c], far[c] - Pack(here[c]), xi, g, h);
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) (all_whole ? h[e] : keep(whole, h[e])).store(out + (c * D + e) * batch_points + l);
+    }
   }
 }
 
@@ -132,9 +153,10 @@ void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, B
     s.volume_group[l / group] = 0;
     if (both_ends) s.volume_group[(lanes + l) / group] = l + group;
   }
-  for (int c = 0; c < volume_components; ++c) {
-    std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
-    for (int l = 0; l < lanes && both_ends; ++l) s.volume[c * batch_points + group + l] = volume_[static_cast<std::size_t>(s.far[l])][c];
+  for (int c = 0; c < volume_components; ++c) std::fill_n(s.volume + c * batch_points, group, volume_[p][c]);
+  for (int l = 0; l < lanes && both_ends; l += pack_width) {
+    const RowColumns far = RowColumns::load(volume_.data(), s.far + l);
+    for (int c = 0; c < volume_components; ++c) far[c].store(s.volume + c * batch_points + group + l);
   }
 }
 
@@ -149,15 +171,13 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
     const int n = static_cast<int>(std::min<std::int64_t>(bonds_at_once(), end - begin));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
     read_bonds(p, begin, n, lanes, s);
-    gather(p, begin, n, u_, gradient_, s.du, s.A);
-    if (tangent) gather(p, begin, n, w_, direction_, s.dw, s.dA);
     if (selective_) volumes_of_bonds(p, lanes, both_ends, s);
     const FamilyView view{D, n, families_.body().horizon(), {xi, xi + batch_points, xi + 2 * batch_points}, s.bond[2], s.bond[2] + 2 * batch_points,
                           s.bond[2] + batch_points, families_.inverse_shape(p), 0};
     formulation_.bond->correction(view, g, batch_points);
-    const BondVectors vectors{{xi, xi + batch_points, xi + 2 * batch_points}, {g, g + batch_points, g + 2 * batch_points}, false};
-    bond_gradient<D, false>(lanes, vectors, s.A, s.du, H);
-    if (tangent) bond_gradient<D, false>(lanes, vectors, s.dA, s.dw, dH);
+    for (int e = 0; e < D; ++e) std::fill(g + e * batch_points + n, g + e * batch_points + lanes, 0.0);
+    bond_gradients(p, begin, n, lanes, s, u_, gradient_, H);
+    if (tangent) bond_gradients(p, begin, n, lanes, s, w_, direction_, dH);
     if (pass.work.numbered()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
@@ -166,7 +186,6 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
     if (pass.work.work() == Work::sample) pass.add_samples(n, s);
     if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;
-    bond_adjoint<D, false>(lanes, vectors, s.P, s.t, s.P);
     scatter(p, n, s, both_ends, tangent);
   }
   return -1;
@@ -175,20 +194,30 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
 /// Forces, stresses on the point gradients, and pressures of n bonds.
 template <int D>
 void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
-  Row own{}, own_stress[D] = {};
   Row *const force = force_.data(), *const flux = flux_.data();
   const double far_share = far_share_;
-  for (int l = 0; l < n; ++l) {
-    const auto j = static_cast<std::size_t>(s.far[l]);
-    Row t{};
-    for (int c = 0; c < D; ++c) t[c] = s.t[c * batch_points + l];
-    own += t;
-    force[j] -= t;
-    for (int e = 0; e < D; ++e) {
-      Row stress{};
-      for (int c = 0; c < D; ++c) stress[c] = s.P[(c * D + e) * batch_points + l];
-      own_stress[e] += stress;
-      if (far_share > 0) flux[D * j + static_cast<std::size_t>(e)] += far_share * stress;
+  RowColumns own, own_stress[D];
+  for (int l = 0; l < n; l += pack_width) {
+    Pack xi[D], g[D];
+    RowColumns t, stress[D];  // t: on the far ends
+    PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+      xi[e] = Pack::load(s.bond[0] + e * batch_points + l);
+      g[e] = Pack::load(s.bond[1] + e * batch_points + l);
+    }
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) {
+      Pack P[D];
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = Pack::load(s.P + (c * D + e) * batch_points + l);
+      const Pack owners = bond_shape_row_adjoint<D>(P, xi, g);
+      own[c] += owners;
+      t[c] = -owners;
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+        own_stress[e][c] += P[e];
+        stress[e][c] = Pack(far_share) * P[e];
+      }
+    }
+    t.add_to(force, s.far + l, n - l);
+    if (far_share > 0) {
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) stress[e].add_to(flux + e, s.far + l, n - l, D);
     }
   }
   const auto pressure = [&](int lane) { return Row{s.pressure[lane], tangent ? s.pressure_rate[lane] : 0.0}; };
@@ -197,8 +226,8 @@ void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool bo
     pressure_[p] += pressure(l);
     if (both_ends) pressure_[static_cast<std::size_t>(s.far[l])] += pressure(lanes + l);
   }
-  force_[p] += own;
-  for (int e = 0; e < D; ++e) flux[D * p + static_cast<std::size_t>(e)] += (1 - far_share) * own_stress[e];
+  force[p] += own.sum();
+  for (int e = 0; e < D; ++e) flux[D * p + static_cast<std::size_t>(e)] += (1 - far_share) * own_stress[e].sum();
 }
 
 /// Eight points at a time: rows of gradients to lanes.
@@ -274,7 +303,7 @@ void CloudBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   const bool tangent = pass.work.tangent();
-  mirror_rows(pass.u, points_, u_);
+  mirror_rows(pass.u, points_, u_, scale_.data());
   if (tangent) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
@@ -300,7 +329,7 @@ void CloudBonds<D>::run(Pass& pass) {
     over_points(b, [&](std::size_t p) {
       if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
       if (gradient_of_.stored()) return gradient_of_.scatter(p, &flux_[D * p], force_);
-      if (gradient_of_.shifted()) std::copy_n(&flux_[D * p], D, &stress_[D * p]);
+      if (gradient_of_.shifted()) gradient_of_.keep_stress(p, &flux_[D * p], &stress_[D * p]);
       gradient_of_.times_transposed(p, &flux_[D * p], &flux_[D * p]);
     });
   };
@@ -311,8 +340,7 @@ void CloudBonds<D>::run(Pass& pass) {
     const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
     over_points(b, [&](std::size_t p) {
       if (!pass.wanted(static_cast<std::int64_t>(p))) return;
-      Row f = gather ? gradient_of_.divergence(p, flux_, force_[p]) : force_[p];
-      if (gather && gradient_of_.shifted()) f = gradient_of_.shifted_divergence(p, stress_, f);
+      const Row f = gather ? gradient_of_.divergence(p, flux_, stress_, force_[p]) : force_[p];
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     });
   });

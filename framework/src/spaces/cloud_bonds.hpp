@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "families/blocks.hpp"
+#include "families/row_packs.hpp"
 #include "spaces/bond_shape.hpp"
 #include "spaces/cloud_gradient.hpp"
 #include "spaces/evaluation_space.hpp"
@@ -28,7 +29,8 @@ class CloudBonds final : public EvaluationSpace {
   void bonds(std::size_t b, Pass& pass);
   int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   void read_bonds(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
-  void gather(std::size_t p, std::int64_t begin, int n, const AlignedVector<Row>& u, const AlignedVector<Row>& H, double* du, double* A) const noexcept;
+  void bond_gradients(std::size_t p, std::int64_t begin, int n, int lanes, const BatchScratch& s, const AlignedVector<Row>& u,
+                      const AlignedVector<Row>& H, double* out) const noexcept;
   void scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   void number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
   void number_bonds();
@@ -63,7 +65,7 @@ class CloudBonds final : public EvaluationSpace {
   const double* factor_ = nullptr;    ///< w_ij / W_ij; null: 1
   AlignedVector<double> far_factor_;  ///< w_ji / W_ji by bond, where bonds are evaluated once
   Colouring colouring_;
-  AlignedVector<Row> u_, w_;                 ///< mirrors
+  AlignedVector<Row> u_, w_;                 ///< mirrors; {u, scale}
   AlignedVector<Row> gradient_, direction_;  ///< Hbar of u and w, D rows a point
   AlignedVector<Row> stress_;                ///< on shifted gradients
   AlignedVector<Row> flux_;                  ///< the stress on Hbar, then Q; likewise

@@ -13,6 +13,7 @@
 
 #include "families/cloud_families.hpp"
 #include "families/cloud_rows.hpp"
+#include "families/row_packs.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
@@ -30,10 +31,15 @@ class CloudGradient {
   void at(std::size_t p, const AlignedVector<Row>& u, Row* H) const noexcept {
     if (!stored()) {
       Row S[D];
-      moments(p, u, S);
-      times_inverse(p, S, H);
-      if (shifted()) add_shift(p, u, H);
-      return;
+      if (shifted() && live(p)) {
+        Row T[D];
+        moments<true>(p, u, S, T);
+        times_inverse(p, S, H);
+        for (int e = 0; e < D; ++e) H[e] += T[e];
+        return;
+      }
+      moments<false>(p, u, S, nullptr);
+      return times_inverse(p, S, H);
     }
     Row h[D] = {};
     for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
@@ -62,30 +68,13 @@ class CloudGradient {
     for (std::size_t p = 0; p < families_.body().points(); ++p) shift_point(p);
   }
   bool shifted() const noexcept { return !lambda_.empty(); }
-  /// Order 1: f, and what Q of all points adds to the force on p.
-  Row divergence(std::size_t p, const AlignedVector<Row>& Q, Row f = Row{}) const noexcept {
-    const Row x = position_[p];
-    const Row* own = &Q[D * p];
-    const double* omega = families_.omegas();
-    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
-      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
-      const Row far = position_[j], xi = far - x;
-      const double w = omega[k], to_own = w * far[3], to_far = w * x[3];
-      for (int e = 0; e < D; ++e) f += xi[e] * (to_own * own[e] + to_far * Q[D * j + static_cast<std::size_t>(e)]);
-    }
-    return f;
+  /// Shifted gradients: the stress P of p as `divergence` wants it, zero where there is no gradient.
+  void keep_stress(std::size_t p, const Row* P, Row* kept) const noexcept {
+    for (int e = 0; e < D; ++e) kept[e] = live(p) ? P[e] : Row{};
   }
-  /// Shifted gradients: what the stresses P of all points add to it beside that.
-  Row shifted_divergence(std::size_t p, const AlignedVector<Row>& P, Row f) const noexcept {
-    const Row* own = &P[D * p];
-    const double volume = position_[p][3], *omega = families_.omegas();
-    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
-      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
-      const Row lambda = lambda_[j] - lambda_[p];
-      const double w = omega[k], to_own = live(p) ? w * position_[j][3] : 0.0, to_far = live(j) ? w * volume : 0.0;
-      for (int e = 0; e < D; ++e) f += lambda[e] * (to_own * own[e] + to_far * P[D * j + static_cast<std::size_t>(e)]);
-    }
-    return f;
+  /// Order 1: f, and what Q of all points adds to the force on p; where gradients are shifted, with what their stresses P add beside that.
+  Row divergence(std::size_t p, const AlignedVector<Row>& Q, const AlignedVector<Row>& P, Row f = Row{}) const noexcept {
+    return shifted() ? divergence<true>(p, Q.data(), P.data(), f) : divergence<false>(p, Q.data(), nullptr, f);
   }
   /// Stored stencils: what the stress S on H of point p does, added to force.
   void scatter(std::size_t p, const Row* S, AlignedVector<Row>& force) const noexcept {
@@ -120,20 +109,10 @@ class CloudGradient {
     for (int e = 0; e < D; ++e) Q[e] = out[e];
   }
   bool live(std::size_t p) const noexcept { return std::isfinite(families_.condition(p)); }
-  /// H += T.
-  void add_shift(std::size_t p, const AlignedVector<Row>& u, Row* H) const noexcept {
-    if (!live(p)) return;
-    const double* omega = families_.omegas();
-    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
-      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
-      const Row lambda = lambda_[j] - lambda_[p], du = (omega[k] * position_[j][3]) * (u[j] - u[p]);
-      for (int e = 0; e < D; ++e) H[e] += lambda[e] * du;
-    }
-  }
   /// M_eb = K^-1_eb - (gradient of lambda)_eb.
   void shift_point(std::size_t p) noexcept {
     Row L[D], H[D];
-    moments(p, lambda_, L);
+    moments<false>(p, lambda_, L, nullptr);
     const double* inverse = families_.inverse_shape(p);
     times(L, H, [&](int k, int e) { return inverse[symmetric_index(D, k, e)]; });
     for (int e = 0; e < D; ++e)
@@ -142,16 +121,52 @@ class CloudGradient {
             live(p) ? inverse[symmetric_index(D, e, b)] - H[b][e] : 0.0;
   }
   const FamilyLists& lists() const noexcept { return families_.lists(); }
-  void moments(std::size_t p, const AlignedVector<Row>& u, Row (&S)[D]) const noexcept {
-    const Row x = position_[p], own = u[p];
-    const double* omega = families_.omegas();
-    for (int e = 0; e < D; ++e) S[e] = Row{};
-    for (std::int64_t k = lists().first[p]; k < lists().first[p + 1]; ++k) {
-      const auto j = static_cast<std::size_t>(lists().neighbour[static_cast<std::size_t>(k)]);
-      const Row xi = position_[j] - x;
-      const Row du = (omega[k] * position_[j][3]) * (u[j] - own);
-      for (int e = 0; e < D; ++e) S[e] += xi[e] * du;
+  /// S = sum_j omega V_j u_ij (x) xi_ij, and where `shift` T = sum_j omega V_j u_ij (x) lambda_ij.
+  template <bool shift>
+  void moments(std::size_t p, const AlignedVector<Row>& field, Row* S, [[maybe_unused]] Row* T) const noexcept {
+    const Row *const position = position_, *const u = field.data(), *const lambda = lambda_.data();
+    const TwoRows x = TwoRows::load(position[p], position[p]), own = TwoRows::load(u[p], u[p]);
+    TwoRows s[D], t[D], own_lambda;
+    if constexpr (shift) own_lambda = TwoRows::load(lambda[p], lambda[p]);
+    over_bonds(families_, p, [&](std::size_t j, std::size_t l, const TwoRows& omega) PERIKIT_INLINE {
+      const TwoRows far = TwoRows::load(position[j], position[l]);
+      const TwoRows du = omega * far.spread<3>() * (TwoRows::load(u[j], u[l]) - own);
+      const auto add = [&](const TwoRows& d, TwoRows(&to)[D]) PERIKIT_INLINE {
+        over_components<D>([&](auto e) PERIKIT_INLINE { to[e].add_product(d.template spread<e>(), du); });
+      };
+      add(far - x, s);
+      if constexpr (shift) add(TwoRows::load(lambda[j], lambda[l]) - own_lambda, t);
+    });
+    for (int e = 0; e < D; ++e) {
+      S[e] = s[e].sum();
+      if constexpr (shift) T[e] = t[e].sum();
     }
+  }
+  template <bool shift>
+  Row divergence(std::size_t p, const Row* Q, [[maybe_unused]] const Row* P, Row f) const noexcept {
+    // f_i = sum_j omega xi_ij (V_j Q_i + V_i Q_j) = Q_i m + V_i sum_j (omega xi_ij) Q_j, m = sum_j V_j omega xi_ij
+    const Row *const position = position_, *const lambda = lambda_.data();
+    const TwoRows x = TwoRows::load(position[p], position[p]);
+    TwoRows sum[D], m, m_lambda, own_lambda;
+    if constexpr (shift) own_lambda = TwoRows::load(lambda[p], lambda[p]);
+    over_bonds(families_, p, [&](std::size_t j, std::size_t l, const TwoRows& omega) PERIKIT_INLINE {
+      const TwoRows far = TwoRows::load(position[j], position[l]), volume = far.spread<3>();
+      const auto add = [&](const TwoRows& d, const Row* stress, TwoRows& moment) PERIKIT_INLINE {
+        over_components<D>([&](auto e) PERIKIT_INLINE { sum[e].add_product(d.template spread<e>(), TwoRows::load(stress[D * j + e], stress[D * l + e])); });
+        moment.add_product(volume, d);
+      };
+      add(omega * (far - x), Q, m);
+      if constexpr (shift) add(omega * (TwoRows::load(lambda[j], lambda[l]) - own_lambda), P, m_lambda);
+    });
+    Row far_sum{};
+    for (int e = 0; e < D; ++e) far_sum += sum[e].sum();
+    f += position[p][3] * far_sum;
+    const auto add_own = [&](const Row& moment, const Row* stress) {
+      for (int e = 0; e < D; ++e) f += moment[e] * stress[D * p + static_cast<std::size_t>(e)];
+    };
+    add_own(m.sum(), Q);
+    if constexpr (shift) add_own(m_lambda.sum(), P);
+    return f;
   }
   void store_stencils();
   /// Whether it has a lower order.

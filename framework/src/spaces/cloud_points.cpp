@@ -67,7 +67,7 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       }
       const std::size_t p = first + static_cast<std::size_t>(l);
       gradient_.times_transposed(p, S, &flux_[D * p]);
-      if (gradient_.shifted()) std::copy_n(S, D, &stress_[D * p]);
+      if (gradient_.shifted()) gradient_.keep_stress(p, S, &stress_[D * p]);
     }
   }
 }
@@ -89,8 +89,7 @@ void CloudPoints<D>::run(Pass& pass) {
     if (!quiet_.awake(b, 2)) return;
     for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
       if (!pass.wanted(static_cast<std::int64_t>(p))) continue;
-      Row f = gradient_.divergence(p, flux_);
-      if (gradient_.shifted()) f = gradient_.shifted_divergence(p, stress_, f);
+      const Row f = gradient_.divergence(p, flux_, stress_);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     }
   });

@@ -111,7 +111,7 @@ void Weighted<D>::prepare_cloud() {
   }
   block_first_.push_back(groups_.size());
   make_cloud_stencils();
-  cloud_colouring_ = cloud_colouring(body_, cloud_reach(cloud_->lists(), body_.points(), cloud_block), cloud_block);
+  cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), cloud_reach(cloud_->lists(), body_.points(), cloud_block), cloud_block);
 }
 
 template <int D>

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "families/cloud_families.hpp"
-#include "families/cloud_rows.hpp"
+#include "families/row_packs.hpp"
 #include "terms/energy_shares.hpp"
 #include "terms/pair_loop.hpp"
 
@@ -42,7 +42,8 @@ class CloudPairs final : public PairLoop {
     alignas(64) double own_strain[batch_points], far_strain[batch_points];   ///< see PairFields::own_strain; near interfaces
     alignas(64) double far_volume[batch_points];   ///< b V_j
     alignas(64) double integrity[batch_points];    ///< b, where damage is on
-    alignas(64) double t[3][batch_points];
+    alignas(64) double t[batch_points];        ///< omega |xi| e or its rate
+    std::int32_t far[batch_points];
   };
 
   template <PairWork work>
@@ -77,22 +78,26 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(lists_, points_);
-  colouring_ = cloud_colouring(families_.body(), reach);
+  colouring_ = cloud_colouring(families_.body(), lists_, reach);
   if (parts.quiet) watch_waves(reach);
 }
 
-/// c_ij of n bonds.
+/// c_ij of n bonds: the mean of both ends, where surfaces are corrected times the mean ellipsoid along the bond.
 template <int D>
 void CloudPairs<D>::moduli(std::size_t p, const std::int32_t* neighbour, int n, const Gathered& g, double* out) const noexcept {
   const Row *const modulus = moduli_.data(), own = modulus[p];
-  for (int l = 0; l < n; ++l) out[l] = 0.5 * (own[3] + modulus[neighbour[l]][3]);
+  for (int l = 0; l < n; l += pack_width) (Pack(0.5) * (Pack(own[3]) + RowColumns::load(modulus, g.far + l)[3])).store(out + l);
   for (int l = 0; l < n && fields_.crosses(p); ++l) out[l] = fields_.of_bond(p, static_cast<std::size_t>(neighbour[l]));
   if (fields_.correction.size() == 0) return;
-  for (int l = 0; l < n; ++l) {
-    const Row mean = 0.5 * (own + modulus[neighbour[l]]);
-    double factor = 0;
-    for (int c = 0; c < D; ++c) factor += mean[c] * g.xi[c][l] * g.xi[c][l];
-    out[l] = out[l] * factor / g.length[l];
+  for (int l = 0; l < n; l += pack_width) {
+    const RowColumns far = RowColumns::load(modulus, g.far + l);
+    const Pack length = Pack::load(g.length + l);
+    Pack factor(0.0);
+    for (int c = 0; c < D; ++c) {
+      const Pack xi = Pack::load(g.xi[c] + l);
+      factor += (Pack(own[c]) + far[c]) * (xi * xi);
+    }
+    (Pack::load(out + l) * (Pack(0.5) * factor) / (length * length)).store(out + l);
   }
 }
 
@@ -101,21 +106,25 @@ template <PairWork work>
 void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g, PairScratch& s) const noexcept {
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
-  // One loop for what every bond has, and one for each thing more: each is short enough to stay in registers.
+  // One loop for what every bond has, and one for each thing more: each is short enough to stay in registers. Lanes beyond the last bond are the
+  // first one again, at rest and without volume.
   const Row *const position = position_, *const u = u_.data(), x = position[p], own = u[p];
   const std::int32_t* const neighbour = lists_.neighbour.data() + begin;
-  for (int l = 0; l < n; ++l) {
-    const auto j = static_cast<std::size_t>(neighbour[l]);
-    const Row far = position[j], xi = far - x, du = u[j] - own;
-    double square = 0;
+  std::copy_n(neighbour, n, g.far);
+  std::fill(g.far + n, g.far + padded(static_cast<std::size_t>(n)), neighbour[0]);
+  for (int l = 0; l < n; l += pack_width) {
+    const std::uint8_t real = first_lanes(n - l);
+    const RowColumns far = RowColumns::load(position, g.far + l), far_u = RowColumns::load(u, g.far + l);
+    Pack square(0.0);
     for (int c = 0; c < D; ++c) {
-      g.xi[c][l] = xi[c];
-      g.du[c][l] = du[c];
-      square += xi[c] * xi[c];
+      const Pack xi = far[c] - Pack(x[c]);
+      xi.store(g.xi[c] + l);
+      keep(real, far_u[c] - Pack(own[c])).store(g.du[c] + l);
+      square += xi * xi;
     }
-    g.length[l] = square;
-    g.far_volume[l] = far[3];
-    if constexpr (!sums) g.q[l] = own[3] + u[j][3];
+    sqrt(square).store(g.length + l);
+    keep(real, far[3]).store(g.far_volume + l);
+    if constexpr (!sums) (Pack(own[3]) + far_u[3]).store(g.q + l);
   }
   if (const double* integrity = families_.integrities()) {
     for (int l = 0; l < n; ++l) {
@@ -133,10 +142,10 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     std::fill_n(g.omega, n, 1.0);
   if constexpr (rate) {
     const Row *const w = w_.data(), own_w = w[p];
-    for (int l = 0; l < n; ++l) {
-      const Row far_w = w[neighbour[l]], dw = far_w - own_w;
-      for (int c = 0; c < D; ++c) g.dw[c][l] = dw[c];
-      if (dilatation_) g.dq[l] = own_w[3] + far_w[3];
+    for (int l = 0; l < n; l += pack_width) {
+      const RowColumns far_w = RowColumns::load(w, g.far + l);
+      for (int c = 0; c < D; ++c) (far_w[c] - Pack(own_w[c])).store(g.dw[c] + l);
+      if (dilatation_) (Pack(own_w[3]) + far_w[3]).store(g.dq + l);
     }
   }
   if constexpr (!sums) {
@@ -152,15 +161,9 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     if constexpr (work == PairWork::tangent) g.dq[l] = g.own_strain[l] * w_[p][3] + g.far_strain[l] * w_[j][3];
   }
   for (int l = n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
-    for (int c = 0; c < D; ++c) {
-      g.xi[c][l] = c == 0;
-      g.du[c][l] = g.dw[c][l] = 0;
-    }
-    g.length[l] = 1;
-    g.far_volume[l] = g.omega[l] = g.q[l] = g.dq[l] = 0;
+    g.omega[l] = g.own_strain[l] = 0;
     if (!moduli_.empty()) s.modulus[l] = 0;
   }
-  for (int l = 0; l < n; l += pack_width) sqrt(Pack::load(g.length + l)).store(g.length + l);
 }
 
 template <int D>
@@ -183,8 +186,8 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     if (moduli_.empty())
       for (double& c : s.modulus) c = fields_.uniform;
   }
-  Row own{};
-  double own_sum = 0, stored = 0;
+  RowColumns own;
+  Pack own_sum(0.0), stored(0.0);
   bool finite = true;
   const Pack onset(nearest_.least_onset);
   Pack excess(-std::numeric_limits<double>::max());
@@ -207,12 +210,15 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
       if constexpr (rate) bond.along(dw).store(s.de + l);
-      if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t[0] + l);
+      if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t + l);
     }
     if constexpr (sums) {
       double* const out = pass.out.data;
-      for (int l = 0; l < n; ++l) own_sum += (crosses ? g.own_strain[l] : 1.0) * g.t[0][l] * g.far_volume[l];
-      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[0][l] * (fails ? g.integrity[l] * volume : volume);
+      for (int l = 0; l < n; l += pack_width) {
+        const Pack t = crosses ? Pack::load(g.own_strain + l) * Pack::load(g.t + l) : Pack::load(g.t + l);
+        own_sum += t * Pack::load(g.far_volume + l);
+      }
+      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[l] * (fails ? g.integrity[l] * volume : volume);
       continue;
     }
     law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr,
@@ -226,15 +232,16 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }
     }
-    for (int l = 0; l < n && energies; ++l) stored += s.energy[l] * g.far_volume[l];
+    for (int l = 0; l < n && energies; l += pack_width) stored += keep(first_lanes(n - l), Pack::load(s.energy + l) * Pack::load(g.far_volume + l));
     if constexpr (work == PairWork::energy) continue;
     for (int l = 0; l < n; l += pack_width) {
       const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
       Pack T = Pack::load(s.force + l);
       if (dilatation) T += weight * Pack::load(g.q + l);
+      RowColumns t;
       if constexpr (work == PairWork::force) {
         T *= volumes;
-        for (int c = 0; c < D; ++c) (T * Pack::load(s.n[c] + l)).store(g.t[c] + l);
+        for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + l);
       } else {
         // d(T n) = dT n + T (dw - n de)/|y|
         const Pack de = Pack::load(s.de + l), turn = T * Pack::load(s.inverse_length + l);
@@ -242,15 +249,15 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         if (dilatation) dT += weight * Pack::load(g.dq + l);
         for (int c = 0; c < D; ++c) {
           const Pack n_c = Pack::load(s.n[c] + l);
-          (-volumes * (dT * n_c + turn * (Pack::load(g.dw[c] + l) - n_c * de))).store(g.t[c] + l);
+          t[c] = -volumes * (dT * n_c + turn * (Pack::load(g.dw[c] + l) - n_c * de));
         }
       }
-    }
-    for (int l = 0; l < n; ++l) {
-      Row t{};
-      for (int c = 0; c < D; ++c) t[c] = g.t[c][l];
-      own += t;
-      if (half) force[neighbour[l]] -= t;
+      const std::uint8_t real = first_lanes(n - l);
+      for (int c = 0; c < D; ++c) {
+        own[c] += keep(real, t[c]);
+        t[c] = -t[c];
+      }
+      if (half) t.add_to(force, g.far + l, n - l);
     }
   }
   if (screened && highest > pass.screen->limit + pass.screen->density[p])
@@ -260,10 +267,10 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     excess.store(lanes);
     nearest_.excess[p] = *std::max_element(lanes, lanes + pack_width);
   }
-  if constexpr (sums) pass.out.data[p] += own_sum;
-  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored;
-  else force_[p] += own;
-  total += (half ? 1.0 : 0.5) * volume * stored;
+  if constexpr (sums) pass.out.data[p] += sum(own_sum);
+  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * sum(stored);
+  else force_[p] += own.sum();
+  total += (half ? 1.0 : 0.5) * volume * sum(stored);
   return finite;
 }
 

@@ -32,7 +32,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   }
 
   void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only) override {
-    mirror_rows(u, points_, u_);
+    mirror(u);
     if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
@@ -53,7 +53,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   }
 
   void add_density(ConstFieldView u, double* density, const std::uint8_t* only) override {
-    mirror_rows(u, points_, u_);
+    mirror(u);
     quiet_.wake();
     over_points(everywhere, [&](std::size_t p) {
       if (only && !only[p / padding]) return;
@@ -71,6 +71,11 @@ class CloudPenalty final : public ZeroEnergyPenalty {
  private:
   static constexpr auto everywhere = [](std::size_t) { return true; };
 
+  void mirror(ConstFieldView u) {
+    if constexpr (isotropic) mirror_rows(u, points_, u_, M_.data());
+    else mirror_rows(u, points_, u_);
+  }
+
   /// body(p) for the points of the blocks with wanted(b).
   template <class Wanted, class Body>
   void over_points(Wanted&& wanted, Body&& body) const {
@@ -85,7 +90,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     std::fill_n(&M_[columns * p], columns, Column{});
     if (!penalised(families_.condition(p))) return;  // M = 0
     double intact = 0, M[6];
-    for_bonds(p, [&](std::size_t j, double omega) { intact += omega * position_[j][3]; });
+    for (std::int64_t k = families_.lists().first[p]; k < families_.lists().first[p + 1]; ++k)
+      intact += families_.omega(static_cast<std::size_t>(k)) * position_[families_.lists().neighbour[static_cast<std::size_t>(k)]][3];
     parts_.stabilization->penalty(penalty_point(families_, parts_.laws, p, intact, inverse), M);
     if constexpr (isotropic) {
       M_[p] = M[0];
@@ -95,15 +101,8 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     }
   }
 
-  /// use(j, omega_pj) for the intact bonds of p.
-  template <class Use>
-  void for_bonds(std::size_t p, Use&& use) const noexcept {
-    const double* omega = families_.omegas();
-    for (std::int64_t k = families_.lists().first[p]; k < families_.lists().first[p + 1]; ++k)
-      use(static_cast<std::size_t>(families_.lists().neighbour[static_cast<std::size_t>(k)]), omega[k]);
-  }
-
-  Row times(std::size_t p, Row x) const noexcept {
+  /// M_p x
+  Row times(std::size_t p, const Row& x) const noexcept {
     if constexpr (isotropic) {
       return M_[p] * x;
     } else {
@@ -112,44 +111,51 @@ class CloudPenalty final : public ZeroEnergyPenalty {
       return y;
     }
   }
-  /// (M_p + M_j) x
-  Row times_both(std::size_t p, std::size_t j, Row x) const noexcept {
-    if constexpr (isotropic) {
-      return (M_[p] + M_[j]) * x;
-    } else {
-      Row y{};
-      for (std::size_t e = 0; e < columns; ++e) y += x[static_cast<int>(e)] * (M_[columns * p + e] + M_[columns * j + e]);
-      return y;
-    }
-  }
 
   /// 1/2 V_p sum_j V_j omega z . M_p z, of the columns of H_p.
   double energy_of_point(std::size_t p, const Row* H) const noexcept {
-    double sum = 0;
-    for_bonds(p, [&](std::size_t j, double omega) {
-      const Row xi = position_[j] - position_[p];
-      Row z = u_[j] - u_[p];
-      for (int e = 0; e < D; ++e) z -= xi[e] * H[e];
-      const Row t = times(p, z);
-      double product = 0;
-      for (int c = 0; c < D; ++c) product += z[c] * t[c];
-      sum += omega * position_[j][3] * product;
+    const Row *const position = position_, *const u = u_.data();
+    const TwoRows x = TwoRows::load(position[p], position[p]), own = TwoRows::load(u[p], u[p]);
+    TwoRows sum, gradient[D], M[columns];
+    for (int e = 0; e < D; ++e) gradient[e] = TwoRows::load(H[e], H[e]);
+    for (std::size_t e = 0; e < columns && !isotropic; ++e) M[e] = matrix_rows(p, p, e);
+    over_bonds(families_, p, [&](std::size_t j, std::size_t l, const TwoRows& omega) PERIKIT_INLINE {
+      const TwoRows far = TwoRows::load(position[j], position[l]), back = x - far;
+      TwoRows z = TwoRows::load(u[j], u[l]) - own, t;
+      over_components<D>([&](auto e) PERIKIT_INLINE { z.add_product(back.template spread<e>(), gradient[e]); });
+      if constexpr (isotropic) t = z;
+      else over_components<D>([&](auto e) PERIKIT_INLINE { t.add_product(z.template spread<e>(), M[e]); });
+      sum.add_product(omega * far.spread<3>() * z, t);
     });
-    return 0.5 * position_[p][3] * sum;
+    const Row products = sum.sum();
+    double product = 0;
+    for (int c = 0; c < D; ++c) product += products[c];
+    if constexpr (isotropic) product *= M_[p];
+    return 0.5 * position_[p][3] * product;
   }
 
   /// sum_j V_j omega [(M_p + M_j) u_pj - (Q_p + Q_j) xi_pj]
   Row force_of_point(std::size_t p) const noexcept {
-    Row f{};
-    const Row* own = &flux_[D * p];
-    for_bonds(p, [&](std::size_t j, double omega) {
-      const Row xi = position_[j] - position_[p];
-      const Row* far = &flux_[D * j];
-      Row t = times_both(p, j, u_[j] - u_[p]);
-      for (int e = 0; e < D; ++e) t -= xi[e] * (own[e] + far[e]);
-      f += omega * position_[j][3] * t;
+    const Row *const position = position_, *const u = u_.data(), *const Q = flux_.data();
+    const TwoRows x = TwoRows::load(position[p], position[p]), own = TwoRows::load(u[p], u[p]);
+    TwoRows f, flux[D], M[columns];
+    for (std::size_t e = 0; e < D; ++e) flux[e] = TwoRows::load(Q[D * p + e], Q[D * p + e]);
+    for (std::size_t e = 0; e < columns && !isotropic; ++e) M[e] = matrix_rows(p, p, e);
+    over_bonds(families_, p, [&](std::size_t j, std::size_t l, const TwoRows& omega) PERIKIT_INLINE {
+      const TwoRows far = TwoRows::load(position[j], position[l]), far_u = TwoRows::load(u[j], u[l]);
+      const TwoRows back = x - far, du = far_u - own;
+      TwoRows t;
+      if constexpr (isotropic) t = (far_u + own).template spread<3>() * du;
+      else over_components<D>([&](auto e) PERIKIT_INLINE { t.add_product(du.template spread<e>(), M[e] + matrix_rows(j, l, e)); });
+      over_components<D>([&](auto e) PERIKIT_INLINE { t.add_product(back.template spread<e>(), flux[e] + TwoRows::load(Q[D * j + e], Q[D * l + e])); });
+      f.add_product(omega * far.spread<3>(), t);
     });
-    return f;
+    return f.sum();
+  }
+  /// Column e of M_j and M_l.
+  TwoRows matrix_rows(std::size_t j, std::size_t l, std::size_t e) const noexcept {
+    if constexpr (isotropic) return TwoRows::fill(M_[j], M_[l]);
+    else return TwoRows::load(M_[columns * j + e], M_[columns * l + e]);
   }
 
   const CloudFamilies& families_;
@@ -157,7 +163,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   const Row* position_;          ///< {x, y, z, V}
   std::size_t points_;
   AlignedVector<Column> M_;
-  AlignedVector<Row> u_, flux_;  ///< mirror of u; H, then Q, by columns
+  AlignedVector<Row> u_, flux_;  ///< mirror of u, {u, M} where M is a number; H, then Q, by columns
   QuietBlocks quiet_;
 };
 

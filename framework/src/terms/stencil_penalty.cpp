@@ -139,7 +139,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       for (std::size_t r = 0; r < rows_.size(); ++r) row_order_.push_back(static_cast<std::int32_t>(r));
       for (std::size_t b = 0; b < cloud_blocks(rows_.size()); ++b) block_end_.push_back(std::min(rows_.size(), (b + 1) * cloud_block_points));
       reach = cloud_reach(rows_.lists(), rows_.size());
-      of_cloud_ = cloud_colouring(rows_.body(), reach, cloud_block_points);
+      of_cloud_ = cloud_colouring(rows_.body(), rows_.lists(), reach);
     }
     if (parts_.skip) quiet_ = QuietBlocks(std::move(reach));
   }

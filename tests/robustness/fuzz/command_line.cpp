@@ -95,7 +95,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     return 0;
   }
   if (!options.command || options.threads < 0 || options.threads > 1024 || options.jobs < 1 || options.jobs > 1024 || options.ranks < 1 ||
-      options.ranks > 100000 || options.bench.cells < 2 || (!options.view.empty() && options.view.size() != 3) ||
+      options.ranks > 100000 || std::ranges::min(options.bench.cells) < 2 || (!options.view.empty() && options.view.size() != 3) ||
       (!options.range.empty() && options.range.size() != 2))
     __builtin_trap();
   static test::FakeCatalogue parts;

@@ -175,6 +175,19 @@ inline bool all(PackMask m) noexcept {
 #endif
 }
 
+/// Bit l: whether it holds in lane l.
+inline std::uint32_t lane_bits(PackMask m) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return m.v;
+#elif defined(__AVX__)
+  return static_cast<std::uint32_t>(_mm256_movemask_pd(reinterpret_cast<__m256d>(m.v)));
+#else
+  std::uint32_t bits = 0;
+  for (int i = 0; i < pack_width; ++i) bits |= static_cast<std::uint32_t>(m.v[i] & 1) << i;
+  return bits;
+#endif
+}
+
 inline Pack sqrt(Pack a) noexcept {
   detail::count(pack_width);
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -257,11 +270,11 @@ inline Pack max(Pack a, Pack b) noexcept { return select(a > b, a, b); }
 
 namespace detail {
 /// Rows i and i + Step change places of their blocks of Step lanes off the diagonal.
-template <int Step, std::size_t... J>
-inline void transpose_blocks(Pack (&rows)[pack_width], std::index_sequence<J...>) noexcept {
+template <int Step, int Rows, std::size_t... J>
+[[gnu::always_inline]] inline void transpose_blocks(Pack (&rows)[Rows], std::index_sequence<J...>) noexcept {
   constexpr Bits low = {((J & Step) != 0 ? pack_width + static_cast<int>(J) - Step : static_cast<int>(J))...};
   constexpr Bits high = {((J & Step) != 0 ? pack_width + static_cast<int>(J) : static_cast<int>(J) + Step)...};
-  for (int i = 0; i < pack_width; ++i) {
+  _Pragma("GCC unroll 8") for (int i = 0; i < Rows; ++i) {
     if ((i & Step) != 0) continue;
     const Lanes a = rows[i].v, b = rows[i + Step].v;
     rows[i].v = __builtin_shuffle(a, b, low);
@@ -276,6 +289,13 @@ inline void transpose(Pack (&rows)[pack_width]) noexcept {
   detail::transpose_blocks<1>(rows, lanes);
   if constexpr (pack_width > 2) detail::transpose_blocks<2>(rows, lanes);
   if constexpr (pack_width > 4) detail::transpose_blocks<4>(rows, lanes);
+}
+
+/// rows[i][j] <-> rows[j][i] within each four lanes; in packs of two lanes within the first two rows and the other two.
+[[gnu::always_inline]] inline void transpose_fours(Pack (&rows)[4]) noexcept {
+  constexpr auto lanes = std::make_index_sequence<pack_width>();
+  detail::transpose_blocks<1>(rows, lanes);
+  if constexpr (pack_width > 2) detail::transpose_blocks<2>(rows, lanes);
 }
 
 /// Sum of the lanes, always in the same order.
