@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <memory>
 #include <string_view>
 
 #include "perikit/core/communicator.hpp"
@@ -16,6 +17,39 @@ namespace perikit {
 namespace {
 
 constexpr std::size_t piece = std::size_t{1} << 30;  // MPI counts in int
+
+class MpiExchange final : public ExchangePlan {
+ public:
+  MpiExchange(MPI_Comm world, std::span<const Message> messages) {
+    for (const Message& message : messages)
+      if (!message.from.empty())
+        MPI_Recv_init(message.from.data(), static_cast<int>(message.from.size()), MPI_DOUBLE, message.rank, tag, world,
+                      &requests_.emplace_back());
+    for (const Message& message : messages)
+      if (!message.to.empty())
+        MPI_Send_init(message.to.data(), static_cast<int>(message.to.size()), MPI_DOUBLE, message.rank, tag, world,
+                      &requests_.emplace_back());
+  }
+  MpiExchange(const MpiExchange&) = delete;
+  MpiExchange& operator=(const MpiExchange&) = delete;
+  ~MpiExchange() override {
+    for (MPI_Request& request : requests_) MPI_Request_free(&request);
+  }
+  void start() override { MPI_Startall(static_cast<int>(requests_.size()), requests_.data()); }
+  bool done(bool wait) override {
+    const int count = static_cast<int>(requests_.size());
+    int all = 1;
+    if (wait)
+      MPI_Waitall(count, requests_.data(), MPI_STATUSES_IGNORE);
+    else
+      MPI_Testall(count, requests_.data(), &all, MPI_STATUSES_IGNORE);
+    return all != 0;
+  }
+
+ private:
+  static constexpr int tag = 3;  // apart from exchanges without a plan
+  std::vector<MPI_Request> requests_;
+};
 
 class MpiRanks final : public Communicator {
  public:
@@ -54,6 +88,10 @@ class MpiRanks final : public Communicator {
         MPI_Isend(message.to.data(), static_cast<int>(message.to.size()), MPI_DOUBLE, message.rank, 0, world_,
                   &requests_.emplace_back());
     MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+  }
+
+  std::unique_ptr<ExchangePlan> plan_exchange(std::vector<Message> messages) override {
+    return std::make_unique<MpiExchange>(world_, messages);
   }
 
   std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override {

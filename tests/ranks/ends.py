@@ -117,6 +117,20 @@ def output_fails():
         print(err)
 
 
+def shared_output_fails():
+    """One rank cannot write its share of a frame: that is said once, and nothing of the frame stays."""
+    folder = WORK + "/shared"
+    text = without_velocity(scene('type = "conventional"', integrator='type = "failing"\nrank = 2\nat = "step"\nerror = "disk"'))
+    began = time.time()
+    done = run(PROGRAM, text, folder, 3, 1, ("--plugin-path", FAILING), environment={"PERIKIT_GATHERED_POINTS": "100"})
+    frames = sorted(os.listdir(folder + "/frames"))
+    check(done.returncode == 1 and perikit_lines(done.stderr, "the run failed") == 1 and perikit_lines(done.stderr, "File too large") == 1
+          and frames == ["%08d.h5" % k for k in range(5)] and time.time() - began < LIMIT,
+          "a rank cannot write its share: status %d after %.1f s, frames %s" % (done.returncode, time.time() - began, frames))
+    if done.returncode != 1:
+        print(done.stderr)
+
+
 def children(process):
     return [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()]
 
@@ -154,6 +168,7 @@ refusals()
 throws()
 other_commands()
 output_fails()
+shared_output_fails()
 stops()
 print("%d checks failed" % len(failed))
 sys.exit(1 if failed else 0)

@@ -4,6 +4,7 @@ usage: same_bits.py PROGRAM LIBRARY WORK small|all
 """
 
 import itertools
+import os
 import re
 import sys
 
@@ -268,6 +269,29 @@ def checkpoints(program, work, everything):
         yield "checkpoints, %s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), found
 
 
+def written_by_all(program, work, everything):
+    """Frames that every rank writes a share of are, byte for byte, those of one rank. What differs."""
+    for name, cloud in itertools.product(("conventional", "baqp") if everything else ("conventional",), (False, True)):
+        text = scene(KINEMATICS[name], 2, cloud)
+        one, several, found = work + "/gathered", work + "/written_by_all", []
+        done = run(program, text, one, 0)
+        found += [done.stderr.strip()] if done.returncode != 0 else []
+        for ranks in (2, 3):
+            # Pieces of 100 points: several for each rank, and a last one that is short.
+            done = run(program, text, several, ranks, environment={"PERIKIT_GATHERED_POINTS": "100"})
+            if found or done.returncode != 0:
+                found.append(done.stderr.strip())
+                continue
+            found += differences(one, several)
+            if log_lines(several, "frames") != ["frames        written by all ranks\n"]:
+                found.append("rank 0 has written the frames")
+            for frame in os.listdir(one + "/frames"):
+                with open(one + "/frames/" + frame, "rb") as a, open(several + "/frames/" + frame, "rb") as b:
+                    if a.read() != b.read():
+                        found.append(frame)
+        yield "frames written by all ranks, %s" % ("cloud" if cloud else "lattice"), found
+
+
 def log_lines(folder, name):
     with open(folder + "/run.log") as log:
         return [line for line in log if line.startswith(name + " ")]
@@ -309,7 +333,7 @@ def main():
                 print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
         if name not in failed:
             print("same    " + name, flush=True)
-    for name, found in itertools.chain(carried(program, work, which == "all"), checkpoints(program, work, which == "all")):
+    for name, found in itertools.chain(carried(program, work, which == "all"), checkpoints(program, work, which == "all"), written_by_all(program, work, which == "all")):
         count += 1
         if found:
             failed.append(name)

@@ -86,7 +86,7 @@ def without_velocity(text):
     return text.replace('quantity = "velocity"', 'quantity = "displacement"').replace('"velocity", ', "")
 
 
-def run(program, text, folder, ranks=1, threads=1, options=(), limit=300):
+def run(program, text, folder, ranks=1, threads=1, options=(), limit=300, environment=None):
     """Runs the scene in an empty folder; the finished process. ranks 0: without mpirun."""
     if "--resume" not in options:
         shutil.rmtree(folder, ignore_errors=True)
@@ -94,7 +94,7 @@ def run(program, text, folder, ranks=1, threads=1, options=(), limit=300):
     file = folder + ".toml"
     with open(file, "w") as out:
         out.write(text)
-    return subprocess.run(command(program, file, folder, ranks, threads, options), env=ENVIRONMENT, capture_output=True, text=True, timeout=limit)
+    return subprocess.run(command(program, file, folder, ranks, threads, options), env=dict(ENVIRONMENT, **(environment or {})), capture_output=True, text=True, timeout=limit)
 
 
 def command(program, file, folder, ranks, threads, options=()):

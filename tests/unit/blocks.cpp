@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include <atomic>
 #include <mutex>
 #include <set>
 
@@ -41,6 +42,90 @@ TEST_CASE("colouring: every block once, and no two of one colour touch the same 
   });
   CHECK(visited.size() == 20);
   for (std::size_t b = 0; b < 20; ++b) CHECK(visited.count(b) == 1);
+}
+
+namespace {
+
+/// What comes when somebody has looked for it three times, or waits for it.
+class Late final : public Arrival {
+ public:
+  void start() {
+    looks_ = 0;
+    there = false;
+    expect();
+  }
+  std::atomic<bool> there = false;
+
+ private:
+  bool come(bool wait) override { return wait || ++looks_ > 3; }
+  void put() override { there = true; }
+  int looks_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("blocks that read what arrives run after it, those that wait for them too, and sums keep their order") {
+  BlockReach reach = row(50);
+  const int threads = thread_count();
+  std::vector<double> wanted(reach.units, 0.0);
+  const auto add = [&](std::vector<double>& sums, std::size_t b) {
+    for (const std::int32_t unit : reach.touches[b]) sums[static_cast<std::size_t>(unit)] += 1.0 / (3.0 + static_cast<double>(b));
+  };
+  Colouring(reach).for_each([&](std::size_t b) { add(wanted, b); });
+  reach.elsewhere.assign(reach.units, 0);
+  reach.elsewhere[0] = reach.elsewhere[1] = reach.elsewhere[49] = 1;
+  CHECK(reach.late(2));
+  CHECK_FALSE(reach.late(3));
+  const Colouring colouring(reach);
+  const BlockSequence sequence(reach);
+  Late arrival;
+  for (const int n : {1, 2, 3}) {
+    set_thread_count(n);
+    for (int round = 0; round < 20; ++round) {
+      std::vector<double> sums(reach.units, 0.0);
+      std::atomic<int> before = 0, too_early = 0, visited = 0;
+      const auto visit = [&](std::size_t b) {
+        ++visited;
+        before += !arrival.there;
+        too_early += !arrival.there && reach.late(b);
+      };
+      arrival.start();
+      colouring.for_each(
+          [&](std::size_t b) {
+            visit(b);
+            add(sums, b);
+          },
+          &arrival);
+      CHECK(sums == wanted);
+      CHECK_FALSE(arrival.pending());
+      CHECK(before > 0);
+      arrival.start();
+      sequence.for_each(visit, &arrival);
+      CHECK_FALSE(arrival.pending());
+      CHECK(visited == 100);
+      CHECK(too_early == 0);
+    }
+  }
+  set_thread_count(threads);
+}
+
+TEST_CASE("quiet blocks: what is not here yet is looked at where something rests, and counts as moving where nothing does") {
+  BlockReach reach = row(6);
+  reach.elsewhere.assign(reach.units, 0);
+  reach.elsewhere[5] = 1;
+  QuietBlocks blocks(reach);
+  Late arrival;
+  std::vector<std::uint8_t> moving(6, 1);
+  const auto moves = [&](std::size_t b) { return moving[b] != 0; };
+  arrival.start();
+  blocks.look(1, moves, &arrival);
+  CHECK(arrival.pending());
+  CHECK(blocks.counts().quiet == 0);
+  moving = {0, 0, 0, 0, 0, 1};
+  blocks.look(1, moves, &arrival);
+  CHECK_FALSE(arrival.pending());
+  CHECK(blocks.awake(4, 1));
+  CHECK_FALSE(blocks.awake(3, 1));
 }
 
 TEST_CASE("colouring: sums into shared units have one order, whatever the number of threads") {

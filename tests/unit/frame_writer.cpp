@@ -12,6 +12,7 @@
 #include <iterator>
 #include <thread>
 
+#include "files/shared_file.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"
@@ -90,11 +91,6 @@ std::string text(const fs::path& file, const char* name) {
   return result;
 }
 
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 std::size_t count_files(const fs::path& folder) {
   return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator{}));
 }
@@ -153,6 +149,20 @@ TEST_CASE("a frame from pieces is the same file, byte for byte, and a field that
   writer.end();
   writer.finish();
   CHECK(read_text(folder.path / "frames/00000001.h5") == read_text(folder.path / "frames/00000000.h5"));
+  // Rows that others write.
+  writer.begin(1.5, 7);
+  for (const OutputField& field : all) {
+    const std::uint64_t at = writer.reserve(field.name, field.width);
+    SharedFile other(writer.file());
+    REQUIRE(other.refusal().empty());
+    const std::size_t half = points / 2 * static_cast<std::size_t>(field.width);
+    other.write(at + half * sizeof(double), std::span(field.data).subspan(half));
+    other.write(at, std::span(field.data).first(half));
+    CHECK(other.close().empty());
+  }
+  writer.end();
+  writer.finish();
+  CHECK(read_text(folder.path / "frames/00000002.h5") == read_text(folder.path / "frames/00000000.h5"));
   CHECK(dataset(folder.path / "results.h5", "/frames/00000001/cauchy").data == all[1].data);
 
   writer.begin(2, 8);
@@ -160,7 +170,7 @@ TEST_CASE("a frame from pieces is the same file, byte for byte, and a field that
   CHECK_THROWS_WITH_AS(writer.end(), doctest::Contains("field 'damage' has 3 values; 4 points of width 1 need 4"), RunError);
   writer.begin(2, 8);
   CHECK_THROWS_WITH_AS(writer.add("damage", 1, std::vector<double>(points + 1, 0.0)), doctest::Contains("field 'damage' has 5 values"), RunError);
-  CHECK(writer.frames() == 2);
+  CHECK(writer.frames() == 3);
 }
 
 TEST_CASE("the last frame comes back in input order; a wrong body or file is refused by name") {
@@ -176,6 +186,19 @@ TEST_CASE("the last frame comes back in input order; a wrong body or file is ref
   CHECK(frame.fields.size() == 3);
   CHECK(frame.fields.at("cauchy").width == 9);
   CHECK(frame.fields.at("displacement").data == fields(2)[0].data);
+  const LastFrame some(results, points);
+  CHECK(some.fields().at("cauchy") == 9);
+  std::vector<double> rows;
+  some.each_row("displacement", std::vector<std::int64_t>{1, 3}, [&](std::size_t k, std::span<const double> row) {
+    CHECK(k == rows.size() / 3);
+    rows.insert(rows.end(), row.begin(), row.end());
+  });
+  const std::vector<double>& whole = frame.fields.at("displacement").data;
+  CHECK(std::equal(rows.begin(), rows.begin() + 3, whole.begin() + 3));
+  CHECK(std::equal(rows.begin() + 3, rows.end(), whole.begin() + 9));
+  CHECK(rows.size() == 6);
+  CHECK_THROWS_WITH_AS(some.each_row("displacement", std::vector<std::int64_t>{4}, [](std::size_t, std::span<const double>) {}),
+                       doctest::Contains("one of number 4 is wanted"), InputError);
   CHECK_THROWS_WITH_AS(read_last_frame(results, 5), doctest::Contains("found 4 points; this body has 5"), InputError);
   CHECK_THROWS_WITH_AS(read_last_frame(folder.path / "none.h5", points), doctest::Contains("No such file"), InputError);
   write_file_atomically(folder.path / "text.h5", "not HDF5");

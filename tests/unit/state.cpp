@@ -4,6 +4,8 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "perikit/core/errors.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/problem/loads.hpp"
@@ -54,6 +56,45 @@ TEST_CASE("state: what is read is what was written, and what was not written is 
   CHECK(forgotten.data[0] == 0);
   ByteReader cut(std::span<const std::byte>(bytes).first(bytes.size() - 1));
   CHECK_THROWS_AS(two.read(cut), InputError);
+  CHECK(bytes.size() == one.written());
+}
+
+TEST_CASE("state: bytes that go and come in pieces are those of one piece") {
+  const Body body = bar();
+  State one(body), two(body);
+  for (double& x : std::span(one.displacement().data, one.displacement().size()))
+    x = 0.5 + static_cast<double>(&x - one.displacement().data);
+  std::vector<std::byte> bytes;
+  int pieces = 0;
+  ByteWriter out([&](std::span<const std::byte> piece) {
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+    ++pieces;
+  });
+  one.write(out);
+  const std::vector<double> large(300'000, 0.25);
+  out.numbers(large);
+  out.finish();
+  CHECK(pieces > 2);
+  CHECK(bytes.size() == one.written() + sizeof(std::uint64_t) + large.size() * sizeof(double));
+  std::size_t at = 0;
+  const auto seven = [&] {
+    const std::size_t count = std::min<std::size_t>(7, bytes.size() - at);
+    at += count;
+    return std::vector<std::byte>(&bytes[at - count], &bytes[at - count] + count);
+  };
+  ByteReader in(bytes.size(), seven);
+  two.read(in);
+  CHECK(std::equal(one.displacement().data, one.displacement().data + one.displacement().size(), two.displacement().data));
+  CHECK(in.value<std::uint64_t>() == large.size());
+  std::vector<double> back(large.size());
+  in.bytes(back.data(), back.size() * sizeof(double));
+  CHECK(back == large);
+  CHECK(in.done());
+  CHECK_THROWS_AS(in.value<char>(), InputError);
+  at = 0;
+  ByteReader longer(bytes.size() + 9, seven);
+  two.read(longer);
+  CHECK_THROWS_AS(longer.bytes(std::vector<std::byte>(bytes.size()).data(), bytes.size() + 9 - one.written()), InputError);
 }
 
 TEST_CASE("constraints: the last prescription governs a component of a point") {

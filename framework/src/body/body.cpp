@@ -126,6 +126,13 @@ std::int32_t Body::at_place(std::int64_t place) const noexcept {
   return alive(static_cast<std::size_t>(index)) ? static_cast<std::int32_t>(index) : -1;
 }
 
+std::vector<std::int64_t> Body::numbers(std::span<const std::int32_t> points) const {
+  std::vector<std::int64_t> numbers;
+  numbers.reserve(points.size());
+  for (const std::int32_t p : points) numbers.push_back(number(static_cast<std::size_t>(p)));
+  return numbers;
+}
+
 std::int32_t Body::find(std::int64_t number) const noexcept {
   if (numbers_.empty()) return number >= 0 && number < std::ssize(internal_) ? internal_[static_cast<std::size_t>(number)] : -1;
   const auto found = std::ranges::lower_bound(numbers_, number);

@@ -125,18 +125,17 @@ void fill(const std::vector<std::optional<Expression>>& values, const Body& body
 
 /// The last frame of an earlier run of the same points.
 void start_from(const std::filesystem::path& results, const Body& body, State& state) {
-  const LoadedFrame frame = read_last_frame(results, body.points_of_all_ranks());
+  const LastFrame frame(results, body.points_of_all_ranks());
+  const std::vector<std::int64_t> numbers = body.numbers(body.owned());
   const auto copy = [&](const std::string& name, FieldView field) {
-    const OutputField& from = frame.fields.at(name);
-    for (const std::int32_t p : body.owned()) {
-      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
-      for (int c = 0; c < field.components; ++c) field.component(c)[p] = from.data[3 * row + static_cast<std::size_t>(c)];
-    }
+    frame.each_row(name, numbers, [&](std::size_t k, std::span<const double> row) {
+      for (int c = 0; c < field.components; ++c) field.component(c)[body.owned()[k]] = row[static_cast<std::size_t>(c)];
+    });
   };
-  if (!frame.fields.contains("displacement"))
+  if (!frame.fields().contains("displacement"))
     throw InputError(fmt::format("{}: the last frame has no displacement", results.string()));
   copy("displacement", state.displacement());
-  if (frame.fields.contains("velocity")) copy("velocity", state.velocity());
+  if (frame.fields().contains("velocity")) copy("velocity", state.velocity());
 }
 
 }  // namespace

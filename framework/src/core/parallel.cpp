@@ -64,37 +64,77 @@ LoopOrder::LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for)
   }
 }
 
+namespace {
+
+/// Spins until `ready` says so.
+template <class Ready>
+void await(const Ready& ready) noexcept {
+  constexpr int patience = 200;  // then there may be more threads than cores
+  for (int spins = 0; !ready(); ++spins)
+    if (spins > patience) std::this_thread::yield();
+}
+
+/// A body that waits for what its late indices read. The thread that runs the loop, which alone may fetch it, looks for it
+/// between indices.
+struct Expecting {
+  LateIndices late;
+  void* context;
+  void (*body)(void*, std::size_t);
+
+  static void call(void* of, std::size_t i) {
+    const auto& [late, context, body] = *static_cast<Expecting*>(of);
+    const bool fetches = detail::team_index() == 0;
+    if (i >= late.first) {
+      if (fetches)
+        late.arrival->finish();
+      else
+        await([&] { return !late.arrival->pending(); });
+    }
+    body(context, i);
+    if (fetches) late.arrival->look();
+  }
+};
+
+void run_alone(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
+  for (std::size_t i = 0; i < n; ++i) body(context, i);
+}
+
+}  // namespace
+
 void LoopOrder::wait(std::size_t i) const noexcept {
-  constexpr int patience = 200;   // then there may be more threads than cores
   for (const std::int32_t other : waits_for(i))
-    for (int spins = 0; ended_[static_cast<std::size_t>(other)].load(std::memory_order_acquire) != round_; ++spins)
-      if (spins > patience) std::this_thread::yield();
+    await([&] { return ended_[static_cast<std::size_t>(other)].load(std::memory_order_acquire) == round_; });
 }
 
 namespace detail {
-void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
-  if (loop_times) [[unlikely]]
+void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(void*, std::size_t)) {
+  if (loop_times) [[unlikely]] {
+    if (late.any()) late.arrival->finish();
     return run_timed(n, context, body);
-  if (threads == 1 || n < 2) {
-    for (std::size_t i = 0; i < n; ++i) body(context, i);
-    return;
   }
-  team_for(threads, n, context, body);
+  const bool alone = threads == 1 || n < 2;
+  if (!late.any()) return alone ? run_alone(n, context, body) : team_for(threads, n, context, body, nullptr);
+  Expecting expecting{late, context, body};
+  if (!alone) return team_for(threads, n, &expecting, Expecting::call, late.arrival);
+  run_alone(n, &expecting, Expecting::call);
+  late.arrival->finish();
 }
 
-/// Indices are handed out in ascending order, so that the lowest of those that have not ended waits for nothing.
-void parallel_for(LoopOrder& order, void* context, void (*body)(void*, std::size_t)) {
+/// Indices are handed out in ascending order, so that the lowest of those that have not ended waits for nothing but what arrives.
+void parallel_for(LoopOrder& order, LateIndices late, void* context, void (*body)(void*, std::size_t)) {
   const std::size_t n = order.size();
-  if (loop_times) [[unlikely]]
+  if (loop_times) [[unlikely]] {
+    if (late.any()) late.arrival->finish();
     return run_timed(n, context, body, &order);
-  if (threads == 1 || n < 2) return parallel_for(n, context, body);
+  }
+  if (threads == 1 || n < 2) return parallel_for(n, late, context, body);
   struct Ordered {
     LoopOrder& order;
     void* context;
     void (*body)(void*, std::size_t);
   } ordered{order, context, body};
   order.begin();
-  team_for(threads, n, &ordered, [](void* of, std::size_t i) {
+  parallel_for(n, late, &ordered, [](void* of, std::size_t i) {
     const auto& [order, context, body] = *static_cast<Ordered*>(of);
     order.wait(i);
     body(context, i);

@@ -5,6 +5,9 @@
 #include <omp.h>
 
 #include <cstddef>
+
+#include "perikit/core/parallel.hpp"
+
 #if defined(__SANITIZE_THREAD__)
 #include <thread>
 #include <vector>
@@ -17,11 +20,13 @@ namespace perikit::detail {
 inline thread_local int own_team_index = 0;
 inline int team_index() noexcept { return own_team_index; }
 
-/// Index i on thread i mod `threads`: neighbouring blocks always meet on different threads, whatever the machine is doing.
-inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t)) {
+/// Index i on thread i mod `threads`: neighbouring blocks always meet on different threads, whatever the machine is doing. The
+/// first thread, when it finds no more to do, waits for `arrival`, for which others may be waiting.
+inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t), Arrival* arrival) {
   const auto share = [&](int thread) {
     own_team_index = thread;
     for (std::size_t i = static_cast<std::size_t>(thread); i < n; i += static_cast<std::size_t>(threads)) body(context, i);
+    if (arrival && thread == 0) arrival->finish();
   };
   std::vector<std::thread> others;
   for (int thread = 1; thread < threads; ++thread) others.emplace_back(share, thread);
@@ -33,9 +38,13 @@ inline void team_for(int threads, std::size_t n, void* context, void (*body)(voi
 
 inline int team_index() noexcept { return omp_get_thread_num(); }
 
-inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t)) {
-#pragma omp parallel for schedule(monotonic : dynamic, 1) num_threads(threads)
-  for (std::size_t i = 0; i < n; ++i) body(context, i);
+inline void team_for(int threads, std::size_t n, void* context, void (*body)(void*, std::size_t), Arrival* arrival) {
+#pragma omp parallel num_threads(threads)
+  {
+#pragma omp for schedule(monotonic : dynamic, 1) nowait
+    for (std::size_t i = 0; i < n; ++i) body(context, i);
+    if (arrival && omp_get_thread_num() == 0) arrival->finish();
+  }
 }
 
 #endif

@@ -17,8 +17,28 @@ using GroupMarks = std::vector<std::uint8_t>;
 /// Units are any fixed grouping of points in which every block is one.
 struct BlockReach {
   std::size_t units = 0;
-  std::vector<std::int32_t> own;                     ///< unit of block b
-  std::vector<std::vector<std::int32_t>> touches;    ///< units that hold the points of block b and of all their families
+  std::vector<std::int32_t> own;                   ///< unit of block b
+  std::vector<std::vector<std::int32_t>> touches;  ///< units that hold the points of block b and of all their families
+  std::vector<std::uint8_t> elsewhere;             ///< by unit: whether it holds points of other ranks; empty: none does
+
+  /// Whether block b reads what comes from other ranks.
+  bool late(std::size_t b) const noexcept;
+};
+
+/// All blocks, those first that read nothing of other ranks.
+class BlockSequence {
+ public:
+  BlockSequence() = default;
+  explicit BlockSequence(const BlockReach& reach);
+  /// body(b) for all blocks, in any order. arrival: of what comes from other ranks; null: it is there.
+  template <class Body>
+  void for_each(Body&& body, Arrival* arrival = nullptr) const {
+    parallel_for(blocks_.size(), [&](std::size_t i) { body(static_cast<std::size_t>(blocks_[i])); }, {early_, arrival});
+  }
+
+ private:
+  std::vector<std::int32_t> blocks_;
+  std::size_t early_ = 0;
 };
 
 class Colouring {
@@ -28,18 +48,23 @@ class Colouring {
   /// Lists the cells that block b writes to, each once.
   using Touch = std::function<void(std::size_t b, std::vector<std::int32_t>& touched)>;
   /// Given colours, by block, of which none has two blocks that touch one of the cells. The smaller cells are, the fewer blocks wait without need.
-  Colouring(const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch);
+  Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch);
 
-  /// body(b) for all blocks. A block does not wait for a whole colour, only for those of lower colours that touch what it touches.
+  /// body(b) for all blocks. A block does not wait for a whole colour, only for those of lower colours that touch what it
+  /// touches. arrival: of what comes from other ranks; null: it is there. Blocks that read it come last, with those that wait for
+  /// them.
   template <class Body>
-  void for_each(Body&& body) const {
-    parallel_for(order_, [&](std::size_t i) { body(static_cast<std::size_t>(blocks_[i])); });
+  void for_each(Body&& body, Arrival* arrival = nullptr) const {
+    parallel_for(order_, [&](std::size_t i) { body(static_cast<std::size_t>(blocks_[i])); }, {early_, arrival});
   }
   std::size_t colours() const noexcept { return colours_; }
  private:
-  std::size_t colours_ = 0;
-  std::vector<std::int32_t> blocks_;   ///< colour by colour
-  mutable LoopOrder order_;            ///< of `blocks_`
+  /// Puts those first that need not wait for what comes from other ranks; waits_for: by place in `blocks_`.
+  void put_late_last(const BlockReach& reach, std::vector<std::vector<std::int32_t>>& waits_for);
+
+  std::size_t colours_ = 0, early_ = 0;
+  std::vector<std::int32_t> blocks_;  ///< the first `early_` of them, and the others, colour by colour
+  mutable LoopOrder order_;           ///< of `blocks_`
 };
 
 }  // namespace perikit

@@ -63,7 +63,7 @@ Colouring cloud_colouring(const Body& body, const FamilyLists& families, const B
         add(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]));
     }
   };
-  return Colouring(prescribed ? *prescribed : block_colours(reach.touches, reach.units), groups, touch);
+  return Colouring(reach, prescribed ? *prescribed : block_colours(reach.touches, reach.units), groups, touch);
 }
 
 bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {

@@ -49,7 +49,14 @@ LatticeTiles::LatticeTiles(const Body& body, const LatticeSlots& slots) {
         blocks.push_back(block);
         tiles.push_back(static_cast<std::int32_t>(tiling.number({t0, t1, t2})));
       }
-  colour(tiling, tiles, lattice, slots);
+  colour(tiling, tiles, body, slots);
+  if (body.part()) {
+    complete_rows.assign(static_cast<std::size_t>(n[1] * n[2]), 0);
+    for (const std::int32_t p : body.complete()) {
+      const auto cell = lattice.cell(p);
+      complete_rows[static_cast<std::size_t>(cell[1] + cell[2] * n[1])] = 1;
+    }
+  }
   chunk_at_.assign(body.stride() / chunk_points, -1);
   for (std::size_t c = 0; c < chunks.size(); ++c)
     chunk_at_[static_cast<std::size_t>(chunks[c].first) / chunk_points] = static_cast<std::int32_t>(c);
@@ -63,8 +70,9 @@ LatticeTiles::LatticeTiles(const Body& body, const LatticeSlots& slots) {
 
 /// Units are tiles of the whole lattice, so that its blocks have the same colours in every box of it. A block touches every tile
 /// that its own, grown by the reach of a family, meets.
-void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Lattice& lattice,
+void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Body& body,
                           const LatticeSlots& slots) {
+  const Lattice& lattice = *body.lattice();
   std::array<std::int64_t, 3> grow{};
   for (const auto& d : slots.offsets)
     for (std::size_t a = 0; a < 3; ++a) grow[a] = std::max<std::int64_t>(grow[a], std::abs(d[a]));
@@ -95,6 +103,12 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }
+  if (body.part()) reach.elsewhere.assign(reach.units, 0);
+  for (std::size_t b = 0; b < blocks.size() && body.part(); ++b)
+    for (std::size_t c = blocks[b].chunk_begin; c < blocks[b].chunk_end; ++c)
+      for (auto p = static_cast<std::size_t>(chunks[c].first), end = p + chunk_points; p < end; ++p)
+        if (body.alive(p) && !body.owns(p)) reach.elsewhere[static_cast<std::size_t>(tiles[b])] = 1;
+  sequence = BlockSequence(reach);
   // Cells of the colouring: groups of eight along rows; whole rows where a tile is as long.
   const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;
   const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
@@ -110,7 +124,7 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
         for (std::int64_t k0 = first; k0 <= last; ++k0)
           touched.push_back(static_cast<std::int32_t>(k0 + along * (k1 + lattice.extent[1] * k2)));
   };
-  colouring = Colouring(of_blocks, static_cast<std::size_t>(along * lattice.extent[1] * lattice.extent[2]), touch);
+  colouring = Colouring(reach, of_blocks, static_cast<std::size_t>(along * lattice.extent[1] * lattice.extent[2]), touch);
 }
 
 std::pair<std::int64_t, std::int64_t> LatticeTiles::range_of(std::size_t b, std::int32_t LatticeRow::*index) const noexcept {
@@ -151,7 +165,7 @@ void LatticeTiles::clear_dead(FieldView out) const noexcept {
 
 std::size_t LatticeTiles::bytes() const noexcept {
   return chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
-         chunk_at_.size() * sizeof(std::int32_t) + partly_dead_.size() * sizeof(partly_dead_[0]);
+         chunk_at_.size() * sizeof(std::int32_t) + complete_rows.size() + partly_dead_.size() * sizeof(partly_dead_[0]);
 }
 
 }  // namespace perikit

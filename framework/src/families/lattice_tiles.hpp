@@ -45,6 +45,9 @@ struct LatticeTiles {
   std::vector<LatticeRow> rows;
   std::vector<LatticeBlock> blocks;
   BlockReach reach;
+  /// By row of cells, k1 + k2 extent[1]: whether forces on some of its points are to be complete here; empty: on all.
+  std::vector<std::uint8_t> complete_rows;
+  BlockSequence sequence;
   Colouring colouring;
 
   /// Index into `chunks` of the chunk with this point; -1: none.
@@ -68,8 +71,7 @@ struct LatticeTiles {
 
  private:
   /// Which tiles a block touches, and its colour. tiles: by block.
-  void colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Lattice& lattice,
-              const LatticeSlots& slots);
+  void colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Body& body, const LatticeSlots& slots);
   /// The least and largest of an index of the rows of block b.
   std::pair<std::int64_t, std::int64_t> range_of(std::size_t b, std::int32_t LatticeRow::*index) const noexcept;
 

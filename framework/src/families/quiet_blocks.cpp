@@ -17,7 +17,6 @@ void QuietBlocks::wake() {
 }
 
 void QuietBlocks::spread() {
-  const auto quiet = [&] { return std::count(distance_.begin(), distance_.end(), far); };
   for (int step = 1; step <= passes_ && quiet() > 0; ++step) {
     reached_.assign(reach_.units, 0);
     for (std::size_t b = 0; b < distance_.size(); ++b)
@@ -29,8 +28,7 @@ void QuietBlocks::spread() {
         distance_[b] = static_cast<std::uint8_t>(step);
     }
   }
-  counts_.blocks += static_cast<std::int64_t>(distance_.size());
-  counts_.quiet += quiet();
+  count();
 }
 
 bool QuietBlocks::moves(ConstFieldView u, std::size_t begin, std::size_t end) noexcept {

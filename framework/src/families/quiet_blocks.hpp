@@ -20,18 +20,36 @@ class QuietBlocks {
   QuietBlocks() = default;
   /// history: laws remember what has passed; a block that was awake once stays awake.
   explicit QuietBlocks(BlockReach reach, bool history = false)
-      : reach_(std::move(reach)), distance_(reach_.own.size(), 0), before_(distance_), moved_(history ? distance_.size() : 0, 0) {}
+      : reach_(std::move(reach)),
+        distance_(reach_.own.size(), 0),
+        before_(distance_),
+        moved_(history ? distance_.size() : 0, 0),
+        late_(distance_.size()) {
+    for (std::size_t b = 0; b < late_.size(); ++b) late_[b] = reach_.late(b);
+  }
 
-  /// At the beginning of an evaluation of `passes` passes: moves(b) says whether a point of block b moves.
+  /// At the beginning of an evaluation of `passes` passes: moves(b) says whether a point of block b moves. arrival: of the
+  /// displacements of points of other ranks; null: they are there.
   template <class Moves>
-  void look(int passes, const Moves& moves) {
+  void look(int passes, const Moves& moves, Arrival* arrival = nullptr) {
     if (distance_.empty()) return;
     begin(passes);
-    parallel_for(distance_.size(), [&](std::size_t b) {
+    auto look_at = [&](std::size_t b) {
       const bool now = (!moved_.empty() && moved_[b]) || moves(b);
       if (!moved_.empty()) moved_[b] = now;
       distance_[b] = now ? 0 : far;
-    });
+    };
+    if (arrival && arrival->pending()) {
+      // Where all moves that is here already, so may the rest; else what is at rest depends on what arrives.
+      parallel_for(distance_.size(), [&](std::size_t b) {
+        if (!late_[b]) return look_at(b);
+        distance_[b] = 0;
+        if (!moved_.empty()) moved_[b] = 1;
+      });
+      if (quiet() == 0) return count();
+      arrival->finish();
+    }
+    parallel_for(distance_.size(), look_at);
     spread();
   }
   /// At the beginning of an evaluation that leaves nothing out.
@@ -54,11 +72,17 @@ class QuietBlocks {
   static constexpr std::uint8_t far = 255;
   void begin(int passes);
   void spread();
+  std::int64_t quiet() const noexcept { return std::count(distance_.begin(), distance_.end(), far); }
+  void count() noexcept {
+    counts_.blocks += static_cast<std::int64_t>(distance_.size());
+    counts_.quiet += quiet();
+  }
 
   BlockReach reach_;
-  std::vector<std::uint8_t> distance_, before_;   ///< in this evaluation and in the one before
-  std::vector<std::uint8_t> moved_;               ///< ever, where laws have a history; else empty
-  std::vector<std::uint8_t> reached_;             ///< by unit
+  std::vector<std::uint8_t> distance_, before_;  ///< in this evaluation and in the one before
+  std::vector<std::uint8_t> moved_;              ///< ever, where laws have a history; else empty
+  std::vector<std::uint8_t> late_;               ///< reads what comes from other ranks
+  std::vector<std::uint8_t> reached_;            ///< by unit
   int passes_ = 1, passes_before_ = 1;
   QuietCounts counts_;
 };

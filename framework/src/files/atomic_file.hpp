@@ -32,6 +32,7 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
   ~AtomicFile();
   int descriptor() const noexcept { return descriptor_.get(); }
+  const std::filesystem::path& temporary() const noexcept { return temporary_; }
   /// Nothing where the system's code is 0.
   void check(int code) const;
   void keep();

@@ -102,12 +102,24 @@ void NewFile::dataset(const std::string& path, std::span<const double> values, i
 }
 
 NewFile::Rows NewFile::rows(const std::string& path, std::size_t rows, int width, Numbers numbers) {
-  const hid_t type = numbers == Numbers::real ? H5T_IEEE_F64LE : H5T_STD_I64LE;
+  const hid_t type = numbers == Numbers::real ? H5T_IEEE_F64LE : numbers == Numbers::whole ? H5T_STD_I64LE : H5T_STD_U8LE;
   return {make_dataset(file_.get(), path, type, shape_of(rows, width)), path, width};
+}
+
+std::uint64_t NewFile::reserve(const std::string& path, std::size_t rows, int width) {
+  Rows all = this->rows(path, rows, width);
+  // HDF5 finds room for all when a row is written, and has written it when the dataset is closed.
+  all.append(std::vector<double>(static_cast<std::size_t>(width)));
+  const haddr_t place = H5Dget_offset(all.dataset_.get());
+  if (place == HADDR_UNDEF) throw RunError(fmt::format("HDF5 finds no room for {}", path));
+  return place;
 }
 
 void NewFile::Rows::append(std::span<const double> values) { append(values.data(), values.size(), H5T_NATIVE_DOUBLE); }
 void NewFile::Rows::append(std::span<const std::int64_t> values) { append(values.data(), values.size(), H5T_NATIVE_INT64); }
+void NewFile::Rows::append(std::span<const std::byte> values) {
+  append(values.data(), values.size(), H5T_NATIVE_UINT8);
+}
 
 void NewFile::Rows::append(const void* values, std::size_t size, hid_t memory_type) {
   const std::size_t count = size / static_cast<std::size_t>(width_);
@@ -176,11 +188,12 @@ StoredFile::StoredFile(const std::filesystem::path& file) : stored_(file), targe
   create();
 }
 
-void StoredFile::keep() {
+void StoredFile::keep(const std::function<int(int, std::uint64_t)>& last) {
   file_ = Handle();
   check();
   if (target_.size == 0) throw RunError("HDF5 cannot close " + std::string(new_file));
   stored_.check(::ftruncate(stored_.descriptor(), static_cast<off_t>(target_.size)) != 0 ? errno : 0);
+  if (last) stored_.check(last(stored_.descriptor(), target_.size));
   stored_.keep();
 }
 
@@ -239,12 +252,41 @@ std::vector<std::size_t> Source::shape(const std::string& path) const {
   return {extent, extent + rank};
 }
 
-Source::Array Source::read(const std::string& path) const {
-  Array array{shape(path), {}};
-  const Handle data = dataset(path);
+Handle Source::numbers(const std::string& path) const {
+  Handle data = dataset(path);
   const Handle type(H5Dget_type(data.get()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(path, "must hold numbers");
+  return data;
+}
+
+void Source::each_row(const std::string& path, std::span<const std::int64_t> numbers,
+                      const std::function<void(std::size_t, std::span<const double>)>& use) const {
+  constexpr std::int64_t piece = 1 << 17;  // rows
+  const std::vector<std::size_t> shape = this->shape(path);
+  const Handle data = this->numbers(path);
+  const std::size_t width = shape.size() > 1 ? shape[1] : 1;
+  if (!numbers.empty() && numbers.back() >= static_cast<std::int64_t>(shape[0]))
+    refuse(path, fmt::format("has {} rows, and one of number {} is wanted", shape[0], numbers.back()));
+  std::vector<double> rows;
+  for (std::size_t begin = 0, end = 0; begin < numbers.size(); begin = end) {
+    while (end < numbers.size() && numbers[end] < numbers[begin] + piece) ++end;
+    const hsize_t first[] = {static_cast<hsize_t>(numbers[begin]), 0},
+                  count[] = {static_cast<hsize_t>(numbers[end - 1] - numbers[begin] + 1), width};
+    rows.resize(count[0] * width);
+    const Handle file(H5Dget_space(data.get()), H5Sclose),
+        memory(H5Screate_simple(static_cast<int>(shape.size()), count, nullptr), H5Sclose);
+    if (H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, first, nullptr, count, nullptr) < 0 ||
+        H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), file.get(), H5P_DEFAULT, rows.data()) < 0)
+      refuse(path, "cannot be read");
+    for (std::size_t k = begin; k < end; ++k)
+      use(k, std::span(rows).subspan(static_cast<std::size_t>(numbers[k] - numbers[begin]) * width, width));
+  }
+}
+
+Source::Array Source::read(const std::string& path) const {
+  Array array{shape(path), {}};
+  const Handle data = numbers(path);
   array.data.resize(array.rows() * static_cast<std::size_t>(array.width()));
   if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
     refuse(path, "cannot be read");
@@ -252,11 +294,20 @@ Source::Array Source::read(const std::string& path) const {
 }
 
 std::vector<std::byte> Source::read_bytes(const std::string& path) const {
-  std::vector<std::byte> bytes(shape(path)[0]);
+  return read_bytes(path, 0, shape(path)[0]);
+}
+
+std::vector<std::byte> Source::read_bytes(const std::string& path, std::uint64_t first, std::size_t count) const {
+  std::vector<std::byte> bytes(count);
   const Handle data = dataset(path);
   const Handle type(H5Dget_type(data.get()), H5Tclose);
   if (H5Tequal(type.get(), H5T_STD_U8LE) <= 0 || shape(path).size() != 1) refuse(path, "must be a flat dataset of bytes");
-  if (H5Dread(data.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0) refuse(path, "cannot be read");
+  if (count == 0) return bytes;
+  const hsize_t begin = first, size = count;
+  const Handle file(H5Dget_space(data.get()), H5Sclose), memory(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, &begin, nullptr, &size, nullptr) < 0 ||
+      H5Dread(data.get(), H5T_NATIVE_UINT8, memory.get(), file.get(), H5P_DEFAULT, bytes.data()) < 0)
+    refuse(path, "cannot be read");
   return bytes;
 }
 

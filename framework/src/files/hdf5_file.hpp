@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,7 @@ class NewFile {
    public:
     void append(std::span<const double> values);
     void append(std::span<const std::int64_t> values);
+    void append(std::span<const std::byte> values);
 
    private:
     friend class NewFile;
@@ -54,8 +56,10 @@ class NewFile {
     int width_;
     std::size_t rows_ = 0;
   };
-  enum class Numbers { real, whole };
+  enum class Numbers { real, whole, bytes };
   Rows rows(const std::string& path, std::size_t rows, int width = 1, Numbers numbers = Numbers::real);
+  /// The same of 64-bit numbers, low byte first, which somebody else writes: they begin at this byte of the file.
+  std::uint64_t reserve(const std::string& path, std::size_t rows, int width);
   void group(const std::string& path);
   /// Attributes of the root group; text is stored as UTF-8 of variable length, which has no 64 kB limit.
   void attribute(const std::string& name, double value);
@@ -89,8 +93,11 @@ class StoredFile : public NewFile {
   explicit StoredFile(const std::filesystem::path& file);
   ~StoredFile() { file_ = Handle(); }  // before what it is written to
   void check() const { stored_.check(target_.error); }
-  /// All Rows must be gone, and nothing comes after it.
-  void keep();
+  /// Its name until it is kept.
+  const std::filesystem::path& temporary() const noexcept { return stored_.temporary(); }
+  /// All Rows must be gone, and nothing comes after it. last(descriptor, bytes of the file): what is done to it before it gets
+  /// its name, returns the system's error code.
+  void keep(const std::function<int(int descriptor, std::uint64_t size)>& last = {});
 
  private:
   AtomicFile stored_;
@@ -113,8 +120,12 @@ class Source {
   bool contains(const std::string& path) const;
   /// Any numeric dataset of one or two dimensions, converted to double.
   Array read(const std::string& path) const;
-  /// A flat dataset that was written from bytes.
+  /// use(k, row numbers[k] of it), for ascending numbers; a piece of it is in memory at a time.
+  void each_row(const std::string& path, std::span<const std::int64_t> numbers,
+                const std::function<void(std::size_t k, std::span<const double> row)>& use) const;
+  /// A flat dataset that was written from bytes; some of it.
   std::vector<std::byte> read_bytes(const std::string& path) const;
+  std::vector<std::byte> read_bytes(const std::string& path, std::uint64_t first, std::size_t count) const;
   std::vector<std::size_t> shape(const std::string& path) const;
   double real(const std::string& group, const std::string& attribute) const;
   std::int64_t integer(const std::string& group, const std::string& attribute) const;
@@ -123,6 +134,7 @@ class Source {
  private:
   [[noreturn]] void refuse(const std::string& what, const std::string& message) const;
   Handle dataset(const std::string& path) const;
+  Handle numbers(const std::string& path) const;
   Handle attribute(const std::string& group, const std::string& name) const;
 
   std::filesystem::path path_;

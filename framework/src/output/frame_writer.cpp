@@ -235,6 +235,23 @@ void FrameWriter::add(const std::string& name, int width, std::span<const double
   });
 }
 
+std::uint64_t FrameWriter::reserve(const std::string& name, int width) {
+  Implementation& self = *implementation_;
+  std::uint64_t first = 0;
+  self.with_frame([&](Implementation::Frame& frame) {
+    self.end_field();
+    frame.rows.reset();
+    frame.fields.push_back({name, width});
+    first = frame.file.reserve(name, self.points, width);
+    frame.file.check();
+  });
+  return first;
+}
+
+const std::filesystem::path& FrameWriter::file() const {
+  return implementation_->frame->file.temporary();
+}
+
 void FrameWriter::end() {
   Implementation& self = *implementation_;
   self.with_frame([&](Implementation::Frame& frame) {

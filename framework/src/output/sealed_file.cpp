@@ -1,6 +1,7 @@
 #include "output/sealed_file.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -21,11 +22,24 @@ std::string seal_of(const Fingerprint& fingerprint) { return fmt::format("\nperi
 
 }  // namespace
 
-void store_sealed(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+int seal(int descriptor, std::uint64_t size) {
   Fingerprint fingerprint;
-  fingerprint.add(bytes);
-  const std::string seal = seal_of(fingerprint);
-  store_atomically(file, bytes, std::as_bytes(std::span(seal)));
+  std::vector<std::byte> piece(std::size_t{1} << 20);
+  for (std::uint64_t at = 0; at < size;) {
+    // Whole pieces, in which the fingerprint is taken again.
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), size - at));
+    for (std::size_t got = 0; got < wanted;) {
+      const ssize_t count = ::pread(descriptor, piece.data() + got, wanted - got, static_cast<off_t>(at + got));
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) return count < 0 ? errno : EIO;
+      got += static_cast<std::size_t>(count);
+    }
+    fingerprint.add(std::span<const std::byte>(piece).first(wanted));
+    at += wanted;
+  }
+  const std::string text = seal_of(fingerprint);
+  if (::lseek(descriptor, static_cast<off_t>(size), SEEK_SET) < 0) return errno;
+  return write_all(descriptor, std::as_bytes(std::span(text)));
 }
 
 bool seal_holds(const std::filesystem::path& file) {

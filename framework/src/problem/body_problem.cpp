@@ -107,7 +107,13 @@ void BodyProblem::describe(EvaluationStatus& status) const {
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
-  EvaluationStatus status = terms().forces(seen(u, seen_), force, energy);
+  EvaluationStatus status;
+  if (meanwhile()) {
+    ghosts_->start(Seen::writable(u));
+    status = terms().forces(Seen(u, ghosts()), force, energy, &*ghosts_);
+  } else {
+    status = terms().forces(seen(u, seen_), force, energy);
+  }
   if (history) history->set_time_step(0);
   describe(status);
   energy_wanted_ = energy != nullptr;
@@ -295,19 +301,38 @@ std::uint64_t stride_of(ByteReader& in) {
 
 }  // namespace
 
-std::vector<std::byte> BodyProblem::snapshot() const {
-  ByteWriter out;
-  out.value(snapshot_format);
-  out.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
-  values_.constraints.write(out);
-  parts_.fracture.write(terms(), out);
-  HistoryRecord::of(terms()).write(out);
+void BodyProblem::write_snapshot(const std::function<void(std::uint64_t)>& begin,
+                                 const std::function<void(std::span<const std::byte>)>& next) const {
+  ByteWriter before_state;
+  before_state.value(snapshot_format);
+  before_state.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
+  values_.constraints.write(before_state);
+  parts_.fracture.write(terms(), before_state);
+  HistoryRecord::of(terms()).write(before_state);
+  const std::vector<std::byte> bytes = before_state.take();
+  const bool first = communicator().rank() == 0;
+  if (first) begin(bytes.size() + values_.state.written());
+  ByteWriter out([&](std::span<const std::byte> piece) {
+    if (first) next(piece);
+  });
+  out.bytes(bytes.data(), bytes.size());
   values_.state.write(out);
-  return out.take();
+  out.finish();
+}
+
+std::vector<std::byte> BodyProblem::snapshot() const {
+  std::vector<std::byte> all;
+  write_snapshot([&](std::uint64_t size) { all.reserve(size); },
+                 [&](std::span<const std::byte> piece) { all.insert(all.end(), piece.begin(), piece.end()); });
+  return all;
 }
 
 void BodyProblem::restore(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
+  restore(in);
+}
+
+void BodyProblem::restore(ByteReader& in) {
   if (stride_of(in) != body().stride_of_all_ranks()) throw InputError("the saved state belongs to another body");
   constraints().read(in);
   parts_.fracture.read(terms(), in);
@@ -325,8 +350,7 @@ struct BeforeState {
   std::vector<NamedChange> bonds;
   HistoryRecord history;
 
-  explicit BeforeState(std::span<const std::byte> snapshot) {
-    ByteReader in(snapshot);
+  explicit BeforeState(ByteReader& in) {
     stride = stride_of(in);
     in.value<double>();   // of the constraints
     FractureRecord::read_bonds(in, bonds);
@@ -336,12 +360,12 @@ struct BeforeState {
 
 }  // namespace
 
-BodyProblem::Carried BodyProblem::carried_by(std::span<const std::byte> snapshot) {
+BodyProblem::Carried BodyProblem::carried_by(ByteReader& snapshot) {
   const BeforeState before(snapshot);
   return {before.bonds.size(), before.history.values.size()};
 }
 
-void BodyProblem::carry(std::span<const std::byte> snapshot) {
+void BodyProblem::carry(ByteReader& snapshot) {
   const BeforeState before(snapshot);
   if (before.stride != body().stride_of_all_ranks()) throw InputError("the earlier run had another body");
   const SharedBonds shared(body());

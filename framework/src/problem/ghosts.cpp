@@ -1,5 +1,7 @@
 #include "perikit/problem/ghosts.hpp"
 
+#include <chrono>
+
 namespace perikit {
 
 Ghosts::Ghosts(const Partition& partition, int components) {
@@ -9,25 +11,35 @@ Ghosts::Ghosts(const Partition& partition, int components) {
     neighbour.to.resize(neighbour.lent.size() * static_cast<std::size_t>(components));
     neighbour.from.resize(neighbour.borrowed.size() * static_cast<std::size_t>(components));
   }
-  messages_.reserve(neighbours_.size());
+  std::vector<Message> messages;
+  for (Neighbour& neighbour : neighbours_) messages.push_back({neighbour.rank, neighbour.to, neighbour.from});
+  plan_ = communicator().plan_exchange(std::move(messages));
 }
 
-void Ghosts::forward(FieldView field) {
-  const auto components = static_cast<std::size_t>(field.components);
-  messages_.clear();
+void Ghosts::start(FieldView field) {
   for (Neighbour& neighbour : neighbours_) {
     double* to = neighbour.to.data();
     for (int c = 0; c < field.components; ++c)
       for (const std::int32_t p : neighbour.lent) *to++ = field.component(c)[p];
-    messages_.push_back({neighbour.rank,
-                         {neighbour.to.data(), components * neighbour.lent.size()},
-                         {neighbour.from.data(), components * neighbour.borrowed.size()}});
   }
-  communicator().exchange(messages_);
+  arriving_ = field;
+  plan_->start();
+  expect();
+}
+
+bool Ghosts::come(bool wait) {
+  if (!wait) return plan_->done(false);
+  const auto before = std::chrono::steady_clock::now();
+  plan_->done(true);
+  waited_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
+  return true;
+}
+
+void Ghosts::put() {
   for (const Neighbour& neighbour : neighbours_) {
     const double* from = neighbour.from.data();
-    for (int c = 0; c < field.components; ++c)
-      for (const std::int32_t p : neighbour.borrowed) field.component(c)[p] = *from++;
+    for (int c = 0; c < arriving_.components; ++c)
+      for (const std::int32_t p : neighbour.borrowed) arriving_.component(c)[p] = *from++;
   }
 }
 

@@ -1,5 +1,6 @@
 #include "problem/snapshot.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 
@@ -8,8 +9,16 @@
 namespace perikit {
 
 void ByteWriter::bytes(const void* data, std::size_t size) {
+  constexpr std::size_t piece = std::size_t{1} << 20;
   const auto* from = static_cast<const std::byte*>(data);
+  if (drain_ && bytes_.size() + size > piece) finish();
+  if (drain_ && size > piece) return drain_({from, size});
   bytes_.insert(bytes_.end(), from, from + size);
+}
+
+void ByteWriter::finish() {
+  drain_(bytes_);
+  bytes_.clear();
 }
 
 void ByteWriter::text(const std::string& text) {
@@ -23,13 +32,24 @@ void ByteWriter::numbers(std::span<const double> values) {
 }
 
 void ByteReader::bytes(void* to, std::size_t size) {
-  if (size > bytes_.size()) throw InputError("the saved state is too short");
-  if (size > 0) std::memcpy(to, bytes_.data(), size);  // an empty span may point nowhere
-  bytes_ = bytes_.subspan(size);
+  expect(size, 1);
+  for (auto* at = static_cast<std::byte*>(to); size > 0;) {
+    if (bytes_.empty()) {
+      piece_ = next_();
+      if (piece_.empty() || piece_.size() > later_) throw InputError("the saved state is too short");
+      later_ -= piece_.size();
+      bytes_ = piece_;
+    }
+    const std::size_t part = std::min(size, bytes_.size());
+    std::memcpy(at, bytes_.data(), part);
+    bytes_ = bytes_.subspan(part);
+    at += part;
+    size -= part;
+  }
 }
 
 void ByteReader::expect(std::uint64_t count, std::size_t size) const {
-  if (count > bytes_.size() / size) throw InputError("the saved state is too short");
+  if (count > (bytes_.size() + later_) / size) throw InputError("the saved state is too short");
 }
 
 std::string ByteReader::text() {

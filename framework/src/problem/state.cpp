@@ -1,9 +1,9 @@
 #include "perikit/problem/state.hpp"
 
 #include <algorithm>
-#include <iterator>
+#include <optional>
 
-#include "perikit/core/rank_values.hpp"
+#include "core/numbered_rows.hpp"
 #include "perikit/core/errors.hpp"
 #include "problem/snapshot.hpp"
 
@@ -34,24 +34,38 @@ std::size_t State::bytes() const noexcept {
 
 namespace {
 
-/// Points and images that no other rank has.
-std::vector<std::int32_t> own_points(const Body& body) {
-  std::vector<std::int32_t> own;
-  std::ranges::copy_if(body.internal(), std::back_inserter(own),
-                       [&](std::int32_t p) { return body.owns(static_cast<std::size_t>(p)); });
-  return own;
+/// Points and images of a part that no other rank has, in the order of the whole body.
+struct OwnPlaces {
+  explicit OwnPlaces(const Body& body) {
+    for (const std::int32_t p : body.internal())
+      if (body.owns(static_cast<std::size_t>(p))) points.push_back(p);
+    const auto place = body.places().place;
+    std::ranges::sort(points, {}, [&](std::int32_t p) { return place[static_cast<std::size_t>(p)]; });
+    for (const std::int32_t p : points) places.push_back(place[static_cast<std::size_t>(p)]);
+  }
+  std::vector<std::int32_t> points;
+  std::vector<std::int64_t> places;
+};
+
+/// visit(first, count) of the pieces of a component of the whole body.
+template <class Visit>
+void each_piece(std::size_t stride, Visit&& visit) {
+  for (std::size_t first = 0; first < stride; first += rows_of_piece) visit(first, std::min(rows_of_piece, stride - first));
 }
 
 }  // namespace
 
+std::uint64_t State::written() const noexcept {
+  constexpr std::uint64_t number = 8;
+  std::uint64_t size = sizeof time + sizeof step + sizeof energies + 2 * number;
+  for (const auto& [name, values] : numbers_) size += 2 * number + name.size() + values.size() * sizeof(double);
+  for (const auto& [name, field] : fields_)
+    size +=
+        2 * number + name.size() + static_cast<std::uint64_t>(field.components()) * body_->stride_of_all_ranks() * sizeof(double);
+  return size;
+}
+
 void State::write(ByteWriter& out) const {
-  const std::vector<std::int32_t> owned = own_points(*body_);
-  const auto places = body_->places().place;
-  std::vector<double> values, to;  // of owned points; where those of all ranks go
-  if (!places.empty()) {
-    for (const std::int32_t p : owned) values.push_back(static_cast<double>(places[static_cast<std::size_t>(p)]));
-    to = gathered<double>(values);
-  }
   out.value(time);
   out.value(step);
   out.value(energies);
@@ -60,27 +74,33 @@ void State::write(ByteWriter& out) const {
     out.text(name);
     out.numbers(values);
   }
+  std::optional<OwnPlaces> own;
+  if (body_->part()) own.emplace(*body_);
+  std::vector<double> values;
   out.value(static_cast<std::uint64_t>(fields_.size()));
   for (const auto& [name, field] : fields_) {
     out.text(name);
     out.value(static_cast<std::int64_t>(field.components()));
-    if (places.empty()) {
+    if (!own) {
       out.bytes(field.data(), field.size() * sizeof(double));
       continue;
     }
-    for (int c = 0; c < field.components(); ++c) {
-      for (std::size_t n = 0; n < owned.size(); ++n) values[n] = field.component(c)[owned[n]];
-      const std::vector<double> from = gathered<double>(values);
-      if (from.empty()) continue;
-      std::vector<double> all(body_->stride_of_all_ranks(), 0.0);
-      for (std::size_t n = 0; n < from.size(); ++n) all[static_cast<std::size_t>(to[n])] = from[n];
-      out.bytes(all.data(), all.size() * sizeof(double));
-    }
+    for (int c = 0; c < field.components(); ++c)
+      each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
+        const std::vector<double> piece = gather_piece(own->places, first, count, 1, [&](std::size_t from, std::size_t to) {
+          values.clear();
+          for (std::size_t n = from; n < to; ++n) values.push_back(field.component(c)[own->points[n]]);
+          return std::span<const double>(values);
+        });
+        out.bytes(piece.data(), piece.size() * sizeof(double));
+      });
   }
 }
 
 void State::read(ByteReader& in) {
-  const auto places = body_->places().place;
+  std::optional<OwnPlaces> own;
+  if (body_->part()) own.emplace(*body_);
+  std::vector<double> values;
   time = in.value<double>();
   step = in.value<std::int64_t>();
   energies = in.value<Energies>();
@@ -98,15 +118,18 @@ void State::read(ByteReader& in) {
     if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
     const FieldView field = declare(name, static_cast<int>(components));
     if (field.components != components) throw InputError("the saved state is damaged");
-    if (places.empty()) {
+    if (!own) {
       in.bytes(field.data, field.size() * sizeof(double));
       continue;
     }
-    std::vector<double> all(body_->stride_of_all_ranks());
     for (int c = 0; c < field.components; ++c) {
-      in.bytes(all.data(), all.size() * sizeof(double));
-      for (const std::int32_t p : own_points(*body_))
-        field.component(c)[p] = all[static_cast<std::size_t>(places[static_cast<std::size_t>(p)])];
+      std::size_t next = 0;
+      each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
+        values.resize(count);
+        in.bytes(values.data(), count * sizeof(double));
+        for (; next < own->points.size() && own->places[next] < static_cast<std::int64_t>(first + count); ++next)
+          field.component(c)[own->points[next]] = values[static_cast<std::size_t>(own->places[next]) - first];
+      });
     }
   }
 }

@@ -7,6 +7,8 @@
 #include <array>
 #include <cstring>
 #include <iterator>
+#include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -14,6 +16,7 @@
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "output/sealed_file.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "scene/scene_differences.hpp"
 
 namespace perikit {
@@ -66,28 +69,46 @@ std::string library_fingerprints(const Registry& registry) {
   return fmt::format("{}", fmt::join(lines, "\n"));
 }
 
-void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
-  hdf5::Image image;
-  image.attribute("perikit_version", checkpoint.perikit_version);
-  image.attribute("scene", checkpoint.scene);
-  image.attribute("body", checkpoint.body);
-  image.attribute("libraries", checkpoint.libraries);
-  image.attribute("step", checkpoint.step);
-  image.attribute("time", checkpoint.time);
-  image.attribute("frames", checkpoint.output.frames);
-  image.attribute("history_rows", checkpoint.output.history_rows);
-  image.attribute("history_every", checkpoint.output.history_every);
-  image.attribute("next_time", checkpoint.output.next_time);
-  image.attribute("steps_expected", checkpoint.output.steps_expected);
-  image.attribute("end_time", checkpoint.output.end_time);
-  image.attribute("initial_energy", checkpoint.output.energies.initial);
-  image.attribute("largest_energy", checkpoint.output.energies.largest);
-  image.attribute("energy_imbalance", checkpoint.output.energies.off);
-  image.attribute("frame_spacing", checkpoint.output.frame_spacing);
-  image.attribute("history_fingerprint", checkpoint.output.history_fingerprint);
-  image.dataset("frame_fingerprints", std::as_bytes(std::span(checkpoint.output.frame_fingerprints)));
-  image.dataset("state", checkpoint.state);
-  store_sealed(checkpoint_file(folder), image.bytes());
+struct NewCheckpoint::File {
+  explicit File(const fs::path& folder) : file(checkpoint_file(folder)) {}
+  hdf5::StoredFile file;
+  std::optional<hdf5::NewFile::Rows> state;
+};
+
+NewCheckpoint::NewCheckpoint(const fs::path& folder, const Checkpoint& checkpoint, std::uint64_t state_size)
+    : file_(std::make_unique<File>(folder)) {
+  hdf5::StoredFile& file = file_->file;
+  file.attribute("perikit_version", checkpoint.perikit_version);
+  file.attribute("scene", checkpoint.scene);
+  file.attribute("body", checkpoint.body);
+  file.attribute("libraries", checkpoint.libraries);
+  file.attribute("step", checkpoint.step);
+  file.attribute("time", checkpoint.time);
+  file.attribute("frames", checkpoint.output.frames);
+  file.attribute("history_rows", checkpoint.output.history_rows);
+  file.attribute("history_every", checkpoint.output.history_every);
+  file.attribute("next_time", checkpoint.output.next_time);
+  file.attribute("steps_expected", checkpoint.output.steps_expected);
+  file.attribute("end_time", checkpoint.output.end_time);
+  file.attribute("initial_energy", checkpoint.output.energies.initial);
+  file.attribute("largest_energy", checkpoint.output.energies.largest);
+  file.attribute("energy_imbalance", checkpoint.output.energies.off);
+  file.attribute("frame_spacing", checkpoint.output.frame_spacing);
+  file.attribute("history_fingerprint", checkpoint.output.history_fingerprint);
+  file.dataset("frame_fingerprints", std::as_bytes(std::span(checkpoint.output.frame_fingerprints)));
+  file_->state.emplace(file.rows("state", state_size, 1, hdf5::NewFile::Numbers::bytes));
+}
+
+NewCheckpoint::~NewCheckpoint() = default;
+
+void NewCheckpoint::add(std::span<const std::byte> state) {
+  file_->state->append(state);
+  file_->file.check();
+}
+
+void NewCheckpoint::keep() {
+  file_->state.reset();
+  file_->file.keep(seal);
 }
 
 Checkpoint read_checkpoint(const fs::path& folder) {
@@ -115,9 +136,29 @@ Checkpoint read_checkpoint(const fs::path& folder) {
   checkpoint.output.history_fingerprint = source.integer("/", "history_fingerprint");
   const std::vector<std::byte> frames = source.read_bytes("frame_fingerprints");
   checkpoint.output.frame_fingerprints.resize(frames.size() / sizeof(std::int64_t));
-  std::memcpy(checkpoint.output.frame_fingerprints.data(), frames.data(), checkpoint.output.frame_fingerprints.size() * sizeof(std::int64_t));
-  checkpoint.state = source.read_bytes("state");
+  std::memcpy(checkpoint.output.frame_fingerprints.data(), frames.data(),
+              checkpoint.output.frame_fingerprints.size() * sizeof(std::int64_t));
   return checkpoint;
+}
+
+ByteReader checkpoint_state(const fs::path& folder, bool shared) {
+  const bool reads = !shared || communicator().rank() == 0, tells = shared && communicator().size() > 1;
+  std::shared_ptr<const hdf5::Source> source;
+  std::vector<std::uint64_t> size(1);
+  if (reads) {
+    source = std::make_shared<hdf5::Source>(checkpoint_file(folder));
+    size[0] = source->shape("state")[0];
+  }
+  if (tells) size = told_to_all(size);
+  return {size[0], [source, tells, size = size[0], at = std::uint64_t{0}]() mutable {
+            constexpr std::uint64_t most = std::uint64_t{1} << 20;
+            const std::uint64_t count = std::min(most, size - at);
+            std::vector<std::byte> piece;
+            if (source) piece = source->read_bytes("state", at, count);
+            if (tells) communicator().broadcast(piece);
+            at += count;
+            return piece;
+          }};
 }
 
 bool check_same_scene(const std::string& before, const Scene& scene, const fs::path& folder, bool may_lengthen) {

@@ -38,6 +38,9 @@ std::string RunRecorder::closing(double set_up) const {
     text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
                         steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
   }
+  if (problem.ghosts())
+    text += fmt::format("exchange      {:.2f} s spent in waiting for other ranks, by the one that waited longest\n",
+                        communicator().largest(problem.ghosts()->waited()));
   const double arrays = communicator().largest(static_cast<double>(problem.bytes())), peak = communicator().largest(peak_bytes());
   text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most{}\n", arrays / 1e6, peak / 1e6,
                       communicator().size() > 1 ? ", on the rank with most" : "");

@@ -24,7 +24,7 @@ class EarlierRun {
       : scene_(scene),
         problem_(problem),
         folder_(results_folder(*scene.initial_from)),
-        frame_(read_last_frame(*scene.initial_from, problem.body().points_of_all_ranks())) {}
+        frame_(*scene.initial_from, problem.body().points_of_all_ranks()) {}
 
   std::string carry() {
     std::string taken;
@@ -43,14 +43,15 @@ class EarlierRun {
   std::optional<Checkpoint> checkpoint_of_frame() const {
     try {
       Checkpoint checkpoint = read_checkpoint(folder_);
-      if (checkpoint.step == frame_.step && checkpoint.time == frame_.time) return checkpoint;
+      if (checkpoint.step == frame_.step() && checkpoint.time == frame_.time()) return checkpoint;
     } catch (const InputError&) {  // none, or a damaged one
     }
     return std::nullopt;
   }
 
   std::string carry(const Checkpoint& checkpoint) {
-    const BodyProblem::Carried carried = BodyProblem::carried_by(checkpoint.state);
+    ByteReader state = checkpoint_state(folder_);
+    const BodyProblem::Carried carried = BodyProblem::carried_by(state);
     if (carried.bonds == 0 && carried.history == 0) return {};
     const std::string what = carried.bonds > 0 ? fmt::format("results of a run in which {} bonds had failed", carried.bonds)
                                                : "results of a run whose laws have a history";
@@ -68,7 +69,8 @@ class EarlierRun {
       refuse(what + fmt::format(", and of another body or family: {}", fmt::join(others, "; ")), "the same sections as there");
     if (!same_points()) refuse(what + ", and of other points", "the same points");
     try {
-      problem_.carry(checkpoint.state);
+      ByteReader again = checkpoint_state(folder_);
+      problem_.carry(again);
     } catch (const InputError& error) {
       refuse(fmt::format("{}: {}", what, error.what()), "a scene of the same body and laws");
     }
@@ -79,19 +81,19 @@ class EarlierRun {
   }
 
   bool same_points() const {
-    const std::vector<double> positions = hdf5::Source(folder_ / "reference.h5").read("position").data;
     const Body& body = problem_.body();
-    return std::ranges::all_of(body.owned(), [&](std::int32_t p) {
-      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
-      const Point x = body.position(static_cast<std::size_t>(p));
-      return std::equal(x.begin(), x.end(), &positions[3 * row]);
-    });
+    bool same = true;
+    hdf5::Source(folder_ / "reference.h5")
+        .each_row("position", body.numbers(body.owned()), [&](std::size_t k, std::span<const double> there) {
+          const Point x = body.position(static_cast<std::size_t>(body.owned()[k]));
+          same = same && std::ranges::equal(x, there);
+        });
+    return same;
   }
 
   /// No point may have lost more of its family there than it has here.
   void compare_damage() const {
-    const auto found = frame_.fields.find("damage");
-    if (found == frame_.fields.end()) {
+    if (!frame_.fields().contains("damage")) {
       const auto marked = read_marked(folder_ / "scene.toml");
       if (marked && marked->text.find("\n[damage]") != std::string::npos && !checkpoint_of_frame())
         refuse("results of a run with [damage], whose frames hold no damage, and without a checkpoint of its end",
@@ -100,22 +102,22 @@ class EarlierRun {
     }
     const Field damage = problem_.terms().damage();
     const Body& body = problem_.body();
-    for (const std::int32_t p : body.owned()) {
-      const auto row = static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)));
-      if (found->second.data[row] <= damage.data()[p] + 1e-9) continue;
+    frame_.each_row("damage", body.numbers(body.owned()), [&](std::size_t k, std::span<const double> there) {
+      const std::int32_t p = body.owned()[k];
+      if (there[0] <= damage.data()[p] + 1e-9) return;
       const Point x = body.position(static_cast<std::size_t>(p));
       refuse(fmt::format("results of a run in which bonds were cut or had failed that are whole in this scene, at the point "
                          "({:.6g}, {:.6g}, {:.6g}) for one",
                          x[0], x[1], x[2]),
              "every [[crack]] of that run; where bonds failed, results with a checkpoint of the end: [output] checkpoint_every "
              "keeps one");
-    }
+    });
   }
 
   const Scene& scene_;
   BodyProblem& problem_;
   fs::path folder_;
-  LoadedFrame frame_;
+  LastFrame frame_;
 };
 
 }  // namespace

@@ -15,6 +15,9 @@ namespace perikit {
 /// own points. All ranks must call it.
 void gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
                    const std::function<void(std::size_t first, std::span<const double> rows)>& use);
+/// The same where ranks take turns: use(...) on each rank, of the pieces that are its.
+void share_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
+                  const std::function<void(std::size_t first, std::span<const double> rows)>& use);
 /// The rows of the points first ... first + points - 1 in input order, on rank 0; nothing on the others. row(p, out): `width`
 /// numbers of the rank's own point p, internal index. All ranks must call it.
 std::vector<double> gather_rows(const Body& body, std::size_t first, std::size_t points, std::size_t width,
@@ -24,7 +27,8 @@ std::vector<double> gather_rows(const Body& body, std::size_t first, std::size_t
 std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine,
                                std::size_t width = 1);
 
-/// Points whose values are sent at a time.
-inline constexpr std::size_t points_of_piece = std::size_t{1} << 17;
+/// The frames of bodies of more points are written by all ranks together; those of others by rank 0. 2^24; for tests,
+/// PERIKIT_GATHERED_POINTS in the environment of all ranks says otherwise, and then pieces have no more points than that.
+std::size_t most_points_gathered();
 
 }  // namespace perikit

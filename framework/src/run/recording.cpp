@@ -7,14 +7,17 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <optional>
 #include <sstream>
 
 #include "core/fingerprint.hpp"
 #include "files/atomic_file.hpp"
+#include "files/shared_file.hpp"
 #include "output/history_file.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "perikit/run/simulation.hpp"
 #include "problem/snapshot.hpp"
 #include "run/checkpoint.hpp"
@@ -54,7 +57,6 @@ void share(Checkpoint& checkpoint) {
   each([&](auto& value) { out.value(value); });
   std::vector<std::byte> head = out.take();
   communicator().broadcast(head);
-  communicator().broadcast(checkpoint.state);
   ByteReader in(head);
   each([&](auto& value) { value = in.value<std::remove_reference_t<decltype(value)>>(); });
 }
@@ -101,8 +103,10 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   reference.use([&](const ReferenceData& data) {
     writer_ = std::make_unique<FrameWriter>(folder_, data, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   });
+  shares_frames_ = simulation.problem().partition() && simulation.problem().body().points_of_all_ranks() > most_points_gathered();
   if (!first_) return;
   history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
+  if (shares_frames_) log("frames        written by all ranks");
 }
 
 void RunRecorder::start_fresh(RunStart start) {
@@ -130,7 +134,8 @@ void RunRecorder::start_from_checkpoint() {
   share(checkpoint);
   lengthened = communicator().largest(lengthened ? 1 : 0) > 0;
   try {
-    simulation_.problem().restore(checkpoint.state);
+    ByteReader state = checkpoint_state(folder_, true);
+    simulation_.problem().restore(state);
   } catch (const InputError& error) {
     throw InputError({checkpoint_file(folder_).string()}, "state", error.what());
   }
@@ -280,37 +285,77 @@ void RunRecorder::working(std::string_view what) {
 
 void RunRecorder::keep_checkpoint(const StepReport& report) {
   ++checkpoints_written_;
-  std::vector<std::byte> state = simulation_.problem().snapshot();
-  if (!first_) return;
-  finish();
-  history_->sync();
-  for (std::int64_t k = std::ssize(done_.frame_fingerprints); k < done_.frames; ++k) done_.frame_fingerprints.push_back(file_fingerprint(frame_file(k)));
-  write_checkpoint(folder_, {PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time,
-                             std::move(state)});
+  if (first_) {
+    finish();
+    history_->sync();
+  }
+  for (std::int64_t k = std::ssize(done_.frame_fingerprints); first_ && k < done_.frames; ++k)
+    done_.frame_fingerprints.push_back(file_fingerprint(frame_file(k)));
+  std::optional<NewCheckpoint> checkpoint;
+  simulation_.problem().write_snapshot(
+      [&](std::uint64_t size) {
+        checkpoint.emplace(
+            folder_,
+            Checkpoint{PERIKIT_VERSION, simulation_.scene().resolved, body_, libraries_, done_, report.step, report.time}, size);
+      },
+      [&](std::span<const std::byte> piece) { checkpoint->add(piece); });
+  if (first_) checkpoint->keep();
 }
 
 void RunRecorder::finish() {
   if (writer_) writer_->finish();
 }
 
+std::unique_ptr<SharedFile> RunRecorder::shared_frame() {
+  if (!shares_frames_) return nullptr;
+  std::vector<char> name;
+  if (first_) name.assign(writer_->file().native().begin(), writer_->file().native().end());
+  name = told_to_all(name);
+  auto file = std::make_unique<SharedFile>(std::string(name.begin(), name.end()));
+  const std::string refusal = first_message(file->refusal());
+  if (refusal.empty()) return file;
+  log("frames        written by rank 0 alone, as " + refusal);
+  shares_frames_ = false;
+  return nullptr;
+}
+
 void RunRecorder::write_frame(const StepReport& report) {
   if (first_) writer_->begin(report.time, report.step);
+  const std::unique_ptr<SharedFile> shared = shared_frame();
   fields_.expect(frame_fields_);
   for (const std::string& name : frame_fields_) {
     const OutputField& mine = fields_.get(name);
     const auto width = static_cast<std::size_t>(mine.width);
-    gather_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
-      writer_->add(name, mine.width, rows);
-      const auto strange = std::ranges::find_if(rows, [](double value) { return !std::isfinite(value); });
-      if (strange == rows.end() || !strange_fields_.insert(name).second) return;
-      log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name,
-                      first + static_cast<std::size_t>(strange - rows.begin()) / width,
+    constexpr double none = 1e300;
+    double strange = none;  // the first point that is not finite
+    const auto look = [&](std::size_t first, std::span<const double> rows) {
+      const auto found = std::ranges::find_if(rows, [](double value) { return !std::isfinite(value); });
+      if (found != rows.end())
+        strange = std::min(strange, static_cast<double>(first + static_cast<std::size_t>(found - rows.begin()) / width));
+    };
+    if (shared) {
+      const std::uint64_t begin =
+          told_to_all(first_ ? std::vector{writer_->reserve(name, mine.width)} : std::vector<std::uint64_t>()).front();
+      share_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
+        shared->write(begin + first * width * sizeof(double), rows);
+        look(first, rows);
+      });
+      strange = -communicator().largest(-strange);
+    } else {
+      gather_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
+        writer_->add(name, mine.width, rows);
+        look(first, rows);
+      });
+    }
+    if (strange < none && strange_fields_.insert(name).second)
+      log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, strange,
                       name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
-    });
     fields_.forget(name);
   }
   fields_.renew();
   ++frames_written_;
+  if (shared)
+    if (const std::string error = first_message(shared->close()); !error.empty()) throw RunError(error);
   if (first_) writer_->end();
 }
 

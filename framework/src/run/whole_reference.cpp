@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/numbered_rows.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "run/gathering.hpp"
 
@@ -10,7 +11,7 @@ namespace perikit {
 namespace {
 
 constexpr std::size_t width = 5;  // of a point: place, volume, material
-constexpr auto piece_size = static_cast<std::int64_t>(points_of_piece);
+constexpr auto piece_size = static_cast<std::int64_t>(rows_of_piece);
 
 ReferenceData of_one_rank(const Body& body) {
   ReferenceData data;
@@ -59,13 +60,13 @@ ReferenceData WholeReference::of_all() {
   ReferenceData data;
   data.points = body.points_of_all_ranks();
   data.point = [this](std::size_t p) -> ReferenceData::Point {
-    const auto wanted = static_cast<std::int64_t>(p / points_of_piece);
+    const auto wanted = static_cast<std::int64_t>(p / rows_of_piece);
     if (wanted != piece_number_) {
       ask({0, wanted});
       piece_ = points(wanted);
       piece_number_ = wanted;
     }
-    const double* row = &piece_[p % points_of_piece * width];
+    const double* row = &piece_[p % rows_of_piece * width];
     return {{row[0], row[1], row[2]}, row[3], static_cast<std::int64_t>(row[4])};
   };
   for (std::size_t s = 0; s < sets_.size(); ++s) {
@@ -85,8 +86,8 @@ ReferenceData WholeReference::of_all() {
 
 std::vector<double> WholeReference::points(std::int64_t piece) {
   const Body& body = problem_.body();
-  const std::size_t first = static_cast<std::size_t>(piece) * points_of_piece;
-  return gather_rows(body, first, std::min(points_of_piece, body.points_of_all_ranks() - first), width,
+  const std::size_t first = static_cast<std::size_t>(piece) * rows_of_piece;
+  return gather_rows(body, first, std::min(rows_of_piece, body.points_of_all_ranks() - first), width,
                      [&](std::size_t p, double* row) {
                        const Point x = body.position(p);
                        std::copy(x.begin(), x.end(), row);

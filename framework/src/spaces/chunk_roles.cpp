@@ -1,6 +1,8 @@
 #include "spaces/chunk_roles.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <map>
 
 #include "perikit/core/parallel.hpp"
 
@@ -19,8 +21,8 @@ void over_bonds(const LatticeFamilies& families, const LatticeChunk& chunk, Visi
     }
 }
 
-/// By point: 1 where its force is to be complete or it lies within a horizon of such a point, whether a bond leads there or not: the
-/// divergence sends along bonds that are cut, too, and takes back what it sent.
+}  // namespace
+
 std::vector<std::uint8_t> felt_here(const LatticeFamilies& families) {
   const Body& body = families.body();
   std::vector<std::uint8_t> felt(body.stride(), 0);
@@ -32,9 +34,55 @@ std::vector<std::uint8_t> felt_here(const LatticeFamilies& families) {
   return felt;
 }
 
-}  // namespace
+std::vector<std::uint8_t> felt_rows(const LatticeFamilies& families, const std::vector<std::uint8_t>& felt) {
+  std::vector<std::uint8_t> rows;
+  for (const LatticeRow& row : families.tiles.rows) {
+    const auto first = felt.begin() + row.first;
+    rows.push_back(std::any_of(first, first + row.chunks * chunk_points, [](std::uint8_t here) { return here != 0; }));
+  }
+  return rows;
+}
 
-ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws) {
+std::vector<SlotBatch> slot_batches(const std::vector<bool>& wanted, std::size_t at_once) {
+  constexpr std::size_t least_gap = 3;
+  std::vector<SlotBatch> all;
+  for (std::size_t slot = 0; slot < wanted.size(); ++slot) {
+    if (!wanted[slot]) continue;
+    const bool joins = !all.empty() && slot / at_once == all.back().first / at_once &&
+                       slot < all.back().first + static_cast<std::size_t>(all.back().count) + least_gap;
+    if (!joins) all.push_back({slot, 0});
+    all.back().count = static_cast<int>(slot - all.back().first) + 1;
+  }
+  return all;
+}
+
+PointRoles::PointRoles(const LatticeFamilies& families, const Laws& laws) {
+  if (laws.single()) return;
+  for (const LatticeChunk& chunk : families.tiles.chunks) {
+    const unsigned live = families.live_bits(chunk.first);
+    const auto first = static_cast<std::size_t>(chunk.first + std::countr_zero(live));
+    bool one = !laws.record_of(first).silent;
+    for (unsigned lanes = live; lanes != 0; lanes &= lanes - 1)
+      one = one && laws.same(first, static_cast<std::size_t>(chunk.first + std::countr_zero(lanes)));
+    law.push_back(one ? static_cast<std::int32_t>(&laws.record_of(first) - laws.records().data()) : ChunkRole::mixed);
+  }
+  if (!laws.any_far()) return;
+  rows = felt_rows(families, felt_here(families));
+  const LatticeTiles& tiles = families.tiles;
+  for (const LatticeBlock& block : tiles.blocks) {
+    bool owned = false;
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c)
+      for (int l = 0; l < chunk_points; ++l)
+        owned = owned || (families.live_bits(tiles.chunks[c].first) >> l & 1 &&
+                          families.body().owns(static_cast<std::size_t>(tiles.chunks[c].first + l)));
+    if (owned)
+      std::fill(rows.begin() + static_cast<std::ptrdiff_t>(block.row_begin),
+                rows.begin() + static_cast<std::ptrdiff_t>(block.row_end), std::uint8_t{1});
+  }
+}
+
+ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws, std::size_t count, std::size_t at_once)
+    : slots{slot_batches(std::vector<bool>(count, true), at_once)} {
   if (laws.single()) return;
   const auto& chunks = families.tiles.chunks;
   const bool ghosts = laws.any_far();
@@ -72,11 +120,22 @@ ChunkRoles::ChunkRoles(const LatticeFamilies& families, const Laws& laws) {
       role.stress = role.stress || felt[p];
     }
   });
-  rows.assign(families.tiles.rows.size(), ghosts ? 0 : 1);
-  for (std::size_t r = 0; r < rows.size() && ghosts; ++r) {
-    const LatticeRow& row = families.tiles.rows[r];
-    for (std::int32_t p = row.first; p < row.first + row.chunks * chunk_points; ++p) rows[r] |= felt[static_cast<std::size_t>(p)];
+  // What points feel on which nobody feels the stress is not asked for: bonds are left that lead from there to others.
+  std::map<std::vector<bool>, std::int32_t> known;
+  for (std::size_t c = 0; c < chunk.size() && ghosts; ++c) {
+    if (chunk[c].stress || !chunk[c].bonds) continue;
+    const LatticePattern& pattern = families.pattern(chunks[c]);
+    std::vector<bool> wanted(count, false);
+    for (std::size_t slot = 0; slot < count; ++slot)
+      for (unsigned lanes = pattern.mask[slot]; lanes != 0 && !wanted[slot]; lanes &= lanes - 1) {
+        const auto p = static_cast<std::size_t>(chunks[c].first + std::countr_zero(lanes));
+        wanted[slot] = !stores_nothing(p, p + static_cast<std::size_t>(families.slots.shifts[slot]));
+      }
+    const auto [at, fresh] = known.try_emplace(std::move(wanted), static_cast<std::int32_t>(slots.size()));
+    if (fresh) slots.push_back(slot_batches(at->first, at_once));
+    chunk[c].slots = at->second;
   }
+  rows = ghosts ? felt_rows(families, felt) : std::vector<std::uint8_t>(families.tiles.rows.size(), 1);
 }
 
 }  // namespace perikit

@@ -24,6 +24,8 @@ class EvaluationSpace {
   virtual ~EvaluationSpace() = default;
   /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone.
   virtual void run(Pass& pass) = 0;
+  /// Whether a run may begin while displacements of points of other ranks are on their way.
+  virtual bool overlaps() const noexcept { return false; }
   /// Marks the groups whose energies a run sums up together with those of marked ones (Pass::energies).
   virtual void complete(GroupMarks&) const {}
   /// The numbers of evaluation points lie below this.

@@ -30,9 +30,10 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       far_share_(formulation_.far_share),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
-      roles_(families_, laws_),
-      operator_(families_),
-      slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once) {
+      slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once),
+      roles_(families_, laws_, slots_each(), static_cast<std::size_t>(slots_at_once_)),
+      every_slot_(slot_batches(std::vector<bool>(families_.slots.size(), true), static_cast<std::size_t>(slots_at_once_))),
+      operator_(families_) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
   const Body& body = families_.body();
   if (formulation_.order > 1) stencils_.emplace(families_, formulation_.order);
@@ -234,15 +235,15 @@ template <int D>
 void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   const LatticeBlock& block = tiles_.blocks[b];
   BatchScratch& s = scratch_.mine();
-  const std::size_t slots = (pairs_ && !pass.alone()) || samples_pairs(pass) ? families_.slots.half : families_.slots.size();
+  const bool all = pass.alone();
+  const std::vector<SlotBatch>& of_all = samples_pairs(pass) ? roles_.slots.front() : every_slot_;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
     if (!pass.wanted(chunk.first) || !roles_.wants(c, &ChunkRole::bonds)) continue;
     GroupEnergy energy;
     s.one_law = roles_.chunk.empty() || pass.work.laminates_near(chunk.first) ? ChunkRole::mixed : roles_.chunk[c].law;
-    for (std::size_t slot = 0; slot < slots; slot += static_cast<std::size_t>(slots_at_once_)) {
-      const int n = static_cast<int>(std::min(static_cast<std::size_t>(slots_at_once_), slots - slot));
-      const int bad = bonds_of_chunk(c, slot, n, s, pass, &energy);
+    for (const auto& [slot, count] : all ? of_all : roles_.slots_of(c)) {
+      const int bad = bonds_of_chunk(c, slot, count, s, pass, &energy);
       if (bad >= 0) return pass.report(chunk.first + bad % chunk_points);
     }
     if (pass.energies) pass.energies[chunk.first / chunk_points] = energy;
@@ -309,16 +310,19 @@ void LatticeBonds<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(last, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+    quiet_.look(
+        last, [&](std::size_t b) { return tiles_.moves(b, pass.u); }, pass.arrival);
   // Each pass reads what the one before it left at one family's reach.
   const auto awake = [&](auto&& block) {
     return [&](std::size_t b) {
       if (quiet_.awake(b, 2) && here(b, pass)) block(b);
     };
   };
-  parallel_for(blocks(), [&](std::size_t b) {
-    if (quiet_.begins(b) && here(b, pass)) gradients(b, pass);
-  });
+  tiles_.sequence.for_each(
+      [&](std::size_t b) {
+        if (quiet_.begins(b) && here(b, pass)) gradients(b, pass);
+      },
+      pass.arrival);
   if (samples_pairs(pass)) return tiles_.colouring.for_each([&](std::size_t b) { bonds(b, pass); });
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
   tiles_.colouring.for_each(awake([&](std::size_t b) { bonds(b, pass); }));

@@ -20,6 +20,7 @@ class LatticeBonds final : public EvaluationSpace {
   explicit LatticeBonds(const SpaceParts& parts);
 
   void run(Pass& pass) override;
+  bool overlaps() const noexcept override { return true; }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   PointFlux point_flux() const noexcept override { return last_ == Last::other || stencils_ ? PointFlux() : PointFlux{gradient_, flux_, last_ == Last::all_forces}; }
@@ -54,17 +55,18 @@ class LatticeBonds final : public EvaluationSpace {
   const Laws& laws_;
   bool selective_;
   double far_share_;
-  bool pairs_;                                  ///< each bond evaluated once for both ends
-  bool two_states_;                             ///< and yet with a history of its own for each
+  bool pairs_;         ///< each bond evaluated once for both ends
+  bool two_states_;    ///< and yet with a history of its own for each
+  int slots_at_once_;  ///< of a bond batch
   ChunkRoles roles_;
-  LatticeOperator<D> operator_;                 ///< order 1
-  std::optional<LatticeStencils<D>> stencils_;  ///< higher orders
-  Field flux_;                                  ///< the stress on Hbar, then Q
-  enum class Last { all_forces, some_forces, other } last_ = Last::other;   ///< run
-  Field gradient_, direction_;                  ///< Hbar of u and of w
-  Field scale_;                                 ///< V_i / N_i of bond weights
-  Field volume_, pressure_;                     ///< selective: volume changes of points; pressures (and their rates) on them
-  int slots_at_once_;                           ///< of a bond batch
+  std::vector<SlotBatch> every_slot_;                                      ///< of both ends
+  LatticeOperator<D> operator_;                                            ///< order 1
+  std::optional<LatticeStencils<D>> stencils_;                             ///< higher orders
+  Field flux_;                                                             ///< the stress on Hbar, then Q
+  enum class Last { all_forces, some_forces, other } last_ = Last::other;  ///< run
+  Field gradient_, direction_;                                             ///< Hbar of u and of w
+  Field scale_;                                                            ///< V_i / N_i of bond weights
+  Field volume_, pressure_;  ///< selective: volume changes of points; pressures (and their rates) on them
   std::vector<double> slot_xi_[3], slot_g_[3], slot_weight_;
   std::vector<AlignedVector<double>> pattern_g_;   ///< corrections by pattern of the set-up: [slot group][component][lane]; empty: computed
   AlignedVector<double> lane_xi_;                  ///< bond vectors, likewise

@@ -64,8 +64,8 @@ class LatticeOperator {
       }
   }
 
-  /// f += div Q for the target rows that the sources in `row` reach. Q of the cell row.first is at `from`; sources are read along the row,
-  /// as far as a family reaches beyond its ends.
+  /// f += div Q for the target rows that the sources in `row` reach, where forces are to be complete. Q of the cell row.first is
+  /// at `from`; sources are read along the row, as far as a family reaches beyond its ends.
   void divergence(const LatticeRow& row, ConstFieldView Q, std::int64_t from, FieldView f) const noexcept {
     for (std::int64_t k = 0; k < std::int64_t(row.chunks) * chunk_points; k += pack_width) scatter<false>(row, row.first + k, Q, from + k, {}, f);
   }
@@ -260,6 +260,8 @@ class LatticeOperator {
       int current = -1;
       Pack a[D], b[D], g[D], near[D];
       for (const RowPair& pair : f_.slots.row_pairs) {
+        const bool below = wanted(row.k1 - pair.d1, row.k2 - pair.d2), above = wanted(row.k1 + pair.d1, row.k2 + pair.d2);
+        if (!below && !above) continue;
         if (pair.profile != current) {
           current = pair.profile;
           const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(current)];
@@ -280,7 +282,6 @@ class LatticeOperator {
             }
           }
         }
-        const bool below = inside(row.k1 - pair.d1, row.k2 - pair.d2), above = inside(row.k1 + pair.d1, row.k2 + pair.d2);
         for (int c = 0; c < D; ++c) {
           Pack across = Pack(pair.d1) * b[c];
           if constexpr (D > 2) across += Pack(pair.d2) * g[c];
@@ -324,14 +325,20 @@ class LatticeOperator {
         if (pair.profile != current) sums(current = pair.profile, c, s);
         Pack across = D > 1 ? Pack(pair.d1) * s[1] : Pack(0.0);
         if (D > 2) across += Pack(pair.d2) * s[2];
-        if (inside(row.k1 - pair.d1, row.k2 - pair.d2)) (Pack::load(target - pair.shift) + (s[0] + across)).store(target - pair.shift);
-        if (inside(row.k1 + pair.d1, row.k2 + pair.d2)) (Pack::load(target + pair.shift) + (s[0] - across)).store(target + pair.shift);
+        if (wanted(row.k1 - pair.d1, row.k2 - pair.d2))
+          (Pack::load(target - pair.shift) + (s[0] + across)).store(target - pair.shift);
+        if (wanted(row.k1 + pair.d1, row.k2 + pair.d2))
+          (Pack::load(target + pair.shift) + (s[0] - across)).store(target + pair.shift);
       }
     }
   }
 
-  bool inside(std::int64_t k1, std::int64_t k2) const noexcept {
-    return k1 >= 0 && k1 < f_.grid.extent[1] && k2 >= 0 && k2 < f_.grid.extent[2];
+  /// Whether the row is there, and somebody asks for the forces on it.
+  bool wanted(std::int64_t k1, std::int64_t k2) const noexcept {
+    const std::int64_t rows = f_.grid.extent[1];
+    const auto& complete = f_.tiles.complete_rows;
+    return k1 >= 0 && k1 < rows && k2 >= 0 && k2 < f_.grid.extent[2] &&
+           (complete.empty() || complete[static_cast<std::size_t>(k1 + k2 * rows)]);
   }
 
   const LatticeFamilies& f_;

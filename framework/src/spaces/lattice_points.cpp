@@ -17,7 +17,11 @@ std::size_t rows_at_once(const LatticeRow& row) noexcept { return static_cast<st
 
 template <int D>
 LatticePoints<D>::LatticePoints(const SpaceParts& parts)
-    : families_(*parts.families.lattice()), tiles_(families_.tiles), laws_(parts.laws), operator_(families_) {
+    : families_(*parts.families.lattice()),
+      tiles_(families_.tiles),
+      laws_(parts.laws),
+      roles_(families_, laws_),
+      operator_(families_) {
   quiet_ = parts.quiet_blocks(tiles_.reach);
   gap_ = static_cast<std::int64_t>(padded(static_cast<std::size_t>(families_.slots.row_reach)));
   for (const LatticeRow& row : tiles_.rows) most_ = std::max(most_, static_cast<std::int64_t>(rows_at_once(row)) * width(row));
@@ -26,10 +30,13 @@ LatticePoints<D>::LatticePoints(const SpaceParts& parts)
 /// The law of n chunks, whose gradients are in the lanes of s. Whether all of them are admissible.
 template <int D>
 bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, GroupEnergy* energy) const {
+  s.one_law = roles_.law_of(index[0]);
+  for (int i = 0; i < n; ++i)
+    if (roles_.law_of(index[i]) != s.one_law || pass.work.laminates_near(chunk(index[i]).first)) s.one_law = ChunkRole::mixed;
   for (int i = 0; i < n; ++i) {
     const int lane = i * chunk_points;
     std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
-    if (!laws_.single() || pass.alone()) {
+    if ((!laws_.single() && s.one_law < 0) || pass.alone()) {
       for (int l = 0; l < chunk_points; ++l) {
         s.owner[lane + l] = chunk(index[i]).first + l;
         s.far[lane + l] = -1;
@@ -80,8 +87,33 @@ std::int64_t LatticePoints<D>::width(const LatticeRow& row) const noexcept {
   return std::int64_t(row.chunks) * chunk_points + 2 * gap_;
 }
 
-/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows, and then the
-/// one after their last.
+/// Whether a chunk of a row, or one beyond its ends that it reads, is wanted; true of rows without points.
+template <int D>
+bool LatticePoints<D>::wanted(const LatticeRow& row, const Pass& pass) const noexcept {
+  if (!pass.only) return true;
+  bool any = false;
+  for (std::int32_t k = -row.before; k < row.chunks + row.after; ++k) {
+    const std::int32_t index = tiles_.chunk_of(row.first + k * chunk_points);
+    if (index < 0) continue;
+    if (pass.wanted(chunk(index).first)) return true;
+    any = true;
+  }
+  return !any;
+}
+
+/// Rows from `first` on that are taken together, and `first` is what comes after them. Those that nobody feels or wants are left
+/// out one by one: what is evaluated may not depend on how many rows of a block a rank has.
+template <int D>
+std::span<const LatticeRow> LatticePoints<D>::rows_from(std::size_t& first, std::size_t end, const Pass& pass) const {
+  const auto taken = [&](std::size_t r) { return roles_.wants_row(r) && wanted(tiles_.rows[r], pass); };
+  while (first < end && !taken(first)) ++first;
+  const std::size_t begin = first, last = first < end ? std::min(end, first + rows_at_once(tiles_.rows[first])) : end;
+  while (first < last && taken(first)) ++first;
+  return std::span(tiles_.rows).subspan(begin, first - begin);
+}
+
+/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows,
+/// and then the one after their last.
 template <int D>
 void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
   const auto zero = [&](std::int64_t from, std::int64_t to) {
@@ -91,6 +123,7 @@ void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next
   r.at.clear();
   std::int64_t start = gap_;
   for (const LatticeRow& row : rows) {
+    while (next < end && tiles_.chunks[next].first < row.first) ++next;  // of rows that were left out
     std::int64_t filled = start - gap_;
     for (; next < end && row.holds(tiles_.chunks[next].first); ++next) {
       const std::int64_t to = start + tiles_.chunks[next].first - row.first;
@@ -135,10 +168,8 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
   GroupEnergy energy, of_others;
   std::size_t next = block.chunk_begin;
   for (std::size_t first = block.row_begin; first < block.row_end;) {
-    const std::span rows = std::span(tiles_.rows).subspan(first, std::min(block.row_end - first, rows_at_once(tiles_.rows[first])));
+    const std::span<const LatticeRow> rows = rows_from(first, block.row_end, pass);
     place(rows, next, block.chunk_end, r);
-    first += rows.size();
-    if (std::none_of(r.index.begin(), r.index.end(), [&](std::int32_t c) { return pass.wanted(chunk(c).first); })) continue;
     for (std::size_t i = 0; i < r.index.size();) {
       const bool own = i < r.own;
       const int n = static_cast<int>(std::min<std::size_t>(chunks_at_once, (own ? r.own : r.index.size()) - i));
@@ -170,14 +201,17 @@ void LatticePoints<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(2, [&](std::size_t b) { return tiles_.moves(b, pass.u); });
+    quiet_.look(
+        2, [&](std::size_t b) { return tiles_.moves(b, pass.u); }, pass.arrival);
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { one_by_one(b, pass); });
   rows_.resize(static_cast<std::size_t>(thread_count()));
   for (Rows& r : rows_)
     if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
-  tiles_.colouring.for_each([&](std::size_t b) {
-    if (quiet_.awake(b, 1)) by_rows(b, pass);
-  });
+  tiles_.colouring.for_each(
+      [&](std::size_t b) {
+        if (quiet_.awake(b, 1)) by_rows(b, pass);
+      },
+      pass.arrival);
   tiles_.clear_dead(pass.out);
 }
 

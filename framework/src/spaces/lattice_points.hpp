@@ -2,8 +2,9 @@
 #include <vector>
 
 #include "families/lattice_families.hpp"
-#include "spaces/lattice_gradient.hpp"
+#include "spaces/chunk_roles.hpp"
 #include "spaces/evaluation_space.hpp"
+#include "spaces/lattice_gradient.hpp"
 
 namespace perikit {
 
@@ -15,6 +16,7 @@ class LatticePoints final : public EvaluationSpace {
   explicit LatticePoints(const SpaceParts& parts);
 
   void run(Pass& pass) override;
+  bool overlaps() const noexcept override { return true; }
   void complete(GroupMarks& marks) const override { tiles_.complete(marks); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
   void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed
@@ -32,6 +34,8 @@ class LatticePoints final : public EvaluationSpace {
   void one_by_one(std::size_t b, Pass& pass);
   void by_rows(std::size_t b, Pass& pass);
   bool evaluate(const std::int32_t* index, int n, BatchScratch& s, Pass& pass, GroupEnergy* energy) const;
+  bool wanted(const LatticeRow& row, const Pass& pass) const noexcept;
+  std::span<const LatticeRow> rows_from(std::size_t& first, std::size_t end, const Pass& pass) const;
   void place(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, Rows& r) const;
   void gradients(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept;
   std::int64_t width(const LatticeRow& row) const noexcept;
@@ -40,6 +44,7 @@ class LatticePoints final : public EvaluationSpace {
   const LatticeFamilies& families_;
   const LatticeTiles& tiles_;
   const Laws& laws_;
+  PointRoles roles_;
   LatticeOperator<D> operator_;
   std::vector<Rows> rows_;             ///< by thread
   std::int64_t gap_ = 0, most_ = 0;    ///< cells between rows there; of all rows at once

@@ -1,13 +1,15 @@
 /// Pair laws on a lattice: packs of contiguous points against their neighbours at one offset, offsets +d only (the force at
 /// the far end is the opposite one), slot by slot, with nothing stored by bond.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
-#include <array>
 #include <numeric>
 #include <vector>
 
 #include "families/lattice_families.hpp"
+#include "spaces/chunk_roles.hpp"
 #include "terms/energy_shares.hpp"
 #include "terms/pair_loop.hpp"
 
@@ -36,6 +38,7 @@ class LatticePairs final : public PairLoop {
     families_.load(all, family);
     energy_shares(parts.formulation, D, family, share);
     for (std::size_t s = 0; s < all.size(); ++s) inverse_share_.push_back(share[s] > 0 ? 1 / share[s] : 0.0);
+    find_needed();
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
   }
@@ -55,8 +58,10 @@ class LatticePairs final : public PairLoop {
   template <PairWork work>
   void run_block(std::size_t b, const PairPass& pass) {
     const LatticeBlock& block = families_.tiles.blocks[b];
+    constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
     for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
       const LatticeChunk& chunk = families_.tiles.chunks[c];
+      if (!needed_[sums].empty() && !needed_[sums][c]) continue;
       if (pass.only) {
         if (!pass.only[chunk.first / chunk_points]) continue;
         for (int k = 0; k < pass.out.components && !pass.local; ++k) std::memset(pass.out.component(k) + chunk.first, 0, sizeof(double) * chunk_points);
@@ -65,6 +70,26 @@ class LatticePairs final : public PairLoop {
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane >= 0) return report_bad(chunk.first + lane);
       if (pass.energies) pass.energies[chunk.first / chunk_points] += energy;
+    }
+  }
+
+  /// Chunks whose bonds, each counted at one end, lead to points whose forces are to be complete here, or whose dilatations these
+  /// ask for.
+  void find_needed() {
+    if (!families_.body().part()) return;
+    std::vector<std::uint8_t> wanted(families_.body().stride(), 0);
+    for (const std::int32_t p : families_.body().complete()) wanted[static_cast<std::size_t>(p)] = 1;
+    for (std::vector<std::uint8_t>& needed : needed_) {
+      for (const LatticeChunk& chunk : families_.tiles.chunks) {
+        const auto any = [&](std::int64_t first) {
+          return std::any_of(wanted.begin() + first, wanted.begin() + first + chunk_points,
+                             [](std::uint8_t here) { return here != 0; });
+        };
+        const auto half = families_.slots.shifts.begin() + static_cast<std::ptrdiff_t>(families_.slots.half);
+        needed.push_back(any(chunk.first) || std::any_of(families_.slots.shifts.begin(), half,
+                                                         [&](std::int64_t shift) { return any(chunk.first + shift); }));
+      }
+      wanted = felt_here(families_);
     }
   }
 
@@ -81,6 +106,7 @@ class LatticePairs final : public PairLoop {
   bool dilatation_;
   const LatticeFamilies& families_;
   double squared_volume_;
+  std::vector<std::uint8_t> needed_[2];   ///< by chunk, for forces and for dilatations; empty: all are
   AlignedVector<double> length_, omega_;  ///< by slot, one value a lane
   std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };

@@ -1,5 +1,9 @@
+#include <algorithm>
+#include <functional>
+
 #include "families/lattice_families.hpp"
 #include "families/quiet_blocks.hpp"
+#include "spaces/chunk_roles.hpp"
 #include "spaces/lattice_gradient.hpp"
 #include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
@@ -29,6 +33,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         flux_(families_.body().make_field(D * D)),
         source_(families_.body().make_field(D)) {
     if (parts.skip) quiet_ = QuietBlocks(families_.tiles.reach);
+    if (families_.body().part()) felt_rows_ = felt_rows(families_, felt_here(families_));
     const std::size_t blocks = families_.tiles.blocks.size();
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_matrices(chunk); }); });
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
@@ -52,7 +57,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     families_.tiles.colouring.for_each([&](std::size_t b) {
       if (!quiet_.awake(b, 2)) return;
       for (std::size_t r = families_.tiles.blocks[b].row_begin; r < families_.tiles.blocks[b].row_end; ++r)
-        if (families_.tiles.rows[r].marked(only)) operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
+        if (takes(r, only)) operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
       if (!families_.any_broken()) return;
       for_chunks(b, [&](const LatticeChunk& chunk) {
         if (!only || only[chunk.first / chunk_points]) operator_.remove_broken(chunk, flux_, chunk.first, source_, force);
@@ -132,19 +137,29 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]);
   }
 
-  /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of block b,
-  /// or those among them that are taken together with a marked one.
+  /// Whether a row is marked, and somebody feels it.
+  bool takes(std::size_t row, const std::uint8_t* only) const noexcept {
+    return (felt_rows_.empty() || felt_rows_[row]) && families_.tiles.rows[row].marked(only);
+  }
+
+  /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of the wanted
+  /// rows of block b: whole rows, since the divergence reads these, and no others, since a rank may have a part of the block.
   template <class Use>
   void for_gradients(std::size_t b, ConstFieldView u, const std::uint8_t* only, Use&& use) const {
     alignas(64) double H[D * D * batch_points], sums[D * batch_points];
     constexpr std::size_t at_once = batch_points / chunk_points;
+    std::size_t row = families_.tiles.blocks[b].row_begin;
     for (std::size_t c = families_.tiles.blocks[b].chunk_begin; c < families_.tiles.blocks[b].chunk_end; c += at_once) {
       const std::size_t n = std::min(at_once, families_.tiles.blocks[b].chunk_end - c);
-      bool wanted = !only;
-      for (std::size_t k = 0; k < n && !wanted; ++k) wanted = only[families_.tiles.chunks[c + k].first / chunk_points];
-      if (!wanted) continue;
+      bool taken[at_once];
+      for (std::size_t k = 0; k < n; ++k) {
+        while (!families_.tiles.rows[row].holds(families_.tiles.chunks[c + k].first)) ++row;
+        taken[k] = takes(row, only);
+      }
+      if (std::none_of(taken, taken + n, std::identity())) continue;
       operator_.gradient_and_sums(&families_.tiles.chunks[c], static_cast<int>(n), u, H, sums, batch_points);
-      for (std::size_t k = 0; k < n; ++k) use(families_.tiles.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
+      for (std::size_t k = 0; k < n; ++k)
+        if (taken[k]) use(families_.tiles.chunks[c + k], H + k * chunk_points, sums + k * chunk_points);
     }
   }
 
@@ -212,6 +227,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   LatticeOperator<D> operator_;
   Field M_, B_;
   Field flux_, source_;  ///< Q, v
+  std::vector<std::uint8_t> felt_rows_;  ///< of one of several ranks; empty: all are
   QuietBlocks quiet_;
 };
 

@@ -142,11 +142,17 @@ void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double Group
   perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
 }
 
-std::int64_t Mechanics::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
+std::int64_t Mechanics::add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
+  if (!space_->overlaps()) arrival.finish();
+  return forces(u, force, energy, &arrival);
+}
+
+std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
   const bool dissipates = work.dissipates(), wanted = energy || dissipates;
   if (wanted) energies_ = no_energies();
   Pass pass{work, u, {}, force, nullptr, wanted ? energies_.data() : nullptr, -1, {}};
+  pass.arrival = arrival;
   space_->run(pass);
   if (energy) add_owned(energies_, &GroupEnergy::stored, *energy);
   if (dissipates) {

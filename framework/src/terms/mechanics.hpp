@@ -13,8 +13,13 @@ class Mechanics final : public Term {
  public:
   explicit Mechanics(const SpaceParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return tangent_of(u, w, Kw, nullptr, nullptr); }
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
+    return forces(u, force, energy, nullptr);
+  }
+  std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    return tangent_of(u, w, Kw, nullptr, nullptr);
+  }
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
@@ -51,6 +56,7 @@ class Mechanics final : public Term {
   std::unique_ptr<VolumetricRows> make_volumetric_rows() const;
 
  private:
+  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival);
   std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.

@@ -27,8 +27,11 @@ PairForces<D>::PairForces(const PairParts& parts)
     families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
     set_moduli(family, points, modulus);
   });
-  if (share_ && laws_.single() && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
-    fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.internal().front()))).bond;
+  // Far points have a record of their own, and no bond that anybody feels.
+  const std::vector<MaterialRecord>& records = laws_.records();
+  const bool one_law = laws_.single() || (records.size() == 2 && records[0].uniform && records[1].far);
+  if (share_ && one_law && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
+    fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.owned().front()))).bond;
   } else {
     fields_.modulus = std::move(modulus);
   }
@@ -238,8 +241,10 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
 
 template <int D>
 std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                                       const std::uint8_t* only, bool local) {
-  const std::int64_t bad = loop_->run({PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local});
+                                       const std::uint8_t* only, bool local, Arrival* arrival) {
+  PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local};
+  pass.arrival = arrival;
+  const std::int64_t bad = loop_->run(pass);
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
   if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
@@ -271,13 +276,20 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
+std::int64_t PairForces<D>::add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
+  if (!families_.lattice()) arrival.finish();
+  return forces(u, force, energy, &arrival);
+}
+
+template <int D>
+std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
   if (energy) energies_.assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr);
+    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, false, arrival);
     if (bad >= 0) return bad;
   }
   PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
+  pass.arrival = arrival;
   pass.screen = screen_;
   if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
   const std::int64_t bad = loop_->run(pass);

@@ -22,8 +22,13 @@ class PairForces final : public Term {
  public:
   explicit PairForces(const PairParts& parts);
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override;
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override { return tangent_of(u, w, Kw, nullptr, nullptr); }
+  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
+    return forces(u, force, energy, nullptr);
+  }
+  std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override;
+  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    return tangent_of(u, w, Kw, nullptr, nullptr);
+  }
   /// strain_energy_density, and P where it is asked for.
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
   int steps() const noexcept override { return formulation_.dilatation ? 2 : 1; }
@@ -53,6 +58,7 @@ class PairForces final : public Term {
     AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
     AlignedVector<double> energy, force;
   };
+  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival);
   std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   /// energies: those of the groups in `only` [J]; null: not wanted.
   std::int64_t forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, std::vector<double>* energies);
@@ -65,10 +71,10 @@ class PairForces final : public Term {
   void set_sides();
   void renew_sides();
   PairPoint point(std::size_t p) const;
-  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; energies += V phi by group of eight points; phi by point ->
-  /// density. only, local: see PairPass; null for all.
+  /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; energies += V phi by group of eight points;
+  /// phi by point -> density. only, local, arrival: see PairPass; null for all.
   std::int64_t dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                          const std::uint8_t* only = nullptr, bool local = false);
+                          const std::uint8_t* only = nullptr, bool local = false, Arrival* arrival = nullptr);
 
   const Families& families_;
   const Body& body_;

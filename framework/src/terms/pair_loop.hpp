@@ -35,6 +35,7 @@ struct PairPass {
   bool local = false;
   const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
   BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
+  Arrival* arrival = nullptr;        ///< of u at the points of other ranks; null: it is there. Lattices only
 };
 
 /// Point quantities that bonds need.
@@ -115,7 +116,7 @@ class PairLoop {
   void look(const PairPass& pass, const Moves& moves) {
     reach_ = pass.q.data ? 2 : 1;
     if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
-      quiet_.look(reach_, moves);
+      quiet_.look(reach_, moves, pass.arrival);
     else
       quiet_.wake();
   }
@@ -128,8 +129,9 @@ class PairLoop {
       auto body = [&](std::size_t b) {
         if (quiet_.awake(b, reach_)) block(constant, b);
       };
-      if (at_once(pass)) colouring.for_each(body);
-      else parallel_for(blocks(), body);
+      if (at_once(pass)) return colouring.for_each(body, pass.arrival);
+      if (pass.arrival) pass.arrival->finish();
+      parallel_for(blocks(), body);
     };
     switch (pass.work) {
       case PairWork::dilatation: return sweep(std::integral_constant<PairWork, PairWork::dilatation>());

@@ -7,9 +7,10 @@
 
 #include "assembly/assembly.hpp"
 #include "families/families.hpp"
-#include "perikit/core/exact_sum.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/point_flux.hpp"
+#include "perikit/core/exact_sum.hpp"
+#include "perikit/core/parallel.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
 #include "perikit/operators/samples.hpp"
@@ -21,6 +22,11 @@ class Term {
   virtual ~Term() = default;
   /// force += -dE/du [N]; *energy += E of what this rank owns [J] where wanted.
   virtual std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) = 0;
+  /// The same while displacements of points of other ranks are on their way, which have arrived when it returns.
+  virtual std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
+    arrival.finish();
+    return add_forces(u, force, energy);
+  }
   /// Kw += -d(force)/du w [N].
   virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// Adds to the energy density, and sets what else it knows.

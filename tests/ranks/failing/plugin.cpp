@@ -2,6 +2,8 @@
 
 #include "perikit/sdk/plugin.hpp"
 
+#include <sys/resource.h>
+
 #include <new>
 #include <stdexcept>
 
@@ -39,6 +41,11 @@ class Failing final : public Integrator {
  private:
   void fail_at(const std::string& place) const {
     if (place != at_ || communicator().rank() != rank_) return;
+    if (error_ == "disk") {
+      const rlimit limit{4096, 4096};
+      setrlimit(RLIMIT_FSIZE, &limit);
+      return;
+    }
     if (error_ == "input") throw InputError("thrown on purpose: input");
     if (error_ == "run") throw RunError("thrown on purpose: run");
     if (error_ == "memory") throw std::bad_alloc();
@@ -56,7 +63,10 @@ PERIKIT_PLUGIN(registrar) {
   ParameterTable table;
   table.integer("rank", "Which throws.").by_default("0").at_least(0);
   table.choice("at", {"construction", "plan", "step"}, "Where.").by_default("\"step\"");
-  table.choice("error", {"input", "run", "memory", "other"}, "What.").by_default("\"run\"");
+  table
+      .choice("error", {"input", "run", "memory", "other", "disk"},
+              "What; disk: it throws nothing, but its files cannot grow beyond 4 kB any more.")
+      .by_default("\"run\"");
   registrar.integrator({.name = "failing",
                         .summary = "throws on one rank",
                         .parameters = std::move(table),

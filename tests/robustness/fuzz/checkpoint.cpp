@@ -10,10 +10,11 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   std::ofstream(checkpoint_file(folder.path), std::ios::binary | std::ios::trunc)
       .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   try {
-    const Checkpoint checkpoint = read_checkpoint(folder.path);
-    if (checkpoint.state.size() != 4096) __builtin_trap();   // as in the seed (seeds.cpp)
-    for (std::size_t k = 0; k < checkpoint.state.size(); ++k)
-      if (checkpoint.state[k] != static_cast<std::byte>(k * 7)) __builtin_trap();
+    read_checkpoint(folder.path);
+    ByteReader state = checkpoint_state(folder.path);
+    for (std::size_t k = 0; k < 4096; ++k)  // as in the seed (seeds.cpp)
+      if (state.value<std::byte>() != static_cast<std::byte>(k * 7)) __builtin_trap();
+    if (!state.done()) __builtin_trap();
   } catch (const InputError&) {
   }
   return 0;

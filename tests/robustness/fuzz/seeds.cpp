@@ -40,7 +40,6 @@ Checkpoint checkpoint() {
   all.body = all.libraries = "0123456789abcdef";
   all.step = 17;
   all.time = 0.25;
-  for (int k = 0; k < 4096; ++k) all.state.push_back(static_cast<std::byte>(k * 7));
   return all;
 }
 
@@ -52,7 +51,11 @@ int main(int count, char** arguments) try {
   for (const char* target : {"hdf5", "checkpoint"}) fs::create_directories(folder / target);
   write_points(folder / "hdf5");
   write_results(folder / "hdf5");
-  write_checkpoint(folder / "checkpoint", checkpoint());
+  std::vector<std::byte> state;
+  for (int k = 0; k < 4096; ++k) state.push_back(static_cast<std::byte>(k * 7));
+  NewCheckpoint kept(folder / "checkpoint", checkpoint(), state.size());
+  kept.add(state);
+  kept.keep();
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

@@ -136,6 +136,7 @@ class Body {
     const std::int32_t input = input_of(internal_index);
     return numbers_.empty() || input < 0 ? input : numbers_[static_cast<std::size_t>(input)];
   }
+  std::vector<std::int64_t> numbers(std::span<const std::int32_t> points) const;
   /// The internal index of the point with this input number in the whole body; -1 where it is not here.
   std::int32_t find(std::int64_t number) const noexcept;
   /// Whether no other rank owns the point.

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "perikit/core/exact_sum.hpp"
@@ -18,6 +19,17 @@ struct Message {
   int rank;
   std::span<const double> to;
   std::span<double> from;
+};
+
+/// An exchange that is made again and again, from and to the same memory.
+class ExchangePlan {
+ public:
+  virtual ~ExchangePlan() = default;
+  /// Numbers are on their way from now on: those to send may not change, and those to come may not be read, until the exchange is
+  /// done.
+  virtual void start() = 0;
+  /// Whether all have come and gone; waits until they have where it may.
+  virtual bool done(bool wait) = 0;
 };
 
 class Communicator {
@@ -34,6 +46,9 @@ class Communicator {
   virtual double largest(double value) = 0;
   /// Sends and receives all of them, from at most one message a rank. A rank calls it together with those that it names.
   virtual void exchange(std::span<const Message> messages) = 0;
+  /// The same, to be made many times. A rank starts it, and waits for it, together with those that it names, and the plan goes
+  /// before the communicator does. Unless a communicator knows better, nothing happens before somebody waits.
+  virtual std::unique_ptr<ExchangePlan> plan_exchange(std::vector<Message> messages);
   /// On rank 0 the bytes of every rank, in their order; empty on the others. All ranks must call it.
   virtual std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) = 0;
   /// bytes <- those of rank 0. All ranks must call it.
@@ -56,6 +71,12 @@ class CommunicatorScope {
  private:
   Communicator* before_;
 };
+
+/// What each rank has for each: to[k] goes to rank k. Returns what has come from each. All ranks must call it.
+std::vector<std::vector<std::byte>> exchange_among_all(const std::vector<std::vector<std::byte>>& to);
+
+/// The message of the lowest rank that has one, on all; empty where none has. All ranks must call it.
+std::string first_message(const std::string& mine);
 
 /// The sum of what all ranks have added, rounded once: the same bits however the terms lie on ranks. All ranks must call it.
 double total_over_ranks(ExactSum sum);

@@ -43,22 +43,59 @@ class LoopOrder {
   std::uint32_t round_ = 0;
 };
 
+/// Values that are on their way while a loop runs. The thread that runs the loop looks after them, and no other calls what is not
+/// const.
+class Arrival {
+ public:
+  virtual ~Arrival() = default;
+  /// On their way; else they are where they are read.
+  bool pending() const noexcept { return pending_.load(std::memory_order_acquire); }
+  /// Puts them there if they have come.
+  void look() { end(false); }
+  /// Waits for them, and puts them there.
+  void finish() { end(true); }
+
+ protected:
+  /// They are on their way from now on.
+  void expect() noexcept { pending_.store(true, std::memory_order_relaxed); }
+
+ private:
+  /// Whether they have come; not before they have where it may wait.
+  virtual bool come(bool wait) = 0;
+  virtual void put() = 0;
+  void end(bool wait) {
+    if (!pending() || !come(wait)) return;
+    put();
+    pending_.store(false, std::memory_order_release);
+  }
+
+  std::atomic<bool> pending_{false};
+};
+
+/// The indices of a loop from `first` on read what `arrival` brings; those before them do not, and wait for none of those.
+struct LateIndices {
+  std::size_t first = 0;
+  Arrival* arrival = nullptr;  ///< null: nothing is on its way
+  bool any() const noexcept { return arrival && arrival->pending(); }
+};
+
 namespace detail {
-void parallel_for(std::size_t n, void* context, void (*body)(void*, std::size_t));
-void parallel_for(LoopOrder& order, void* context, void (*body)(void*, std::size_t));
+void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(void*, std::size_t));
+void parallel_for(LoopOrder& order, LateIndices late, void* context, void (*body)(void*, std::size_t));
 }  // namespace detail
 
-/// body(i) for i in [0, n), in any order, on all threads. body must be noexcept in effect.
+/// body(i) for i in [0, n), in any order, on all threads. body must be noexcept in effect. What arrives has arrived after the
+/// loop.
 template <class Body>
-void parallel_for(std::size_t n, Body&& body) {
-  detail::parallel_for(n, &body,
+void parallel_for(std::size_t n, Body&& body, LateIndices late = {}) {
+  detail::parallel_for(n, late, &body,
                        [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
 }
 
 /// body(i) for i in [0, order.size()), those that wait for others after them.
 template <class Body>
-void parallel_for(LoopOrder& order, Body&& body) {
-  detail::parallel_for(order, &body,
+void parallel_for(LoopOrder& order, Body&& body, LateIndices late = {}) {
+  detail::parallel_for(order, late, &body,
                        [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
 }
 

@@ -63,6 +63,11 @@ class FrameWriter {
   void begin(double time, std::int64_t step);
   /// The next rows of a field; those of one field follow each other.
   void add(const std::string& name, int width, std::span<const double> values);
+  /// In place of `add`: room for all rows of a field, which somebody else writes into file() before the frame ends, as numbers of
+  /// 64 bits from the byte that is returned on.
+  std::uint64_t reserve(const std::string& name, int width);
+  /// The file of the frame that was begun; it has another name when it is complete.
+  const std::filesystem::path& file() const;
   /// The frame goes to the disk on a thread of its own, which nothing else of HDF5 may run beside: finish() first. What fails there is
   /// thrown by the next begin() or finish().
   void end();
@@ -104,5 +109,24 @@ struct LoadedFrame {
   std::map<std::string, OutputField> fields;
 };
 LoadedFrame read_last_frame(const std::filesystem::path& results_h5, std::size_t points);
+
+/// The same frame, of which a reader takes what it needs.
+class LastFrame {
+ public:
+  /// Throws InputError as read_last_frame does.
+  LastFrame(const std::filesystem::path& results_h5, std::size_t points);
+  ~LastFrame();
+  double time() const noexcept;
+  std::int64_t step() const noexcept;
+  /// Names and widths.
+  const std::map<std::string, int>& fields() const noexcept;
+  /// use(k, row of the point numbers[k]), for ascending numbers; a piece of the field is in memory at a time.
+  void each_row(const std::string& field, std::span<const std::int64_t> numbers,
+                const std::function<void(std::size_t k, std::span<const double> row)>& use) const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
 
 }  // namespace perikit

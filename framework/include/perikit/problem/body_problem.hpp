@@ -1,6 +1,7 @@
 #pragma once
 /// The Problem of one body: its families, its terms, and what holds and loads it.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 
 namespace perikit {
 
+class ByteReader;
 class Companion;
 class Families;
 class WeakSprings;
@@ -67,9 +69,9 @@ class BodyProblem final : public Problem {
   struct Carried {
     std::size_t bonds = 0, history = 0;
   };
-  static Carried carried_by(std::span<const std::byte> snapshot);
+  static Carried carried_by(ByteReader& snapshot);
   /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
-  void carry(std::span<const std::byte> snapshot);
+  void carry(ByteReader& snapshot);
 
   /// Quasi-static runs: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
   /// the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness. Returns what is
@@ -80,6 +82,11 @@ class BodyProblem final : public Problem {
   /// both. restore throws InputError for what belongs to another problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
+  /// The same bytes, on rank 0: begin(how many), then next(some of them) until all are out. Nobody has all points of all ranks at
+  /// once.
+  void write_snapshot(const std::function<void(std::uint64_t size)>& begin,
+                      const std::function<void(std::span<const std::byte>)>& next) const;
+  void restore(ByteReader& in);
 
   Terms& terms() noexcept { return *parts_.terms; }
   const Terms& terms() const noexcept { return *parts_.terms; }
@@ -123,6 +130,8 @@ class BodyProblem final : public Problem {
 
   /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
   Seen seen(ConstFieldView u, Field& memory);
+  /// Whether evaluations may begin before the values of ghosts are there: images follow them at once.
+  bool meanwhile() const noexcept { return ghosts_ && !images(); }
   /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
   void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.

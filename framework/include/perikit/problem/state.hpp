@@ -50,6 +50,8 @@ class State {
   std::size_t bytes() const noexcept;
   /// Of all ranks, by rank 0 alone. All ranks must call it.
   void write(ByteWriter& out) const;
+  /// Bytes that rank 0 then writes.
+  std::uint64_t written() const noexcept;
   /// What was declared but not written becomes zero. Throws InputError where the bytes cannot be those of a state of the whole
   /// body.
   void read(ByteReader& in);

@@ -94,6 +94,7 @@ struct OutputProgress {
 };
 
 class OutputFolder;
+class SharedFile;
 
 /// Writes frames, history, checkpoints and log of a run, and shows progress.
 class RunRecorder final : public Observer {
@@ -139,6 +140,8 @@ class RunRecorder final : public Observer {
   bool history_due(std::int64_t step) const;
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
+  /// The frame that was begun, open for this rank to write a share of it; null where rank 0 writes all of it.
+  std::unique_ptr<SharedFile> shared_frame();
   /// Of a state that is sampled. RunError where the energies of a dynamic run are far from adding up. recorded: the state counts
   /// in the balance of the run; not that of a stop alone.
   void watch_energies(const StepReport& report, bool recorded);
@@ -181,6 +184,7 @@ class RunRecorder final : public Observer {
   double first_time_ = 0;
   std::vector<std::string> warnings_;
   std::set<std::string> strange_fields_;   ///< that were not finite somewhere
+  bool shares_frames_ = false;             ///< ranks write frames together
 };
 
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.

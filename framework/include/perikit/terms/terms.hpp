@@ -20,6 +20,7 @@
 
 namespace perikit {
 
+class Arrival;
 class BondCriterion;
 class Families;
 class Mechanics;
@@ -57,14 +58,16 @@ class Terms {
   explicit Terms(TermParts parts);
   ~Terms();
 
-  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted.
-  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy);
-  /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds: what
-  /// has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs. On one rank.
-  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost, FieldView force,
-                                double* energy);
-  /// The groups of points whose bonds have failed or weakened since the set-up and of what lies in their families, on all ranks the same; empty
-  /// where none have.
+  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. arrival: of u at the
+  /// points of other ranks, which has come when it returns; null: it is there.
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr);
+  /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds:
+  /// what has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs.
+  /// On one rank.
+  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
+                                FieldView force, double* energy);
+  /// The groups of points whose bonds have failed or weakened since the set-up and of what lies in their families, on all ranks
+  /// the same; empty where none have.
   GroupRings near_failed_bonds() const;
   /// The tangent of those groups alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
   /// anything elsewhere.
