@@ -4,6 +4,7 @@ usage: ends.py PROGRAM LIBRARY WORK FOLDER_OF_THE_FAILING_INTEGRATOR
 """
 
 import glob
+import math
 import os
 import shutil
 import signal
@@ -52,6 +53,17 @@ def torn_off():
     return text[:begin] + "force = [4.0, 0.0]\n" + text[end:]
 
 
+def with_points(name, changed):
+    """A scene with points of a file, after its lines have been changed."""
+    lines = ["x,y,volume"] + ["%.17g,%.17g,1" % (k % 32 + 0.5 + 0.2 * math.sin(3 * k), k // 32 + 0.5 + 0.2 * math.cos(5 * k)) for k in range(32 * 38)]
+    file = "%s/%s.csv" % (WORK, name)
+    with open(file, "w") as out:
+        out.write("\n".join(changed(lines)))
+    text = scene('type = "conventional"', 2, True)
+    begin, end = text.index("[body.lattice]"), text.index("[sets]")
+    return text[:begin] + '[body.points]\nfile = "%s"\n' % file + text[end:]
+
+
 def refusals():
     """What all ranks refuse, one says."""
     conventional = 'type = "conventional"'
@@ -62,6 +74,8 @@ def refusals():
             ("a piece that comes loose under load", torn_off(), "the loads move it"),
             ("jfnk with a preconditioner", without_velocity(scene(conventional, integrator='type = "jfnk"\npreconditioner = "factorisation"')), 'found "jfnk" on 3 ranks'),
             ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
+            ("a file with a mistake far down", with_points("mistake", lambda lines: lines[:950] + ["1,2,3,4"] + lines[950:]), "mistake.csv:951:1: found 4 cells"),
+            ("two points at one place", with_points("twice", lambda lines: lines + lines[7:8]), "found two points at ("),
             ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0\nallow_unstable = true'), "the run failed: step 1")):
         began = time.time()
         done = run(PROGRAM, text, WORK + "/refused", 3)

@@ -2,11 +2,22 @@
 
 #include <algorithm>
 
-#include "perikit/body/body.hpp"
+#include "body/block_colours.hpp"
 
 namespace perikit {
 
-Colouring::Colouring(const BlockReach& reach) : Colouring(reach, block_colours(reach.touches, reach.units)) {}
+namespace {
+
+std::vector<std::int32_t> colours_of(const BlockReach& reach) {
+  FreeColours free(reach.units);
+  std::vector<std::int32_t> colours;
+  for (const std::vector<std::int32_t>& units : reach.touches) colours.push_back(free.next(std::span(units)));
+  return colours;
+}
+
+}  // namespace
+
+Colouring::Colouring(const BlockReach& reach) : Colouring(reach, colours_of(reach)) {}
 
 Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of) {
   std::vector<std::vector<std::int32_t>> of_colour;

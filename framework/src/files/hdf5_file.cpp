@@ -240,15 +240,40 @@ std::vector<std::size_t> Source::shape(const std::string& path) const {
 }
 
 Source::Array Source::read(const std::string& path) const {
-  Array array{shape(path), {}};
+  Array array{shape(path), std::vector<double>(values(path))};
+  read(path, H5S_ALL, H5S_ALL, array.data.data());
+  return array;
+}
+
+std::size_t Source::values(const std::string& path) const {
+  std::size_t values = 1;
+  for (const std::size_t extent : shape(path)) values *= extent;
+  return values;
+}
+
+std::vector<double> Source::read(const std::string& path, std::size_t first, std::size_t last) const {
+  const std::vector<std::size_t> extent = shape(path);
+  const std::size_t width = extent.size() > 1 ? std::max<std::size_t>(1, extent[1]) : 1;
+  // The rows that hold these values.
+  const hsize_t begin[2] = {first / width, 0}, count[2] = {(last + width - 1) / width - begin[0], width};
+  std::vector<double> rows(count[0] * width);
+  if (rows.empty()) return rows;
+  const Handle data = dataset(path);
+  const Handle file_space(H5Dget_space(data.get()), H5Sclose);
+  const Handle memory_space(H5Screate_simple(static_cast<int>(extent.size()), count, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(file_space.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) < 0) refuse(path, "cannot be read");
+  read(path, memory_space.get(), file_space.get(), rows.data());
+  rows.erase(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(first - begin[0] * width));
+  rows.resize(last - first);
+  return rows;
+}
+
+void Source::read(const std::string& path, hid_t memory_space, hid_t file_space, double* values) const {
   const Handle data = dataset(path);
   const Handle type(H5Dget_type(data.get()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(path, "must hold numbers");
-  array.data.resize(array.rows() * static_cast<std::size_t>(array.width()));
-  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
-    refuse(path, "cannot be read");
-  return array;
+  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory_space, file_space, H5P_DEFAULT, values) < 0) refuse(path, "cannot be read");
 }
 
 std::vector<std::byte> Source::read_bytes(const std::string& path) const {

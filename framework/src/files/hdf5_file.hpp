@@ -113,6 +113,9 @@ class Source {
   bool contains(const std::string& path) const;
   /// Any numeric dataset of one or two dimensions, converted to double.
   Array read(const std::string& path) const;
+  /// How many values there are in it, and those first ... last - 1 of them, row by row.
+  std::size_t values(const std::string& path) const;
+  std::vector<double> read(const std::string& path, std::size_t first, std::size_t last) const;
   /// A flat dataset that was written from bytes.
   std::vector<std::byte> read_bytes(const std::string& path) const;
   std::vector<std::size_t> shape(const std::string& path) const;
@@ -123,6 +126,7 @@ class Source {
  private:
   [[noreturn]] void refuse(const std::string& what, const std::string& message) const;
   Handle dataset(const std::string& path) const;
+  void read(const std::string& path, hid_t memory_space, hid_t file_space, double* values) const;
   Handle attribute(const std::string& group, const std::string& name) const;
 
   std::filesystem::path path_;
