@@ -114,6 +114,13 @@ LONG_MEMORY = LONG.replace('type = "saint_venant_kirchhoff"', 'type = "hypoelast
 LONG_MEMORY += '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = 1.0, bulk_modulus = 3.0 }\n'
 
 
+# Of a cloud that cracks, and of which ranks have other parts afterwards.
+LONG_CLOUD = scene('type = "bond_based"', 2, True, 'type = "verlet"\nend_time = 20.0\ntime_step = 0.01', cells=[32, 38])
+LONG_CLOUD = LONG_CLOUD.replace("frames = 3", "frames = 8\ncheckpoint_every = 100").replace('"reaction"]', '"reaction", "damage"]')
+LONG_CLOUD = LONG_CLOUD.replace("[[boundary]]", 'velocity = ["0.1*(x - 16)/16", "0.1*sin(x/3)*(y - 19)/19"]\n[[boundary]]', 1)
+LONG_CLOUD += '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n'
+
+
 def output_fails():
     """Rank 0 cannot write a frame; the others wait for it in the next step."""
     folder = WORK + "/output"
@@ -140,9 +147,10 @@ def stops():
     for name, text, target, number, ranks in (
             ("SIGTERM to one rank", LONG, lambda p: children(p)[1], signal.SIGTERM, 2),
             ("SIGTERM to one rank, with a law that remembers", LONG_MEMORY, lambda p: children(p)[1], signal.SIGTERM, 2),
+            ("SIGTERM to one rank, of a cloud", LONG_CLOUD, lambda p: children(p)[1], signal.SIGTERM, 4),
             ("SIGTERM to mpirun", LONG, lambda p: p.pid, signal.SIGTERM, 1),
             ("kill -9 of one rank", LONG, lambda p: children(p)[2], signal.SIGKILL, 1)):
-        whole = WORK + ("/whole" if text is LONG else "/whole_memory")
+        whole = WORK + {LONG: "/whole", LONG_MEMORY: "/whole_memory", LONG_CLOUD: "/whole_cloud"}[text]
         if not os.path.exists(whole + "/history.csv"):
             done = run(PROGRAM, text, whole, 0)
             check(done.returncode == 0, "a run without a stop")
