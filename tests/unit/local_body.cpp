@@ -16,6 +16,7 @@
 #include "body/point_share.hpp"
 #include "files/hdf5_file.hpp"
 #include "perikit/build/body.hpp"
+#include "perikit/core/memory.hpp"
 #include "perikit/core/serial_communicator.hpp"
 #include "tests/thread_ranks.hpp"
 #include "unit/fake_catalogue.hpp"
@@ -417,6 +418,19 @@ TEST_CASE("local bodies: more points than 32 bits can number are refused on one 
   CHECK(body.places().place[p] > std::int64_t{1} << 31);
   CHECK(body.at_place(body.places().place[p]) == body.owned().back());
   CHECK(heaviest_rank(scene, ranks) >= 0);
+}
+
+TEST_CASE("local bodies: a rank without others refuses a cloud whose points it cannot put in order") {
+  const Scene scene = parsed(scene_text(3, lattice(3, large, "", "jitter = 0.1"), sets));
+  const double bytes = 130.0 * side * side * side;
+  if (memory_limit() > bytes) return;
+  CHECK_FALSE(one_rank_holds(scene));
+  constexpr int ranks = 8192;
+  const int rank = heaviest_rank(scene, ranks);
+  CHECK(rank == ranks / 2);
+  LoneRank lone(rank, ranks);
+  const CommunicatorScope scope(lone);
+  CHECK_THROWS_WITH(build_local_body(scene, {}, 7), doctest::Contains("where one process shares out a cloud for all ranks"));
 }
 
 TEST_CASE("local bodies: a part that is too large is refused, and so are more points than ranks can name") {
