@@ -4,6 +4,7 @@ usage: ends.py PROGRAM LIBRARY WORK FOLDER_OF_THE_FAILING_INTEGRATOR
 """
 
 import glob
+import math
 import os
 import shutil
 import signal
@@ -52,6 +53,17 @@ def torn_off():
     return text[:begin] + "force = [4.0, 0.0]\n" + text[end:]
 
 
+def with_points(name, changed):
+    """A scene with points of a file, after its lines have been changed."""
+    lines = ["x,y,volume"] + ["%.17g,%.17g,1" % (k % 32 + 0.5 + 0.2 * math.sin(3 * k), k // 32 + 0.5 + 0.2 * math.cos(5 * k)) for k in range(32 * 38)]
+    file = "%s/%s.csv" % (WORK, name)
+    with open(file, "w") as out:
+        out.write("\n".join(changed(lines)))
+    text = scene('type = "conventional"', 2, True)
+    begin, end = text.index("[body.lattice]"), text.index("[sets]")
+    return text[:begin] + '[body.points]\nfile = "%s"\n' % file + text[end:]
+
+
 def refusals():
     """What all ranks refuse, one says."""
     conventional = 'type = "conventional"'
@@ -61,7 +73,9 @@ def refusals():
             ("statics of a body that nothing holds", without_velocity(scene(conventional, integrator='type = "jfnk"')).replace('set = "low"\ndisplacement', 'set = "middle"\ndisplacement'), "found nothing that holds the body"),
             ("a piece that comes loose under load", torn_off(), "the loads move it"),
             ("jfnk with a preconditioner", without_velocity(scene(conventional, integrator='type = "jfnk"\npreconditioner = "factorisation"')), 'found "jfnk" on 3 ranks'),
-            ("more ranks than blocks", scene(conventional, 2, True, cells=[22, 20]), "found 3 ranks for a body of 440 points"),
+            ("more ranks than blocks", scene(conventional, 2, True, cells=[8, 7]), "found 3 ranks for a body of 56 points"),
+            ("a file with a mistake far down", with_points("mistake", lambda lines: lines[:950] + ["1,2,3,4"] + lines[950:]), "mistake.csv:951:1: found 4 cells"),
+            ("two points at one place", with_points("twice", lambda lines: lines + lines[7:8]), "found two points at ("),
             ("a run that fails", scene(conventional, integrator='type = "verlet"\nend_time = 900.0\ntime_step = 9.0\nallow_unstable = true'), "the run failed: step 1")):
         began = time.time()
         done = run(PROGRAM, text, WORK + "/refused", 3)
@@ -98,6 +112,13 @@ LONG = scene('type = "baqp"', 2, False, 'type = "verlet"\nend_time = 12.0\ntime_
 # Of a law that remembers, beside one that does not.
 LONG_MEMORY = LONG.replace('type = "saint_venant_kirchhoff"', 'type = "hypoelastic"').replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n')
 LONG_MEMORY += '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 2.0, shear_modulus = 1.0, bulk_modulus = 3.0 }\n'
+
+
+# Of a cloud that cracks, and of which ranks have other parts afterwards.
+LONG_CLOUD = scene('type = "bond_based"', 2, True, 'type = "verlet"\nend_time = 20.0\ntime_step = 0.01', cells=[32, 38])
+LONG_CLOUD = LONG_CLOUD.replace("frames = 3", "frames = 8\ncheckpoint_every = 100").replace('"reaction"]', '"reaction", "damage"]')
+LONG_CLOUD = LONG_CLOUD.replace("[[boundary]]", 'velocity = ["0.1*(x - 16)/16", "0.1*sin(x/3)*(y - 19)/19"]\n[[boundary]]', 1)
+LONG_CLOUD += '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n'
 
 
 def output_fails():
@@ -140,9 +161,10 @@ def stops():
     for name, text, target, number, ranks in (
             ("SIGTERM to one rank", LONG, lambda p: children(p)[1], signal.SIGTERM, 2),
             ("SIGTERM to one rank, with a law that remembers", LONG_MEMORY, lambda p: children(p)[1], signal.SIGTERM, 2),
+            ("SIGTERM to one rank, of a cloud", LONG_CLOUD, lambda p: children(p)[1], signal.SIGTERM, 4),
             ("SIGTERM to mpirun", LONG, lambda p: p.pid, signal.SIGTERM, 1),
             ("kill -9 of one rank", LONG, lambda p: children(p)[2], signal.SIGKILL, 1)):
-        whole = WORK + ("/whole" if text is LONG else "/whole_memory")
+        whole = WORK + {LONG: "/whole", LONG_MEMORY: "/whole_memory", LONG_CLOUD: "/whole_cloud"}[text]
         if not os.path.exists(whole + "/history.csv"):
             done = run(PROGRAM, text, whole, 0)
             check(done.returncode == 0, "a run without a stop")

@@ -5,7 +5,9 @@ usage: same_bits.py PROGRAM LIBRARY WORK small|all
 
 import itertools
 import os
+import random
 import re
+import subprocess
 import sys
 
 from scenes import differences, need, run, scene, without_velocity
@@ -138,7 +140,7 @@ def torn_slowly(kinematics, integrator, damage, cloud):
     return text.replace('"reaction"]', '"reaction", "damage"]') + LOOSE + damage
 
 
-def cases(everything):
+def cases(everything, work):
     """Name, scene, numbers of ranks, numbers of threads."""
     small = [("conventional", 3, False), ("baqp", 2, True), ("bond_based", 3, True), ("sub_horizon", 2, False)]
     chosen = itertools.product(KINEMATICS, (1, 2, 3), (False, True)) if everything else small
@@ -188,7 +190,7 @@ def cases(everything):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
-    for name, text in itertools.chain(own_parts(everything), long_interfaces(everything)):
+    for name, text in itertools.chain(own_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
         yield name, text, (2, 3, 4) if everything else (2, 4), threads
 
 
@@ -204,21 +206,75 @@ def with_regions(text, some, other):
 
 
 def own_parts(everything):
-    """Lattices of which each rank places its own part: with holes, regions, pre-cracks, failing bonds, and sets of single points."""
+    """Lattices and clouds of which each rank places its own part: with holes, regions, pre-cracks, failing bonds, and sets of single points."""
     hole = {2: "(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6", 3: "(x - 7)^2 + (y - 6)^2 + (z - 2)^2 > 8 && x + z > 2"}
     regions = {2: ("x > 11 && y > 7 && x < 21", "x - y > 17"), 3: ("(x - 8)^2 + (y - 6)^2 + (z - 6)^2 < 14", "x - y > 8")}
     crack = {2: CRACK, 3: CRACK_IN_SPACE}
     names = ("conventional", "wan", "baqp", "sub_horizon", "projection", "bond_based", "ordinary", "bond_associated") if everything else ("baqp", "ordinary")
-    for name, dimension in itertools.product(names, (2, 3)):
-        kind = OWN_PART + "%s, %dD, " % (name, dimension)
-        text = scene(KINEMATICS[name], dimension, False, 'type = "verlet"\nend_time = 2.0\ntime_step = 0.05')
+    for name, dimension, cloud in itertools.product(names, (2, 3), (False, True)):
+        if cloud and dimension == 3 and not everything:
+            continue
+        kind = OWN_PART + "%s, %dD %s, " % (name, dimension, "cloud" if cloud else "lattice")
+        cells = [32, 38] if cloud and dimension == 2 else None  # of more blocks than there are ranks
+        text = scene(KINEMATICS[name], dimension, cloud, 'type = "verlet"\nend_time = 2.0\ntime_step = 0.05', cells=cells)
         holed = text.replace("[sets]", 'inside = "%s"\n[sets]\nlisted = { points = [70, 3, 500, 41] }' % hole[dimension])
         holed = holed.replace("history = [", 'history = [ { name = "few", set = "listed", quantity = "displacement", component = "x", reduce = "sum" },')
         if everything or name == "baqp":
-            yield kind + "hole", holed
+            if everything or not cloud:
+                yield kind + "hole", holed
             yield kind + "hole, regions and pre-crack", with_regions(holed, *regions[dimension]) + crack[dimension]
         pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
+        if cloud:  # before points are turned inside out
+            pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
         yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
+
+
+def points_file(work, dimension, binary):
+    """Jittered points in an order that is not that of the curve, as a file; what takes the place of the lattice in a scene."""
+    draw = random.Random(dimension)
+    cells = {1: (1200,), 2: (32, 38), 3: (14, 12, 11)}[dimension]
+    points = [[draw.uniform(0.9, 1.1)] + [k + 0.5 + draw.uniform(-0.2, 0.2) for k in cell] for cell in itertools.product(*map(range, cells))]
+    draw.shuffle(points)
+    columns = ["volume", "x", "y", "z"][:dimension + 1]
+    file = "%s/points_%d.%s" % (work, dimension, "h5" if binary else "csv")
+    os.makedirs(work, exist_ok=True)
+    if binary:
+        if os.path.exists(file):  # of another scene; h5import adds to files
+            os.remove(file)
+        command = ["h5import"]
+        for column, values in zip(columns, zip(*points)):
+            with open(file + "." + column, "w") as out:
+                out.write("\n".join(map(repr, values)))
+            command += [file + "." + column, "-d", str(len(values)), "-p", column, "-t", "TEXTFP", "-s", "64"]
+        subprocess.run(command + ["-o", file], check=True, capture_output=True)
+    else:
+        with open(file, "w") as out:
+            out.write(",".join(columns) + "\n")
+            out.writelines(",".join(map(repr, row)) + ("  # a line without points comes\n\n" if n % 9 == 0 else "\n") for n, row in enumerate(points))
+    return '[body.points]\nfile = "%s"\n' % file
+
+
+def on_points(text, table):
+    """The scene with points of a file in place of its lattice."""
+    begin, end = text.index("[body.lattice]"), text.index("[sets]")
+    return text[:begin] + table + text[end:]
+
+
+def other_clouds(everything, work):
+    """Clouds of files, and of cells that a surface cuts, of which each rank places its own part."""
+    brief = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.02'
+    for name in ("conventional", "baqp", "bond_based", "ordinary", "projection") if everything else ("bond_based",):
+        for dimension, binary in itertools.product((2, 3), (False, True)) if everything else ((2, True), (3, False)):
+            text = on_points(scene(KINEMATICS[name], dimension, True, brief), points_file(work, dimension, binary))
+            yield OWN_PART + "%s, %dD, %s file" % (name, dimension, "HDF5" if binary else "CSV"), text
+        if name in PAIRS:
+            text = on_points(torn(KINEMATICS[name], DAMAGE["critical_stretch"], True), points_file(work, 2, False))
+            yield OWN_PART + "%s, file, regions and failing bonds" % name, with_regions(text, "x > 11 && y > 7 && x < 21", "x - y > 17")
+    for name in ("conventional", "baqp", "bond_based", "ordinary", "projection") if everything else ("projection",):
+        text = scene(KINEMATICS[name], 2, False, brief, cells=[32, 38]).replace("[family]\n", "[family]\npartial_volume = true\n")
+        yield OWN_PART + "%s, cut cells" % name, text.replace("[sets]", "inside = \"(x - 14)^2 + (y - 18)^2 > 47 && x + 1.3*y > 6\"\n[sets]", 1)
+    if everything:
+        yield OWN_PART + "conventional, 1D, CSV file", on_points(scene(KINEMATICS["conventional"], 1, True, brief), points_file(work, 1, False))
 
 
 def long_interfaces(everything):
@@ -255,7 +311,7 @@ def carried(program, work, everything):
 def checkpoints(program, work, everything):
     """Whether runs leave the same checkpoints, byte for byte, where laws remember and bonds fail. What differs."""
     names = [name for name in KINEMATICS if name not in PAIRS and "order" not in name] if everything else ("baqp", "projection")
-    for name, cloud in itertools.product(names, (False, True) if everything else (False,)):
+    for name, cloud in itertools.product(names, (False, True)) if everything else zip(names, (False, True)):
         text = torn(KINEMATICS[name], DAMAGE["critical_stretch"], cloud, HYPOELASTIC).replace("frames = 3", "frames = 3\ncheckpoint_every = 50")
         text = with_inclusion(text)
         # Of the same name, for checkpoints hold their scenes.
@@ -311,7 +367,7 @@ def main():
     program, library, work, which = sys.argv[1:]
     need(library)
     failed, count = [], 0
-    for number, (name, text, ranks, threads) in enumerate(cases(which == "all")):
+    for number, (name, text, ranks, threads) in enumerate(cases(which == "all", work)):
         one = "%s/%d_one" % (work, number)
         done = run(program, text, one, 0)
         if done.returncode != 0:

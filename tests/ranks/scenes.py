@@ -19,7 +19,7 @@ def need(library):
     """Leaves with a clear word where runs on several ranks cannot be had or compared."""
     if not os.path.exists(library):
         skip("perikit was built without MPI (%s is not there)" % library)
-    for program in ("mpirun", "h5diff"):
+    for program in ("mpirun", "h5diff", "h5import"):
         if not shutil.which(program):
             skip("no %s on this machine" % program)
 

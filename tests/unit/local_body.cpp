@@ -1,4 +1,4 @@
-/// Parts of a lattice that ranks place by themselves are those that they cut out of the whole body, to the last number.
+/// Parts of a body that ranks place by themselves are those that they cut out of the whole body, to the last number.
 
 #include "build/local_body.hpp"
 
@@ -6,29 +6,41 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <mutex>
+#include <random>
 
+#include "body/block_colours.hpp"
 #include "body/input_numbers.hpp"
+#include "body/point_share.hpp"
+#include "files/hdf5_file.hpp"
 #include "perikit/build/body.hpp"
+#include "perikit/core/memory.hpp"
 #include "perikit/core/serial_communicator.hpp"
 #include "tests/thread_ranks.hpp"
 #include "unit/fake_catalogue.hpp"
+#include "unit/temporary_folder.hpp"
 
 using namespace perikit;
 using namespace perikit::test;
 
 namespace {
 
-std::string scene_text(int dimension, const std::string& upper, const std::string& inside, const std::string& sets) {
+/// keys: further ones of the lattice.
+/// A lattice from the origin to `upper`, with further keys.
+std::string lattice(int dimension, const std::string& upper, const std::string& inside, const std::string& keys = "") {
   const std::string lower = dimension == 3 ? "[0, 0, 0]" : dimension == 2 ? "[0, 0]" : "[0]";
+  return fmt::format("[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\n{}\n{}\n", lower, upper,
+                     inside.empty() ? "" : fmt::format("inside = \"{}\"", inside), keys);
+}
+
+std::string scene_text(int dimension, const std::string& body, const std::string& sets,
+                       const std::string& family = "horizon_ratio = 2.015") {
   return fmt::format(R"(format = 1
 [body]
 dimension = {}
 {}
-[body.lattice]
-spacing = 1.0
-lower = {}
-upper = {}
 {}
 [sets]
 {}
@@ -39,7 +51,7 @@ material = {{ type = "neo_hookean", shear_modulus = 2.0, bulk_modulus = 2.0 }}
 set = "some"
 material = {{ type = "neo_hookean", shear_modulus = 3.0, bulk_modulus = 2.0 }}
 [family]
-horizon_ratio = 2.015
+{}
 [kinematics]
 type = "baqp"
 [material]
@@ -53,7 +65,7 @@ type = "newton"
                      dimension == 2   ? "plane = \"strain\""
                      : dimension == 1 ? "line = \"strain\""
                                       : "",
-                     lower, upper, inside.empty() ? "" : fmt::format("inside = \"{}\"", inside), sets);
+                     body, sets, family);
 }
 
 /// Of each rank: expressions are evaluated by one thread at a time.
@@ -67,6 +79,24 @@ bool same(const A& a, const B& b) {
   return std::ranges::equal(a, b);
 }
 
+/// The colours that blocks have on one rank, by block of the whole body.
+std::vector<std::int32_t> colours_of_whole(const Body& whole) {
+  const std::size_t blocks = (whole.points() + cloud_block_points - 1) / cloud_block_points;
+  FreeColours free(blocks);
+  std::vector<std::int32_t> colours;
+  for (const std::vector<std::int32_t>& units : block_reach(whole, 0, blocks)) colours.push_back(free.next(std::span(units)));
+  return colours;
+}
+
+void compare_colours(const Body& part, const Body& whole) {
+  const std::vector<std::int32_t> expected = colours_of_whole(whole), &found = part.block_colours();
+  REQUIRE(found.size() == (part.points() + cloud_block_points - 1) / cloud_block_points);
+  bool right = true;
+  for (std::size_t b = 0; b < found.size(); ++b)
+    right = right && found[b] == expected[static_cast<std::size_t>(part.places().place[b * cloud_block_points]) / cloud_block_points];
+  CHECK(right);
+}
+
 void compare(const std::string& text, int ranks, const Partition::Reach& reach) {
   INFO(ranks, " ranks, ", reach.bonds, " bonds", std::string(reach.blocks ? ", whole blocks" : ""));
   std::mutex one;
@@ -76,11 +106,10 @@ void compare(const std::string& text, int ranks, const Partition::Reach& reach) 
     const Scene scene = parsed(text);
     Partition whole(build_body(scene), reach);
     const Body expected = whole.make_part(far);
-    std::optional<LocalBody> local = build_local_body(scene, reach, far);
+    const LocalBody local = build_local_body(scene, reach, far);
     const std::lock_guard lock(one);
-    REQUIRE(local);
-    const Body& found = local->body;
-    CHECK(local->partition->whole() == nullptr);
+    const Body& found = local.body;
+    CHECK(local.partition->whole() == nullptr);
     CHECK(same(found.internal(), expected.internal()));
     CHECK(found.stride() == expected.stride());
     CHECK(found.stride_of_all_ranks() == expected.stride_of_all_ranks());
@@ -91,18 +120,19 @@ void compare(const std::string& text, int ranks, const Partition::Reach& reach) 
     CHECK(same(found.places().place, expected.places().place));
     CHECK(found.sets() == expected.sets());
     for (const auto& [name, members] : found.sets()) CHECK(same(found.order_of(name), expected.order_of(name)));
-    CHECK(local->partition->points() == whole.points());
-    CHECK(local->partition->lent() == whole.lent());
-    CHECK(local->partition->borrowed() == whole.borrowed());
-    for (const std::int32_t index : found.internal()) {
+    CHECK(local.partition->points() == whole.points());
+    CHECK(local.partition->lent() == whole.lent());
+    CHECK(local.partition->borrowed() == whole.borrowed());
+    CHECK(found.spacing() == expected.spacing());
+    CHECK(found.horizon() == expected.horizon());
+    if (!found.lattice()) compare_colours(found, *whole.whole());
+    const bool same_points = std::ranges::all_of(found.internal(), [&](std::int32_t index) {
       const auto p = static_cast<std::size_t>(index);
-      REQUIRE(found.number(p) == expected.number(p));
-      REQUIRE(found.find(found.number(p)) == index);
-      REQUIRE(found.at_place(found.places().place[p]) == index);
-      REQUIRE(found.position(p) == expected.position(p));
-      REQUIRE(found.volume(p) == expected.volume(p));
-      REQUIRE(found.owns(p) == expected.owns(p));
-    }
+      return found.number(p) == expected.number(p) && found.find(found.number(p)) == index &&
+             found.at_place(found.places().place[p]) == index && found.position(p) == expected.position(p) &&
+             found.volume(p) == expected.volume(p) && found.owns(p) == expected.owns(p);
+    });
+    CHECK(same_points);
     points += std::ssize(found.owned());
     all = static_cast<std::int64_t>(found.points_of_all_ranks());
   });
@@ -128,7 +158,7 @@ TEST_CASE("local bodies: each rank's own part is that of the whole body") {
     INFO(shape.dimension, "D, to ", std::string(shape.upper), ", inside ", std::string(shape.inside));
     const std::string place = shape.dimension == 3 ? "[6, 7, 5]" : shape.dimension == 2 ? "[15.2, 21]" : "[115]";
     const std::string text = scene_text(
-        shape.dimension, shape.upper, shape.inside,
+        shape.dimension, lattice(shape.dimension, shape.upper, shape.inside),
         fmt::format(
             "low = \"x < 5.2\"\nsome = {{ nearest = {} }}\nlisted = {{ points = [90, 3, 250, 17] }}\nfew = {{ points = [2, 5] }}",
             place));
@@ -141,19 +171,222 @@ TEST_CASE("local bodies: what no point has is refused on all ranks, and so are i
   const auto on = [](int ranks, const std::string& text) {
     on_ranks(ranks, [&](ThreadRank&) { build_local_body(parsed(text), {}, 7); });
   };
-  CHECK_THROWS_WITH(on(3, scene_text(2, "[40, 30]", "", "low = \"x < 5\"\nsome = \"x > 50\"")),
+  CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", ""), "low = \"x < 5\"\nsome = \"x > 50\"")),
                     doctest::Contains("found a condition that holds at no point"));
-  CHECK_THROWS_WITH(on(3, scene_text(2, "[40, 30]", "x > 50", "low = \"x < 5\"\nsome = \"x > 9\"")),
+  CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", "x > 50"), "low = \"x < 5\"\nsome = \"x > 9\"")),
                     doctest::Contains("found an expression that keeps no point"));
-  CHECK_THROWS_WITH(on(3, scene_text(2, "[40, 30]", "", "low = \"x < 5\"\nsome = { points = [1200] }")),
+  CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", ""), "low = \"x < 5\"\nsome = { points = [1200] }")),
                     doctest::Contains("allowed: 0 to 1199"));
-  CHECK_THROWS_WITH(on(40, scene_text(1, "[200]", "", "low = \"x < 5\"\nsome = \"x > 9\"")),
+  CHECK_THROWS_WITH(on(40, scene_text(1, lattice(1, "[200]", ""), "low = \"x < 5\"\nsome = \"x > 9\"")),
                     doctest::Contains("found 40 ranks for a body of 200 points"));
 }
 
-TEST_CASE("local bodies: a lattice that is almost empty is a cloud, which no rank places in part") {
-  on_ranks(2, [&](ThreadRank&) {
-    CHECK_FALSE(build_local_body(parsed(scene_text(2, "[60, 60]", "x + y < 20", "low = \"x < 5\"\nsome = \"x > 6\"")), {}, 7));
+namespace {
+
+constexpr const char* cloud_sets =
+    "low = \"x < 5.2\"\nsome = {{ nearest = {} }}\nlisted = {{ points = [90, 3, 250, 17] }}\nfew = {{ points = [2, 5] }}";
+
+/// On 2, 3 and 5 ranks with all reaches.
+void compare_all(const std::string& text) {
+  for (const int ranks : {2, 3, 5})
+    for (const Partition::Reach& reach : {Partition::Reach{2, false}, {3, false}, {2, true}, {3, true}})
+      compare(text, ranks, reach);
+}
+
+}  // namespace
+
+TEST_CASE("local bodies: clouds made from lattices are those of the whole body") {
+  struct Shape {
+    int dimension;
+    const char *upper, *inside, *keys, *place;
+  };
+  for (const Shape& shape :
+       {Shape{1, "[2000]", "", "jitter = 0.3", "[115]"},
+        {1, "[3000]", "x < 100 || x > 130", "jitter = 0.2\nseed = 7", "[115]"},
+        {2, "[61, 53]", "", "jitter = 0.4", "[15.2, 21]"},
+        {2, "[51, 67]", "(x - 14)^2 + (y - 20)^2 > 40 && x + y > 9", "jitter = 0.2", "[15, 21]"},
+        {2, "[300, 300]", "(x - 150)^2 + (y - 150)^2 > 147^2 && x + y < 420", "", "[3.5, 3.5]"},  // almost empty
+        {3, "[16, 14, 12]", "", "jitter = 0.1", "[6, 7, 5]"},
+        {3, "[12, 19, 26]", "(x - 6)^2 + (y - 9)^2 + (z - 9)^2 > 20", "jitter = 0.3", "[6, 7, 5]"}}) {
+    INFO(shape.dimension, "D, to ", std::string(shape.upper), ", inside ", std::string(shape.inside), ", ",
+         std::string(shape.keys));
+    compare_all(scene_text(shape.dimension, lattice(shape.dimension, shape.upper, shape.inside, shape.keys),
+                           fmt::format(fmt::runtime(cloud_sets), shape.place)));
+  }
+}
+
+TEST_CASE("local bodies: cells that a surface cuts are those of the whole body") {
+  struct Shape {
+    int dimension;
+    const char *upper, *inside, *place;
+  };
+  for (const Shape& shape : {Shape{1, "[2000]", "x < 1700.3 && x > 2.6", "[115]"},
+                             {2, "[61, 53]", "(x - 14)^2 + (y - 20)^2 > 47 && x + 1.3*y > 9", "[15.2, 21]"},
+                             {3, "[14, 15, 16]", "(x - 7)^2 + (y - 7)^2 + (z - 7)^2 < 45", "[6, 7, 5]"}}) {
+    INFO(shape.dimension, "D, inside ", std::string(shape.inside));
+    compare_all(scene_text(shape.dimension, lattice(shape.dimension, shape.upper, shape.inside),
+                           fmt::format(fmt::runtime(cloud_sets), shape.place), "horizon_ratio = 2.015\npartial_volume = true"));
+  }
+}
+
+namespace {
+
+/// Points at random places of a box, which are not far from being evenly spread.
+PointCloud random_points(std::size_t count, const Point& size, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto number = [&] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
+  PointCloud cloud;
+  for (std::size_t n = 0; n < count; ++n) {
+    cloud.position.push_back({size[0] * number(), size[1] * number(), size[2] * number()});
+    cloud.volume.push_back(0.5 + number());
+  }
+  return cloud;
+}
+
+std::string csv(const PointCloud& cloud, int dimension) {
+  std::string text =
+      "\xEF\xBB\xBF# points\n\n" + std::string("volume,x,y,z").substr(0, 6 + 2 * static_cast<std::size_t>(dimension)) + "\r\n";
+  for (std::size_t n = 0; n < cloud.volume.size(); ++n) {
+    text += fmt::format("{}", cloud.volume[n]);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) text += fmt::format(", {}", cloud.position[n][c]);
+    text += n % 7 == 0 ? "  # and so on, which is longer than other lines\r\n\n" : "\n";
+  }
+  text.pop_back();
+  return text;
+}
+
+void write_hdf5(const std::filesystem::path& file, const PointCloud& cloud, int dimension) {
+  hdf5::StoredFile out(file);
+  out.dataset("volume", cloud.volume);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) {
+    std::vector<double> values;
+    for (const Point& x : cloud.position) values.push_back(x[c]);
+    // Of any shape.
+    out.dataset(std::string(1, "xyz"[c]), values, c == 1 ? 2 : 1);
+  }
+  out.keep();
+}
+
+std::string file_body(const std::filesystem::path& file) {
+  return fmt::format("[body.points]\nfile = \"{}\"\n", file.string());
+}
+
+}  // namespace
+
+TEST_CASE("local bodies: clouds of files are those of the whole body, in whatever format") {
+  const TemporaryFolder folder;
+  for (const int dimension : {1, 2, 3}) {
+    const Point size = dimension == 1 ? Point{3000, 0, 0} : dimension == 2 ? Point{60, 50, 0} : Point{16, 14, 12};
+    const PointCloud cloud = random_points(dimension == 2 ? 3000 : 2800, size, 3);
+    std::ofstream(folder.path / "cloud.csv", std::ios::binary) << csv(cloud, dimension);
+    write_hdf5(folder.path / "cloud.h5", cloud, dimension);
+    const std::string sets = fmt::format(fmt::runtime(cloud_sets), dimension == 3   ? "[6, 7, 5]"
+                                                                   : dimension == 2 ? "[15.2, 21]"
+                                                                                    : "[115]");
+    for (const char* name : {"cloud.csv", "cloud.h5"}) {
+      INFO(dimension, "D, ", std::string(name));
+      compare_all(scene_text(dimension, file_body(folder.path / name), sets));
+    }
+  }
+}
+
+TEST_CASE("local bodies: clouds of odd shapes are those of the whole body") {
+  const TemporaryFolder folder;
+  const auto compare_points = [&](const std::string& what, const PointCloud& cloud, const std::string& family) {
+    INFO(what);
+    std::ofstream(folder.path / "odd.csv") << csv(cloud, 3);
+    compare_all(scene_text(3, file_body(folder.path / "odd.csv"), "low = { points = [5, 3, 900] }\nsome = \"x > 0.5\"", family));
+  };
+  PointCloud cloud = random_points(1500, {12, 12, 12}, 5);
+  compare_points("one cube of the curve, of which all ranks have a piece", cloud, "horizon = 40");
+  compare_points("more cubes than points", cloud, "horizon = 1.3");
+  for (Point& x : cloud.position) x[2] = 3;
+  compare_points("all in one plane", cloud, "horizon = 2");
+  cloud = random_points(1500, {12, 12, 12}, 6);
+  cloud.position[700] = {1e9, -3e7, 1e8};
+  cloud.position[900] = {-1e5, 0, 0};
+  compare_points("points far away", cloud, "horizon = 2");
+  // Bonds exactly as long as the horizon, and cubes whose faces points lie on.
+  for (std::size_t n = 0; n < cloud.position.size(); ++n)
+    cloud.position[n] = {0.1 * static_cast<double>(n % 10), 0.1 * static_cast<double>(n / 10 % 15),
+                         0.1 * static_cast<double>(n / 150)};
+  for (double& volume : cloud.volume) volume = 1e-3;
+  compare_points("a lattice by hand", cloud, "horizon = 0.2");
+}
+
+TEST_CASE("local bodies: what is wrong with a file is said as on one rank, by all ranks") {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path / "wrong.csv", other = folder.path / "wrong.h5";
+  const auto message = [](const std::filesystem::path& from, int ranks) {
+    std::mutex one;
+    std::vector<std::string> said;
+    on_ranks(ranks, [&](ThreadRank&) {
+      std::string what;
+      try {
+        ranks == 1 ? read_points(from, 3) : read_run_of_points(from, 3);
+      } catch (const InputError& error) {
+        what = error.what();
+      }
+      const std::lock_guard lock(one);
+      said.push_back(what);
+    });
+    for (const std::string& what : said) CHECK(what == said.front());
+    return said.front();
+  };
+  const auto same_for_ranks = [&](const std::filesystem::path& from) {
+    const std::string expected = message(from, 1);
+    CHECK_FALSE(expected.empty());
+    for (const int ranks : {2, 3, 7}) CHECK(message(from, ranks) == expected);
+  };
+  const PointCloud cloud = random_points(300, {10, 10, 10}, 2);
+  const std::string right = csv(cloud, 3);
+  for (const std::string& wrong :
+       {right + "\n1,2,3\n", right + "\n1,2,3,4,5\n", right + "\n-1,2,3,4\n", std::string("x,y,z\n1,2,3\n"),
+        std::string("x,y,z,volume\n"), std::string(), std::string("# nothing\n\n"), std::string("x,y,z,volum\n"),
+        right + "\n1,2,3,inf\n" + right, std::string(right).replace(right.size() / 2, 1, "?"),
+        std::string(right).replace(right.size() / 5, 1, ","), std::string("x,y,z,volume\n1,1,1,1,1")}) {
+    std::ofstream(file, std::ios::binary) << wrong;
+    same_for_ranks(file);
+  }
+  same_for_ranks(folder.path / "none.csv");
+  PointCloud spoiled = cloud;
+  spoiled.volume[290] = 0;
+  spoiled.position[170][1] = std::nan("");
+  write_hdf5(other, spoiled, 3);
+  same_for_ranks(other);
+  write_hdf5(other, cloud, 2);
+  same_for_ranks(other);
+}
+
+TEST_CASE("local bodies: clouds of no point, and of too few for the ranks, are refused on all ranks") {
+  const auto on = [](int ranks, const std::string& text) {
+    on_ranks(ranks, [&](ThreadRank&) { build_local_body(parsed(text), {}, 7); });
+  };
+  const std::string sets = "low = \"x < 5\"\nsome = \"x > 9\"";
+  CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", "x > 50", "jitter = 0.1"), sets)),
+                    doctest::Contains("found an expression that keeps no point"));
+  CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", "x > 50"), sets, "horizon_ratio = 2\npartial_volume = true")),
+                    doctest::Contains("found an expression that keeps no cell"));
+  CHECK_THROWS_WITH(on(6, scene_text(2, lattice(2, "[40, 30]", "", "jitter = 0.1"), sets)),
+                    doctest::Contains("found 6 ranks for a body of 1200 points"));
+  CHECK_THROWS_WITH(on(7, scene_text(1, lattice(1, "[3]", "", "jitter = 0.1"), sets)),
+                    doctest::Contains("found 7 ranks for a body of 3 points"));
+}
+
+TEST_CASE("local bodies: a rank without others has the points that it has among them") {
+  const std::string text = scene_text(3, lattice(3, "[16, 14, 12]", "", "jitter = 0.2"), "low = \"x < 5\"\nsome = \"x > 9\"");
+  std::mutex one;
+  on_ranks(3, [&](ThreadRank& rank) {
+    const Scene scene = parsed(text);
+    const LocalBody among = build_local_body(scene, {3, true}, 7);
+    LoneRank lone(rank.rank(), 3);
+    const CommunicatorScope scope(lone);
+    const LocalBody alone = build_local_body(scene, {3, true}, 7);
+    const std::lock_guard lock(one);
+    CHECK(same(alone.body.places().place, among.body.places().place));
+    CHECK(same(alone.body.owned(), among.body.owned()));
+    CHECK(same(alone.body.material_ids(), among.body.material_ids()));
+    CHECK(alone.partition->points() == among.partition->points());
   });
 }
 
@@ -165,16 +398,15 @@ const std::string large = "[1300, 1300, 1300]", sets = "low = \"x < 5\"\nsome = 
 }  // namespace
 
 TEST_CASE("local bodies: more points than 32 bits can number are refused on one rank, and placed in part") {
-  const Scene scene = parsed(scene_text(3, large, "", sets));
+  const Scene scene = parsed(scene_text(3, lattice(3, large, ""), sets));
   CHECK_FALSE(one_rank_holds(scene));
-  CHECK(one_rank_holds(parsed(scene_text(3, "[100, 100, 100]", "", sets))));
-  CHECK_THROWS_WITH(build_body(scene), doctest::Contains("on a rank; explicit runs of a lattice share it out"));
+  CHECK(one_rank_holds(parsed(scene_text(3, lattice(3, "[100, 100, 100]", ""), sets))));
+  CHECK_THROWS_WITH(build_body(scene), doctest::Contains("on a rank; explicit runs share it out"));
   constexpr int ranks = 8192;
   LoneRank last(ranks - 1, ranks);
   const CommunicatorScope scope(last);
-  std::optional<LocalBody> local = build_local_body(scene, {}, 7);
-  REQUIRE(local);
-  const Body& body = local->body;
+  const LocalBody local = build_local_body(scene, {}, 7);
+  const Body& body = local.body;
   CHECK(body.points_of_all_ranks() == static_cast<std::size_t>(side * side * side));
   const auto p = static_cast<std::size_t>(body.owned().back());
   CHECK(body.position(p) == Point{side - 0.5, side - 0.5, side - 0.5});
@@ -183,11 +415,24 @@ TEST_CASE("local bodies: more points than 32 bits can number are refused on one 
   CHECK(heaviest_rank(scene, ranks) >= 0);
 }
 
+TEST_CASE("local bodies: a rank without others refuses a cloud whose points it cannot put in order") {
+  const Scene scene = parsed(scene_text(3, lattice(3, large, "", "jitter = 0.1"), sets));
+  const double bytes = 130.0 * side * side * side;
+  if (memory_limit() > bytes) return;
+  CHECK_FALSE(one_rank_holds(scene));
+  constexpr int ranks = 8192;
+  const int rank = heaviest_rank(scene, ranks);
+  CHECK(rank == ranks / 2);
+  LoneRank lone(rank, ranks);
+  const CommunicatorScope scope(lone);
+  CHECK_THROWS_WITH(build_local_body(scene, {}, 7), doctest::Contains("where one process shares out a cloud for all ranks"));
+}
+
 TEST_CASE("local bodies: a part that is too large is refused, and so are more points than ranks can name") {
   LoneRank first(0, 2);
   const CommunicatorScope scope(first);
   const auto refused = [](const std::string& upper) {
-    const Scene scene = parsed(scene_text(3, upper, "", sets));
+    const Scene scene = parsed(scene_text(3, lattice(3, upper, ""), sets));
     try {
       build_local_body(scene, {}, 7);
     } catch (const InputError& error) {
@@ -197,7 +442,7 @@ TEST_CASE("local bodies: a part that is too large is refused, and so are more po
   };
   CHECK(refused("[100000, 10000, 10000]").find("points on a rank with a horizon of 2.015 spacings, which need") !=
         std::string::npos);
-  CHECK_THROWS_WITH(parsed(scene_text(3, "[1e6, 1e6, 1e6]", "", sets)),
+  CHECK_THROWS_WITH(parsed(scene_text(3, lattice(3, "[1e6, 1e6, 1e6]", ""), sets)),
                     doctest::Contains("allowed: a spacing that gives 1 to 4e+15 points"));
 }
 

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <stdexcept>
 
+#include "body/curve.hpp"
 #include "perikit/body/images.hpp"
 
 namespace perikit {
@@ -26,8 +28,7 @@ Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
     : frame_(whole.frame_),
       margin_(whole.margin_),
       points_of_all_ranks_(whole.points_of_all_ranks_),
-      stride_of_whole_(whole.stride_),
-      colours_(part.colours) {
+      stride_of_whole_(whole.stride_) {
   const auto role = [&](std::int64_t number) { return part.roles[static_cast<std::size_t>(number)]; };
   for (std::size_t n = 0; n < whole.points(); ++n)
     if (part.roles[n] != Role::absent) numbers_.push_back(static_cast<std::int64_t>(n));
@@ -92,10 +93,35 @@ Body::Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_
   }
   number_lattice(lattice, std::pow(frame_.spacing, dimension()) * frame_.section);
   keep_places(part.places, part.roles);
+  keep_far_material(part.roles, far_material);
+}
+
+Body::Body(BodyFrame frame, CloudPart part, std::uint16_t far_material)
+    : frame_(std::move(frame)),
+      stride_(padded(part.places.size())),
+      positions_(std::move(part.rows)),
+      points_of_all_ranks_(static_cast<std::size_t>(part.points_of_all_ranks)),
+      stride_of_whole_(padded(points_of_all_ranks_)) {
+  internal_.resize(part.places.size());
+  std::iota(internal_.begin(), internal_.end(), 0);
+  const auto by_point = [](const auto& values) { return [&](std::int32_t p) { return values[static_cast<std::size_t>(p)]; }; };
+  std::ranges::sort(internal_, {}, by_point(part.numbers));
+  std::vector<std::int64_t> places;
+  std::vector<Role> roles;
+  std::ranges::transform(internal_, std::back_inserter(numbers_), by_point(part.numbers));
+  std::ranges::transform(internal_, std::back_inserter(places), by_point(part.places));
+  std::ranges::transform(internal_, std::back_inserter(roles), by_point(part.roles));
+  number_cloud();
+  keep_places(places, roles);
+  keep_far_material(roles, far_material);
+}
+
+/// Of a part without materials, by its own input numbers; also which points it owns.
+void Body::keep_far_material(const std::vector<Role>& roles, std::uint16_t far_material) {
   material_ids_.assign(stride_, 0);
   for (std::size_t n = 0; n < internal_.size(); ++n) {
-    if (part.roles[n] == Role::own) owned_.push_back(internal_[n]);
-    if (part.roles[n] == Role::far) material_ids_[static_cast<std::size_t>(internal_[n])] = far_material;
+    if (roles[n] == Role::own) owned_.push_back(internal_[n]);
+    if (roles[n] == Role::far) material_ids_[static_cast<std::size_t>(internal_[n])] = far_material;
   }
 }
 
@@ -227,7 +253,7 @@ void Body::number_lattice(const Lattice& lattice, double volume) {
 }
 
 void Body::place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes) {
-  const std::vector<std::int32_t> order = morton_order(positions, frame_.horizon);
+  const std::vector<std::int32_t> order = curve_order(positions, frame_.horizon);
   stride_ = padded(positions.size());
   internal_.resize(positions.size());
   positions_.assign(4 * stride_, 0.0);

@@ -196,18 +196,19 @@ std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_
   return reached;
 }
 
-std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points) {
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t first, std::size_t last) {
   const std::span<const double> rows = body.rows();
   const std::size_t points = body.points();
   const CellList cells(rows, points, body.dimension(), body.horizon());
   const double limit = body.horizon() * (1 + 1e-10);
-  std::vector<std::vector<std::int32_t>> touches((points + block_points - 1) / block_points);
-  parallel_for(touches.size(), [&](std::size_t b) {
-    std::vector<std::int32_t>& units = touches[b];
+  std::vector<std::vector<std::int32_t>> touches(last - first);
+  parallel_for(touches.size(), [&](std::size_t k) {
+    const std::size_t b = first + k;
+    std::vector<std::int32_t>& units = touches[k];
     units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p)
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p)
       cells.around(&rows[4 * p], [&](std::int32_t q) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / block_points);
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / cloud_block_points);
         if (unit == units.back() || std::ranges::find(units, unit) != units.end()) return;
         if (squared_distance(rows, p, static_cast<std::size_t>(q)) > limit * limit) return;
         if (!body.cut(body.position(p), body.position(static_cast<std::size_t>(q)))) units.push_back(unit);
@@ -215,40 +216,6 @@ std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t
     std::sort(units.begin(), units.end());
   });
   return touches;
-}
-
-std::vector<std::int32_t> block_colours(const std::vector<std::vector<std::int32_t>>& touches, std::size_t units) {
-  std::vector<std::int32_t> colours;
-  std::vector<std::vector<bool>> used;  // by colour and unit
-  for (const std::vector<std::int32_t>& of_block : touches) {
-    const auto free = std::ranges::find_if(used, [&](const std::vector<bool>& taken) {
-      return std::ranges::none_of(of_block, [&](std::int32_t unit) { return taken[static_cast<std::size_t>(unit)]; });
-    });
-    const std::size_t colour = static_cast<std::size_t>(free - used.begin());
-    if (free == used.end()) used.emplace_back(units, false);
-    for (const std::int32_t unit : of_block) used[colour][static_cast<std::size_t>(unit)] = true;
-    colours.push_back(static_cast<std::int32_t>(colour));
-  }
-  return colours;
-}
-
-std::vector<std::int32_t> morton_order(const std::vector<Point>& positions, double cell) {
-  Point lower = positions.front();
-  for (const Point& x : positions)
-    for (std::size_t c = 0; c < 3; ++c) lower[c] = std::min(lower[c], x[c]);
-  std::vector<std::pair<std::uint64_t, std::int32_t>> keys(positions.size());
-  for (std::size_t p = 0; p < positions.size(); ++p) {
-    std::uint64_t key = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto k = static_cast<std::uint64_t>(std::min((positions[p][c] - lower[c]) / cell, 2097151.0));
-      for (int bit = 0; bit < 21; ++bit) key |= (k >> bit & 1u) << (3 * bit + static_cast<int>(c));
-    }
-    keys[p] = {key, static_cast<std::int32_t>(p)};
-  }
-  std::sort(keys.begin(), keys.end());
-  std::vector<std::int32_t> order(positions.size());
-  std::transform(keys.begin(), keys.end(), order.begin(), [](const auto& k) { return k.second; });
-  return order;
 }
 
 }  // namespace perikit

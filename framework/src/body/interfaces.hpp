@@ -41,22 +41,11 @@ struct Interfaces {
 Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
                            double reach);
 
-/// Points of a lattice around a rank's part of it, near which materials meet: all within `surroundings` of the part that have a
-/// point of another material in their family.
-struct MeetingPoints {
-  // By point, in input order.
-  std::vector<std::int64_t> place;  ///< in the whole lattice
-  std::vector<std::uint16_t> material;
-  std::vector<std::uint8_t> own;  ///< whether the rank owns it
-};
-/// How far from a part such points matter [m].
-double surroundings(const Body& part, double reach);
-/// The same of a lattice that no rank has as a whole. material: of the points of the part, by its input numbers. All ranks must
-/// call it; each of them knows which materials meet anywhere.
-Interfaces find_interfaces(const Body& part, const Lattice& whole, std::span<const std::uint16_t> material,
-                           const MeetingPoints& meeting, double reach);
+/// The same of a body that no rank has as a whole. material: of the points of the part, also of far ones, by its input numbers.
+/// All ranks must call it; each of them knows which materials meet anywhere.
+Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach);
 
-/// The same on a rank's part of the body.
+/// The same on a rank's part of a body that it has as a whole.
 Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known);
 
 }  // namespace perikit

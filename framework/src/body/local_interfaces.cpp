@@ -1,4 +1,4 @@
-/// Interfaces of a lattice that no rank has as a whole.
+/// Interfaces of a body that no rank has as a whole.
 
 #include <algorithm>
 #include <tuple>
@@ -42,17 +42,9 @@ std::vector<Meeting> meetings_of_all(std::span<const Crossing> own) {
   return told_to_all(all);
 }
 
-/// The box around the points of a part.
+/// A box around points.
 struct Bounds {
-  Point low, high;
-  explicit Bounds(const Body& body) : low(body.position(static_cast<std::size_t>(body.internal().front()))), high(low) {
-    for (const std::int32_t p : body.internal())
-      for (std::size_t a = 0; a < 3; ++a) {
-        const double x = body.position(static_cast<std::size_t>(p))[a];
-        low[a] = std::min(low[a], x);
-        high[a] = std::max(high[a], x);
-      }
-  }
+  Point low{}, high{};
   bool near(const Point& x, double distance) const noexcept {
     for (std::size_t a = 0; a < 3; ++a)
       if (x[a] < low[a] - distance || x[a] > high[a] + distance) return false;
@@ -60,30 +52,86 @@ struct Bounds {
   }
 };
 
+Bounds bounds_of(const Body& body) {
+  const Point first = body.position(static_cast<std::size_t>(body.internal().front()));
+  Bounds bounds{first, first};
+  for (const std::int32_t p : body.internal())
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double x = body.position(static_cast<std::size_t>(p))[a];
+      bounds.low[a] = std::min(bounds.low[a], x);
+      bounds.high[a] = std::max(bounds.high[a], x);
+    }
+  return bounds;
+}
+
 /// What distances up to `reach` depend on: crossings a bond farther, and of each the midpoints in the window of its plane.
 double reach_of_midpoints(const Body& part, double reach) {
   return reach + 4.1 * part.horizon();
 }
 
-}  // namespace
-
+/// How far from a part points matter: the ends of bonds to these midpoints, and what may be nearer to them.
 double surroundings(const Body& part, double reach) {
-  // The ends of bonds to these midpoints, and what may be nearer to them.
   return reach_of_midpoints(part, reach) + 1.6 * part.horizon();
 }
 
-Interfaces find_interfaces(const Body& part, const Lattice& whole, std::span<const std::uint16_t> material,
-                           const MeetingPoints& meeting, double reach) {
+/// A point near which materials meet: one that has a point of another material in its family, or nearly so.
+struct MeetingPoint {
+  Point x;
+  std::int64_t place, number;  ///< in the whole body
+  std::int64_t material;
+};
+
+/// Those of the rank.
+std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const std::uint16_t> material, const Boxes& boxes) {
+  std::vector<MeetingPoint> meeting;
+  const std::vector<std::uint8_t> differing = boxes.differing(material);
+  for (std::size_t n = 0; n < differing.size(); ++n) {
+    const auto p = static_cast<std::size_t>(part.internal()[n]);
+    if (differing[n] && part.owns(p)) meeting.push_back({boxes.place(n), part.places().place[p], part.number(p), material[n]});
+  }
+  return meeting;
+}
+
+/// Those of all ranks that matter to this one, in input order.
+std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, const Bounds& bounds,
+                                         double reach) {
   std::vector<Point> places;
-  for (const std::int64_t place : meeting.place) places.push_back(whole.position(place));
-  const Boxes boxes(std::move(places), part.horizon() * (1 + 1e-9));
-  std::vector<Crossing> crossings = find_crossings(part.horizon(), boxes, meeting.material);
+  for (const std::int32_t p : part.internal()) places.push_back(part.position(static_cast<std::size_t>(p)));
+  const std::vector<MeetingPoint> own = own_meeting_points(part, material, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
+  const double far = surroundings(part, reach);
+  std::vector<Bounds> of_ranks = told_to_all(gathered<Bounds>({&bounds, 1}));
+  of_ranks.resize(static_cast<std::size_t>(communicator().size()), bounds);
+  std::vector<std::vector<MeetingPoint>> to(of_ranks.size());
+  for (std::size_t r = 0; r < to.size(); ++r)
+    std::ranges::copy_if(own, std::back_inserter(to[r]),
+                         [&](const MeetingPoint& point) { return of_ranks[r].near(point.x, far); });
+  std::vector<MeetingPoint> all;
+  for (const std::vector<MeetingPoint>& of_rank : exchanged(to)) all.insert(all.end(), of_rank.begin(), of_rank.end());
+  std::ranges::sort(all, {}, &MeetingPoint::number);
+  return all;
+}
+
+}  // namespace
+
+Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach) {
+  const Bounds bounds = bounds_of(part);
+  const std::vector<MeetingPoint> meeting = meeting_points(part, material, bounds, reach);
+  std::vector<Point> places;
+  std::vector<std::uint16_t> of_meeting;
+  for (const MeetingPoint& point : meeting) {
+    places.push_back(point.x);
+    of_meeting.push_back(static_cast<std::uint16_t>(point.material));
+  }
+  std::vector<Crossing> crossings =
+      find_crossings(part.horizon(), Boxes(std::move(places), part.horizon() * (1 + 1e-9)), of_meeting);
   // Farther ones may not be what they are in the whole body.
-  const Bounds bounds(part);
   std::erase_if(crossings, [&](const Crossing& c) { return !bounds.near(c.middle, reach_of_midpoints(part, reach)); });
+  const auto here = [&](std::int32_t point) { return part.at_place(meeting[static_cast<std::size_t>(point)].place); };
   std::vector<Crossing> own;
-  std::ranges::copy_if(crossings, std::back_inserter(own),
-                       [&](const Crossing& c) { return meeting.own[static_cast<std::size_t>(c.of_first)] != 0; });
+  std::ranges::copy_if(crossings, std::back_inserter(own), [&](const Crossing& c) {
+    const std::int32_t p = here(c.of_first);
+    return p >= 0 && part.owns(static_cast<std::size_t>(p));
+  });
   Interfaces found;
   const std::vector<Meeting> all = meetings_of_all(own);
   if (all.empty()) return found;
@@ -117,7 +165,7 @@ Interfaces find_interfaces(const Body& part, const Lattice& whole, std::span<con
     for (const auto& [p, n] : near) {
       interface.point.push_back(p);
       interface.distance.push_back(distance[n].value);
-      interface.counterpart.push_back(part.at_place(meeting.place[static_cast<std::size_t>(distance[n].counterpart)]));
+      interface.counterpart.push_back(here(distance[n].counterpart));
     }
   }
   return found;

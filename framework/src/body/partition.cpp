@@ -9,9 +9,11 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "body/block_colours.hpp"
 #include "body/cell_mask.hpp"
+#include "body/curve.hpp"
 #include "body/lattice_shares.hpp"
-#include "perikit/core/communicator.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -19,18 +21,16 @@ namespace {
 
 using Cells = std::array<std::int64_t, 3>;
 
-/// Sizes of the blocks of points that loops over clouds run over; the first is a multiple of the others.
-constexpr std::size_t cloud_blocks[] = {64, 32};
-
-}  // namespace
-
-namespace {
-
 std::size_t count_of_ranks() {
   const int size = communicator().size();
   constexpr int most = std::numeric_limits<std::uint16_t>::max();
   if (size > most) throw std::domain_error(fmt::format("found {} ranks; allowed: {} of them", size, most));
   return static_cast<std::size_t>(size);
+}
+
+/// The pieces of the whole cloud; padding makes no further block.
+CurveShares pieces_of(const Body& part) {
+  return {static_cast<std::int64_t>(part.stride_of_all_ranks()), communicator().size()};
 }
 
 }  // namespace
@@ -64,16 +64,21 @@ void Partition::refuse_idle(std::size_t real) const {
 Body Partition::make_part(std::uint16_t far_material) {
   if (whole_) {
     const BodyPart part = std::move(part_);
-    Body body(*whole_, part, far_material);
-    exchange_borders(body);
-    owner_ = {};
-    return body;
+    return finished(Body(*whole_, part, far_material));
   }
-  Body body(std::move(frame_), lattice_, std::move(lattice_part_), far_material);
-  exchange_borders(body);
+  if (!cloud_part_.places.empty()) return finished(Body(std::move(frame_), std::move(cloud_part_), far_material));
+  Body body = finished(Body(std::move(frame_), lattice_, std::move(lattice_part_), far_material));
   exchange_numbers(body);
-  owner_ = {};
   return body;
+}
+
+/// What ranks have to tell each other of the parts that they have placed.
+Body Partition::finished(Body part) {
+  exchange_borders(part);
+  owner_ = {};
+  if (part.lattice()) return part;
+  colour_blocks(pieces_of(part), part);
+  return part;
 }
 
 void Partition::share_lattice(int size) {
@@ -86,13 +91,9 @@ void Partition::share_lattice(int size) {
     owner_[n] = static_cast<std::uint16_t>(shares.owner(lattice.cell(whole_->internal()[n])));
 }
 
-/// Pieces of the curve that orders the points.
 void Partition::share_cloud(int size) {
-  const std::size_t block = cloud_blocks[0], blocks = (whole_->points() + block - 1) / block;
-  for (std::size_t n = 0; n < owner_.size(); ++n) {
-    const std::size_t b = static_cast<std::size_t>(whole_->internal()[n]) / block;
-    owner_[n] = static_cast<std::uint16_t>(b * static_cast<std::size_t>(size) / blocks);
-  }
+  const CurveShares pieces(static_cast<std::int64_t>(whole_->points()), size);
+  for (std::size_t n = 0; n < owner_.size(); ++n) owner_[n] = static_cast<std::uint16_t>(pieces.owner(whole_->internal()[n]));
 }
 
 template <class Visit>
@@ -160,19 +161,12 @@ void Partition::keep_families(const Reach& reach) {
     for (std::size_t n = 0; n < points; ++n)
       if (at(n)) part_.roles[n] = std::max(part_.roles[n], role);
   };
-  const auto fill_blocks = [&] {
-    for (std::size_t b = 0; b < points; b += cloud_blocks[0]) {
-      const auto begin = reached.begin() + static_cast<std::ptrdiff_t>(b),
-                 end = reached.begin() + static_cast<std::ptrdiff_t>(std::min(points, b + cloud_blocks[0]));
-      if (std::find(begin, end, 1) != end) std::fill(begin, end, std::uint8_t{1});
-    }
-  };
   const auto step = [&] {
     reached = with_families(whole_->rows(), points, whole_->dimension(), whole_->horizon(), std::move(reached));
   };
   for (std::size_t n = 0; n < points; ++n) at(n) = part_.roles[n] >= Role::image;
   for (int k = 1; k < reach.bonds; ++k) step();
-  if (reach.blocks) fill_blocks();
+  if (reach.blocks) fill_blocks(reached);
   // Of images that are there, the sources are, too.
   bool more = false;
   const auto add_sources = [&] {
@@ -187,16 +181,17 @@ void Partition::keep_families(const Reach& reach) {
   mark(Role::near);
   step();
   do {
-    fill_blocks();
+    fill_blocks(reached);
     add_sources();
   } while (more);
   mark(Role::far);
-  for (const std::size_t block : cloud_blocks) {
-    const auto touches = block_reach(*whole_, block);
-    const std::vector<std::int32_t> colours = block_colours(touches, touches.size());
-    for (std::size_t b = 0; b < colours.size(); ++b)
-      if (reached[b * block]) part_.colours[block].push_back(colours[b]);
-  }
+}
+
+std::size_t Partition::owner(const Body& part, std::int32_t p) const {
+  const auto at = static_cast<std::size_t>(p);
+  if (whole_) return owner_[static_cast<std::size_t>(part.number(at))];
+  if (part.lattice()) return owner_[static_cast<std::size_t>(part.input_of(at))];
+  return static_cast<std::size_t>(pieces_of(part).owner(part.places().place[at]));
 }
 
 /// Each rank tells the owners of its ghosts which they are, by their places in the whole body.
@@ -205,46 +200,27 @@ void Partition::exchange_borders(const Body& part) {
   const auto me = static_cast<std::size_t>(communicator().rank());
   lent_.resize(size);
   borrowed_.resize(size);
-  std::vector<std::vector<double>> to(size), from(size);
-  for (std::size_t n = 0; n < part.points(); ++n) {
-    const std::int32_t p = part.internal()[n];
-    const auto number = static_cast<std::size_t>(part.number(static_cast<std::size_t>(p)));
-    const std::size_t owner = owner_[whole_ ? number : n];
-    if (owner == me) continue;
-    borrowed_[owner].push_back(p);
-    to[owner].push_back(static_cast<double>(part.places().place[static_cast<std::size_t>(p)]));
+  std::vector<std::vector<std::int64_t>> places(size);
+  for (const std::int32_t p : part.internal()) {
+    const std::size_t of = owner(part, p);
+    if (of == me) continue;
+    borrowed_[of].push_back(p);
+    places[of].push_back(part.places().place[static_cast<std::size_t>(p)]);
   }
-  std::vector<double> asked(size), wanted(size);
-  for (std::size_t k = 0; k < size; ++k) asked[k] = static_cast<double>(to[k].size());
-  std::vector<Message> messages;
+  const std::vector<std::vector<std::int64_t>> wanted = exchanged(places);
   for (std::size_t k = 0; k < size; ++k)
-    if (k != me) messages.push_back({static_cast<int>(k), {&asked[k], 1}, {&wanted[k], 1}});
-  communicator().exchange(messages);
-  messages.clear();
-  for (std::size_t k = 0; k < size; ++k) {
-    from[k].resize(static_cast<std::size_t>(wanted[k]));
-    if (!to[k].empty() || !from[k].empty()) messages.push_back({static_cast<int>(k), to[k], from[k]});
-  }
-  communicator().exchange(messages);
-  for (std::size_t k = 0; k < size; ++k)
-    for (const double place : from[k]) lent_[k].push_back(part.at_place(static_cast<std::int64_t>(place)));
+    for (const std::int64_t place : wanted[k]) lent_[k].push_back(part.at_place(place));
 }
 
 /// Owners know the input numbers of their points.
 void Partition::exchange_numbers(Body& part) const {
   if (!communicator().complete()) return;
-  const auto size = points_.size();
-  std::vector<std::vector<double>> to(size), from(size);
-  std::vector<Message> messages;
-  for (std::size_t k = 0; k < size; ++k) {
-    for (const std::int32_t p : lent_[k]) to[k].push_back(static_cast<double>(part.number(static_cast<std::size_t>(p))));
-    from[k].resize(borrowed_[k].size());
-    if (!to[k].empty() || !from[k].empty()) messages.push_back({static_cast<int>(k), to[k], from[k]});
-  }
-  communicator().exchange(messages);
-  for (std::size_t k = 0; k < size; ++k)
-    for (std::size_t n = 0; n < from[k].size(); ++n)
-      part.set_number(static_cast<std::size_t>(borrowed_[k][n]), static_cast<std::int64_t>(from[k][n]));
+  std::vector<std::vector<std::int64_t>> mine(points_.size());
+  for (std::size_t k = 0; k < mine.size(); ++k)
+    for (const std::int32_t p : lent_[k]) mine[k].push_back(part.number(static_cast<std::size_t>(p)));
+  const std::vector<std::vector<std::int64_t>> numbers = exchanged(mine);
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    for (std::size_t n = 0; n < numbers[k].size(); ++n) part.set_number(static_cast<std::size_t>(borrowed_[k][n]), numbers[k][n]);
 }
 
 }  // namespace perikit

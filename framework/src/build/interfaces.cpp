@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "body/lattice_shares.hpp"
 #include "build/materials.hpp"
-#include "build/sets.hpp"
-#include "perikit/core/parallel.hpp"
 
 namespace perikit {
 
@@ -100,54 +97,6 @@ void keep_laminates(const Scene& scene, const PartFactory& factory, const Formul
   }
 }
 
-/// Cells of a box of a lattice with a material each, or none.
-class MaterialCells {
- public:
-  static constexpr std::uint16_t none = 0xffff;
-  MaterialCells(const CellBox& box) : box_(box), material_(static_cast<std::size_t>(box.cells()), none) {}
-  std::uint16_t& at(const std::array<std::int64_t, 3>& k) noexcept { return material_[index(k)]; }
-
-  /// By cell: whether different materials lie in the box of so many cells around it.
-  std::vector<bool> meeting(std::int64_t by, int dimension) const {
-    std::vector<std::uint16_t> least = material_, most(material_.size());
-    std::ranges::transform(material_, most.begin(), [](std::uint16_t m) { return m == none ? std::uint16_t{0} : m; });
-    for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension); ++axis) {
-      least = spread(least, axis, by, [](std::uint16_t a, std::uint16_t b) { return std::min(a, b); });
-      most = spread(most, axis, by, [](std::uint16_t a, std::uint16_t b) { return std::max(a, b); });
-    }
-    std::vector<bool> meet(material_.size());
-    for (std::size_t n = 0; n < meet.size(); ++n) meet[n] = material_[n] != none && least[n] < most[n];
-    return meet;
-  }
-  std::size_t index(const std::array<std::int64_t, 3>& k) const noexcept {
-    return static_cast<std::size_t>(k[0] - box_.low[0] +
-                                    box_.length(0) * (k[1] - box_.low[1] + box_.length(1) * (k[2] - box_.low[2])));
-  }
-
- private:
-  template <class Of>
-  std::vector<std::uint16_t> spread(const std::vector<std::uint16_t>& from, std::size_t axis, std::int64_t by, Of&& of) const {
-    std::vector<std::uint16_t> to = from;
-    const std::int64_t step = axis == 0   ? 1
-                              : axis == 1 ? box_.length(0)
-                                          : box_.length(0) * box_.length(1),
-                       length = box_.length(axis);
-    parallel_for(from.size() / static_cast<std::size_t>(length), [&](std::size_t line) {
-      const auto l = static_cast<std::int64_t>(line);
-      const std::int64_t begin = l / step * step * length + l % step;
-      for (std::int64_t k = 0; k < length; ++k)
-        for (std::int64_t other = std::max<std::int64_t>(0, k - by); other <= std::min(length - 1, k + by); ++other) {
-          std::uint16_t& value = to[static_cast<std::size_t>(begin + k * step)];
-          value = of(value, from[static_cast<std::size_t>(begin + other * step)]);
-        }
-    });
-    return to;
-  }
-
-  CellBox box_;
-  std::vector<std::uint16_t> material_;
-};
-
 }  // namespace
 
 Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body,
@@ -163,45 +112,12 @@ Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, cons
 }
 
 Interfaces build_local_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation,
-                                  const Body& part, const Lattice& whole) {
+                                  const Body& part, std::vector<std::uint16_t> material) {
   Interfaces out;
   if (!interfaces_wanted(scene)) return out;
   const std::vector<std::uint16_t> same = first_alike(scene);
-  const Expression* const inside = scene.body.lattice->inside ? &*scene.body.lattice->inside : nullptr;
-  const auto material_at = [&](const Point& x) {
-    std::size_t id = 0;  // the last region has the point
-    for (std::size_t r = scene.regions.size(); r > 0 && id == 0; --r)
-      if (const Expression* const set = set_expression(scene, scene.regions[r - 1].set); !set || (*set)(x) != 0.0) id = r;
-    return same[id];
-  };
-  std::vector<std::uint16_t> material;
-  for (const std::int32_t p : part.internal()) material.push_back(material_at(part.position(static_cast<std::size_t>(p))));
-  const Lattice& lattice = *part.lattice();
-  const double reach = reach_of_interfaces(part);
-  const auto more = static_cast<std::int64_t>(std::ceil(surroundings(part, reach) / lattice.spacing));
-  CellBox box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t by = a < static_cast<std::size_t>(part.dimension()) ? more : 0;
-    box.low[a] = std::max<std::int64_t>(0, lattice.first[a] - by);
-    box.high[a] = std::min(whole.extent[a], lattice.first[a] + lattice.extent[a] + by);
-  }
-  MaterialCells cells(box);
-  in_input_order(whole, box, [&](const std::array<std::int64_t, 3>& k) {
-    const Point x = whole.centre(k);
-    if (!inside || (*inside)(x) != 0.0) cells.at(k) = material_at(x);
-  });
-  const auto bond = static_cast<std::int64_t>(std::floor(part.horizon() / lattice.spacing * (1 + 1e-9)));
-  const std::vector<bool> meet = cells.meeting(bond, part.dimension());
-  MeetingPoints meeting;
-  in_input_order(whole, box, [&](const std::array<std::int64_t, 3>& k) {
-    if (!meet[cells.index(k)]) return;
-    const std::int64_t place = whole.index(k[0], k[1], k[2]);
-    const std::int32_t p = part.at_place(place);
-    meeting.place.push_back(place);
-    meeting.material.push_back(cells.at(k));
-    meeting.own.push_back(p >= 0 && part.owns(static_cast<std::size_t>(p)));
-  });
-  out = find_interfaces(part, whole, material, meeting, reach);
+  for (std::uint16_t& m : material) m = same[m];
+  out = find_interfaces(part, material, reach_of_interfaces(part));
   keep_laminates(scene, factory, formulation, part.space(), out);
   return out;
 }

@@ -14,18 +14,11 @@ namespace perikit {
 
 namespace {
 
-/// The sum of the volumes of the points of a set on all ranks, which must all call it: added up as on one rank, where one follows
-/// the other.
+/// The sum of the volumes of the points of a set; of a part of a body of those on all ranks, which must all call it.
 double total_volume(const Body& body, const std::vector<std::int32_t>& points) {
-  double total = 0;
-  if (!body.part() || !body.lattice()) {
-    for (const std::int32_t p : points) total += body.volume(static_cast<std::size_t>(p));
-    return total;
-  }
-  std::int64_t count = std::ssize(points);
-  communicator().sum({&count, 1});
-  for (; count > 0; --count) total += body.uniform_volume();
-  return total;
+  ExactSum total;
+  for (const std::int32_t p : points) total.add(body.volume(static_cast<std::size_t>(p)));
+  return body.part() ? total_over_ranks(total) : total.value();
 }
 
 /// Points and shares of a load without its values, on the points of the body.

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "body/cloud_shares.hpp"
 #include "body/lattice_shares.hpp"
+#include "build/cloud_points.hpp"
 #include "build/scene_lattice.hpp"
 #include "build/sets.hpp"
 #include "build/size_check.hpp"
@@ -14,14 +16,25 @@ namespace perikit {
 
 namespace {
 
-/// As on one rank, where later regions take points from earlier ones; far points keep what they have.
-void set_materials(const Scene& scene, const SetMembers& members, std::uint16_t far_material, Body& body) {
-  std::vector<std::uint16_t> ids(body.material_ids().begin(), body.material_ids().end());
+/// By input number of the part: as on one rank, where later regions take points from earlier ones.
+std::vector<std::uint16_t> materials_of_part(const Scene& scene, const SetMembers& members, const Body& body) {
+  std::vector<std::uint16_t> material(body.points(), 0);
   for (std::size_t r = 0; r < scene.regions.size(); ++r) {
-    const std::string& set = scene.regions[r].set;
-    for (const std::int32_t p : set == "all" ? std::vector(body.internal().begin(), body.internal().end()) : members.at(set))
-      if (std::uint16_t& id = ids[static_cast<std::size_t>(p)]; id != far_material) id = static_cast<std::uint16_t>(r + 1);
+    const auto id = static_cast<std::uint16_t>(r + 1);
+    if (scene.regions[r].set == "all")
+      std::ranges::fill(material, id);
+    else
+      for (const std::int32_t p : members.at(scene.regions[r].set))
+        material[static_cast<std::size_t>(body.input_of(static_cast<std::size_t>(p)))] = id;
   }
+  return material;
+}
+
+/// Far points keep what they have.
+void set_materials(const std::vector<std::uint16_t>& material, std::uint16_t far_material, Body& body) {
+  std::vector<std::uint16_t> ids(body.material_ids().begin(), body.material_ids().end());
+  for (std::size_t n = 0; n < material.size(); ++n)
+    if (std::uint16_t& id = ids[static_cast<std::size_t>(body.internal()[n])]; id != far_material) id = material[n];
   body.set_materials(std::move(ids));
 }
 
@@ -29,6 +42,27 @@ Inside inside_of(const Scene& scene) {
   const LatticeDescription& description = *scene.body.lattice;
   if (!description.inside) return {};
   return [&](const Point& x) { return (*description.inside)(x) != 0.0; };
+}
+
+std::unique_ptr<Partition> part_of_cloud(const Scene& scene, const Partition::Reach& reach) {
+  CloudPoints cloud = cloud_points(scene, WhichPoints::run);
+  const BodyFrame frame = scene_frame(scene, cloud.spacing);
+  return std::make_unique<Partition>(frame, CloudShares(std::move(cloud.points), frame.horizon), reach);
+}
+
+std::unique_ptr<Partition> part_of_lattice(const Scene& scene, const Partition::Reach& reach) {
+  const LatticeDescription& description = *scene.body.lattice;
+  const double estimate = estimated_cells(scene), ratio = scene_horizon(scene, description.spacing) / description.spacing;
+  const Lattice lattice = scene_lattice(scene);
+  if (!description.inside) check_memory(scene, estimate / communicator().size(), ratio, false, true);
+  const Inside inside = inside_of(scene);
+  std::vector<std::int64_t> points = points_in_tiles(lattice, inside);
+  const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
+  if (all == 0) refuse_empty_lattice(description);
+  if (sparse(static_cast<double>(all), lattice)) return part_of_cloud(scene, reach);
+  const LatticeShares shares(lattice, std::move(points), communicator().size());
+  check_memory(scene, static_cast<double>(shares.points()[static_cast<std::size_t>(communicator().rank())]), ratio, false, true);
+  return std::make_unique<Partition>(scene_frame(scene, description.spacing), lattice, shares, inside, reach);
 }
 
 }  // namespace
@@ -39,7 +73,8 @@ bool one_rank_holds(const Scene& scene) {
   try {
     check_index(scene, cells);
     if (!scene.body.lattice->inside)
-      check_memory(scene, cells, scene_horizon(scene, scene.body.lattice->spacing) / scene.body.lattice->spacing, false);
+      check_memory(scene, cells, scene_horizon(scene, scene.body.lattice->spacing) / scene.body.lattice->spacing,
+                   is_cloud(scene));
   } catch (const InputError&) {
     return false;
   }
@@ -47,6 +82,7 @@ bool one_rank_holds(const Scene& scene) {
 }
 
 int heaviest_rank(const Scene& scene, int ranks) {
+  if (is_cloud(scene)) return ranks / 2;
   const Lattice lattice = scene_lattice(scene);
   const LatticeShares shares(lattice, points_in_tiles(lattice, inside_of(scene)), ranks);
   const auto halo = static_cast<std::int64_t>(2 * scene_horizon(scene, lattice.spacing) / lattice.spacing);
@@ -63,24 +99,14 @@ int heaviest_rank(const Scene& scene, int ranks) {
   return heaviest;
 }
 
-std::optional<LocalBody> build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
-  const LatticeDescription& description = *scene.body.lattice;
+LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
   check_volumes(scene);
-  const double estimate = estimated_cells(scene), ratio = scene_horizon(scene, description.spacing) / description.spacing;
-  const Lattice lattice = scene_lattice(scene);
-  if (!description.inside) check_memory(scene, estimate / communicator().size(), ratio, false, true);
-  const Inside inside = inside_of(scene);
-  std::vector<std::int64_t> points = points_in_tiles(lattice, inside);
-  const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
-  if (all == 0) refuse_empty_lattice(description);
-  if (sparse(static_cast<double>(all), lattice)) return std::nullopt;
-  const LatticeShares shares(lattice, std::move(points), communicator().size());
-  check_memory(scene, static_cast<double>(shares.points()[static_cast<std::size_t>(communicator().rank())]), ratio, false, true);
-  auto partition = std::make_unique<Partition>(scene_frame(scene, description.spacing), lattice, shares, inside, reach);
+  std::unique_ptr<Partition> partition = is_cloud(scene) ? part_of_cloud(scene, reach) : part_of_lattice(scene, reach);
   Body body = partition->make_part(far_material);
   const SetMembers members = add_sets(scene.sets, body);
-  set_materials(scene, members, far_material, body);
-  return LocalBody{std::move(partition), std::move(body), lattice};
+  std::vector<std::uint16_t> material = materials_of_part(scene, members, body);
+  set_materials(material, far_material, body);
+  return LocalBody{std::move(partition), std::move(body), std::move(material)};
 }
 
 }  // namespace perikit

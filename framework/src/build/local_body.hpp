@@ -1,6 +1,7 @@
 #pragma once
+#include <cstdint>
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "perikit/body/partition.hpp"
 #include "perikit/scene/scene.hpp"
@@ -11,12 +12,12 @@ namespace perikit {
 struct LocalBody {
   std::unique_ptr<Partition> partition;
   Body body;
-  Lattice whole;
+  std::vector<std::uint16_t> material;  ///< by input number of the part: as in the whole body, also of far points
 };
 
-/// The part of this rank of the scene's lattice, with its sets and materials, asked of its own cells and those within reach
-/// alone. far_material: of far points. Nothing where the scene keeps so few cells that they are a cloud. All ranks must call it.
-/// Throws InputError as build_body, and std::domain_error as Partition.
-std::optional<LocalBody> build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material);
+/// The part of this rank of the scene's body, with its sets and materials. Of a lattice it asks its own cells and those within
+/// reach alone; of a cloud ranks make runs of points in the order of the input, and give each other those that they need.
+/// far_material: of far points. All ranks must call it. Throws InputError as build_body, and std::domain_error as Partition.
+LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material);
 
 }  // namespace perikit

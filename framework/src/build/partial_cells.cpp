@@ -1,7 +1,10 @@
 #include "build/partial_cells.hpp"
 
+#include <algorithm>
+#include <array>
 #include <optional>
 
+#include "build/scene_lattice.hpp"
 #include "build/volumes.hpp"
 
 namespace perikit {
@@ -13,9 +16,13 @@ constexpr double least_share = 0.5;
 
 class Cells {
  public:
-  Cells(const Expression& inside, const Lattice& lattice, const std::array<std::int64_t, 3>& cells)
-      : lattice_(lattice), cells_(cells), dimension_(lattice.dimension) {
-    parts_.reserve(static_cast<std::size_t>(cells[0] * cells[1] * cells[2]));
+  Cells(const Expression& inside, const Lattice& lattice, const Run& layers)
+      : lattice_(lattice), cells_(input_cells(lattice)), layers_(layers), dimension_(lattice.dimension) {
+    // What a layer gets from its neighbours they may give to theirs, too.
+    const auto last = static_cast<std::size_t>(dimension_ - 1);
+    high_ = cells_;
+    low_[last] = std::max<std::int64_t>(0, layers.first - 2);
+    high_[last] = std::min(cells_[last], layers.last + 2);
     each([&](const Index& k) { parts_.push_back(part_inside(inside, centre(k), lattice.spacing, dimension_)); });
   }
 
@@ -27,11 +34,12 @@ class Cells {
       if (const auto heir = nearest_point(own, k, part.centroid)) add(parts_[*heir], part);
     });
     PartialCells points;
-    for (std::size_t n = 0; n < own.size(); ++n) {
-      if (own[n].share < least_share) continue;
-      points.position.push_back(parts_[n].centroid);
-      points.volume.push_back(parts_[n].share);
-    }
+    each([&](const Index& k) {
+      const std::int64_t layer = k[static_cast<std::size_t>(dimension_ - 1)];
+      if (own[at(k)].share < least_share || layer < layers_.first || layer >= layers_.last) return;
+      points.position.push_back(parts_[at(k)].centroid);
+      points.volume.push_back(parts_[at(k)].share);
+    });
     return points;
   }
 
@@ -42,11 +50,14 @@ class Cells {
   template <class Visit>
   void each(Visit&& visit) const {
     Index k{};
-    for (k[2] = 0; k[2] < cells_[2]; ++k[2])
-      for (k[1] = 0; k[1] < cells_[1]; ++k[1])
-        for (k[0] = 0; k[0] < cells_[0]; ++k[0]) visit(k);
+    for (k[2] = low_[2]; k[2] < high_[2]; ++k[2])
+      for (k[1] = low_[1]; k[1] < high_[1]; ++k[1])
+        for (k[0] = low_[0]; k[0] < high_[0]; ++k[0]) visit(k);
   }
-  std::size_t at(const Index& k) const { return static_cast<std::size_t>((k[2] * cells_[1] + k[1]) * cells_[0] + k[0]); }
+  std::size_t at(const Index& k) const {
+    const Index along{high_[0] - low_[0], high_[1] - low_[1], high_[2] - low_[2]};
+    return static_cast<std::size_t>(((k[2] - low_[2]) * along[1] + k[1] - low_[1]) * along[0] + k[0] - low_[0]);
+  }
   Point centre(const Index& k) const {
     std::array<std::int64_t, 3> inner{};
     for (std::size_t a = 0; a < 3; ++a) inner[a] = k[static_cast<std::size_t>(lattice_.axis[a])];
@@ -63,7 +74,7 @@ class Cells {
         for (std::int64_t dx = -ring(0); dx <= ring(0); ++dx) {
           const Index j{k[0] + dx, k[1] + dy, k[2] + dz};
           bool there = true;
-          for (std::size_t a = 0; a < 3; ++a) there = there && j[a] >= 0 && j[a] < cells_[a];
+          for (std::size_t a = 0; a < 3; ++a) there = there && j[a] >= low_[a] && j[a] < high_[a];
           if (!there || own[at(j)].share < least_share) continue;
           double square = 0;
           for (std::size_t c = 0; c < 3; ++c) square += (own[at(j)].centroid[c] - x[c]) * (own[at(j)].centroid[c] - x[c]);
@@ -81,15 +92,16 @@ class Cells {
   }
 
   const Lattice& lattice_;
-  std::array<std::int64_t, 3> cells_;
+  Index cells_, low_{}, high_{};  ///< along the axes of the input: of the lattice, and those that are looked at
+  Run layers_;
   int dimension_;
-  std::vector<PartOfCell> parts_;  ///< by number of the cell
+  std::vector<PartOfCell> parts_;
 };
 
 }  // namespace
 
-PartialCells cells_inside(const Expression& inside, const Lattice& lattice, const std::array<std::int64_t, 3>& cells) {
-  return Cells(inside, lattice, cells).points();
+PartialCells cells_inside(const Expression& inside, const Lattice& lattice, const Run& layers) {
+  return Cells(inside, lattice, layers).points();
 }
 
 }  // namespace perikit

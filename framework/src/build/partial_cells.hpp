@@ -1,11 +1,11 @@
 #pragma once
 /// Points for the cells of a lattice that the surface of a body cuts.
 
-#include <array>
 #include <vector>
 
 #include "perikit/body/body.hpp"
 #include "perikit/body/lattice.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "perikit/scene/expression.hpp"
 
 namespace perikit {
@@ -16,7 +16,7 @@ struct PartialCells {
 };
 
 /// Cells with half of their volume or more inside have a point at the centroid of what is inside; what other cells have inside
-/// goes to the nearest of these, so that nothing of the body is lost. cells: along the axes of the input.
-PartialCells cells_inside(const Expression& inside, const Lattice& lattice, const std::array<std::int64_t, 3>& cells);
+/// goes to the nearest of these, so that nothing of the body is lost. layers: which of those across the last axis.
+PartialCells cells_inside(const Expression& inside, const Lattice& lattice, const Run& layers);
 
 }  // namespace perikit

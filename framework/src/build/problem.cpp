@@ -18,7 +18,7 @@
 #include "build/several_ranks.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
-#include "perikit/core/communicator.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "problem/whole_body.hpp"
 #include "spaces/consistency.hpp"
 
@@ -60,32 +60,26 @@ Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
           .sources = formulation.pairs && !scene.regions.empty()};  // bonds across interfaces know the moduli of both sides
 }
 
-/// The body of this rank, which no rank has as a whole. False where the scene is not for that.
-bool place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts,
-                Beyond& beyond) {
-  std::optional<LocalBody> local;
+/// The body of this rank, which no rank has as a whole.
+Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts) {
   try {
-    local = build_local_body(scene, reach_of(scene, formulation), image_material(scene));
+    LocalBody local = build_local_body(scene, reach_of(scene, formulation), image_material(scene));
+    parts.body = std::make_unique<const Body>(std::move(local.body));
+    parts.partition = std::move(local.partition);
+    Beyond beyond;
+    beyond.interfaces = std::make_shared<const Interfaces>(
+        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material)));
+    return beyond;
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
   }
-  if (!local) return false;
-  parts.body = std::make_unique<const Body>(std::move(local->body));
-  parts.partition = std::move(local->partition);
-  beyond.interfaces =
-      std::make_shared<const Interfaces>(build_local_interfaces(scene, factory, formulation, *parts.body, local->whole));
-  return true;
 }
 
 /// The bodies of this rank and, where there are several, of all of them.
 Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   if (communicator().size() > 1) {
     parts.placed_whole = needs_whole_body(scene, quasi_static);
-    if (parts.placed_whole.empty()) {
-      Beyond beyond;
-      if (place_part(scene, factory, formulation, parts, beyond)) return beyond;
-      parts.placed_whole = "the lattice is almost empty, and its points are a cloud";
-    }
+    if (parts.placed_whole.empty()) return place_part(scene, factory, formulation, parts);
   }
   Body whole = build_body(scene);
   std::vector<std::uint16_t> material = materials_of_points(whole);
@@ -141,11 +135,13 @@ std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& 
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
   const std::shared_ptr<const InfluenceFunction> influence = factory.influence(*scene.influence);
   if (needs.influence) refuse_no_influence(scene, *influence);
-  try {
-    return Families::make(body, influence, needs);
-  } catch (const std::domain_error& error) {
-    throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
-  }
+  return agreed([&] {  // points at the same place may lie on few ranks
+    try {
+      return Families::make(body, influence, needs);
+    } catch (const std::domain_error& error) {
+      throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
+    }
+  });
 }
 
 /// Why no weights or gradients balance a constant stress on this body: what it is, and what there is instead. Nothing where some do.

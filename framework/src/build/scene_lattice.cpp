@@ -55,6 +55,12 @@ double estimated_cells(const Scene& scene) {
   return cells;
 }
 
+std::array<std::int64_t, 3> input_cells(const Lattice& lattice) {
+  std::array<std::int64_t, 3> cells{1, 1, 1};
+  for (std::size_t k = 0; k < 3; ++k) cells[static_cast<std::size_t>(lattice.axis[k])] = lattice.extent[k];
+  return cells;
+}
+
 void refuse_empty_lattice(const LatticeDescription& description) {
   throw InputError(description.position, "body.lattice.inside",
                    "found an expression that keeps no point of the lattice; allowed: one that is true at one point or more");

@@ -1,5 +1,8 @@
 #pragma once
+#include <array>
+
 #include "perikit/body/body.hpp"
+#include "perikit/core/rank_values.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit {
@@ -19,5 +22,22 @@ double estimated_cells(const Scene& scene);
 [[noreturn]] void refuse_empty_lattice(const LatticeDescription& description);
 /// Whether points fill so little of the box of a lattice that dead cells would dominate.
 bool sparse(double points, const Lattice& lattice);
+
+/// Cells of the lattice along the axes of the input.
+std::array<std::int64_t, 3> input_cells(const Lattice& lattice);
+/// visit(index) for those of a run of the cells in input order, x fastest, that the scene keeps.
+template <class Visit>
+void over_kept_cells(const LatticeDescription& description, const Lattice& lattice, const Run& run, Visit&& visit) {
+  const std::array<std::int64_t, 3> cells = input_cells(lattice);
+  std::array<std::int64_t, 3> k{run.first % cells[0], run.first / cells[0] % cells[1], run.first / cells[0] / cells[1]};
+  for (std::int64_t left = run.last - run.first; left > 0; --left) {
+    const std::array<std::int64_t, 3> inner{k[static_cast<std::size_t>(lattice.axis[0])],
+                                            k[static_cast<std::size_t>(lattice.axis[1])],
+                                            k[static_cast<std::size_t>(lattice.axis[2])]};
+    const std::int64_t index = lattice.index(inner[0], inner[1], inner[2]);
+    if (!description.inside || (*description.inside)(lattice.position(index)) != 0.0) visit(index);
+    for (std::size_t a = 0; a < 3 && ++k[a] == cells[a] && a < 2; ++a) k[a] = 0;
+  }
+}
 
 }  // namespace perikit

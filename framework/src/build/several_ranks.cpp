@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "build/sets.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -19,8 +18,7 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
 
 std::string needs_whole_body(const Scene& scene, bool quasi_static) {
   using Type = LoadDescription::Type;
-  if (!scene.body.lattice || scene.body.lattice->jitter > 0) return "points of a cloud are put in order together";
-  if (scene.partial_volume) return "cells that the surface cuts are a cloud";
+  if (scene.body.voronoi) return "Voronoi cells are found of all points together";
   if (quasi_static) return "pieces that nothing holds are looked for";
   if (!scene.symmetries.empty() || !scene.periodics.empty())
     return "there are images beyond planes of symmetry or periodic sides";
@@ -29,11 +27,6 @@ std::string needs_whole_body(const Scene& scene, bool quasi_static) {
   if (std::ranges::any_of(scene.loads,
                           [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; }))
     return "tractions and pressures share out the surface";
-  const auto by_points = [&](const RegionDescription& region) {
-    return region.set != "all" && !set_expression(scene, region.set);
-  };
-  if (scene.laminates.value_or(true) && std::ranges::any_of(scene.regions, by_points))
-    return "interfaces of regions of single points are looked for";
   return {};
 }
 

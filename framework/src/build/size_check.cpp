@@ -17,6 +17,7 @@ constexpr double most_bonds = 65535;    // of one lattice family: slots are 16 b
 constexpr double largest_ball = 1.0e7;  // cells within the horizon, also of a body that is smaller than it
 
 // The least that any model needs.
+constexpr double bytes_a_shared_point = 130;  // while it is put in order
 constexpr double bytes_a_lattice_point = 100, bytes_a_cloud_point = 200, bytes_a_cloud_bond = 4;
 
 /// Cells within the horizon.
@@ -35,9 +36,7 @@ void check_index(const Scene& scene, double cells) {
   if (cells > most_points) {
     throw InputError(scene.body.position, key_of(scene),
                      fmt::format("found about {:.3g} points; allowed: at most {:.3g} on a rank{}", cells, most_points,
-                                 scene.body.lattice && scene.body.lattice->jitter == 0
-                                     ? "; explicit runs of a lattice share it out (mpirun -np N perikit run)"
-                                     : ""));
+                                 scene.body.voronoi ? "" : "; explicit runs share it out (mpirun -np N perikit run)"));
   }
 }
 
@@ -66,6 +65,15 @@ void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bo
                                  "allowed: the {:.3g} GB that this machine offers",
                                  cells, part ? " on a rank" : "", ratio, bytes / 1e9, limit / 1e9));
   }
+}
+
+void check_lone(const Scene& scene, double points) {
+  const double bytes = points * bytes_a_shared_point, limit = memory_limit();
+  if (bytes <= limit) return;
+  throw InputError(scene.body.position, key_of(scene),
+                   fmt::format("found about {:.3g} points, which take {:.3g} GB where one process shares out a cloud for all "
+                               "ranks; allowed: the {:.3g} GB that this machine offers",
+                               points, bytes / 1e9, limit / 1e9));
 }
 
 }  // namespace perikit

@@ -13,5 +13,7 @@ void check_horizon(const Scene& scene, double ratio);
 /// Refuses what the memory of this machine cannot hold, whatever the kinematics. part: these are the cells of one of several
 /// ranks.
 void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bool part = false);
+/// Refuses clouds all of whose points a rank without others cannot have at once.
+void check_lone(const Scene& scene, double points);
 
 }  // namespace perikit

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "perikit/body/body.hpp"
+#include "body/block_colours.hpp"
 
 namespace perikit {
 
@@ -11,6 +11,13 @@ bool BlockReach::late(std::size_t b) const noexcept {
   return !elsewhere.empty() &&
          std::ranges::any_of(touches[b], [&](std::int32_t unit) { return elsewhere[static_cast<std::size_t>(unit)] != 0; });
 }
+std::vector<std::int32_t> free_colours(const BlockReach& reach) {
+  FreeColours free(reach.units);
+  std::vector<std::int32_t> colours;
+  for (const std::vector<std::int32_t>& units : reach.touches) colours.push_back(free.next(std::span(units)));
+  return colours;
+}
+
 
 BlockSequence::BlockSequence(const BlockReach& reach) : blocks_(reach.own.size()) {
   std::iota(blocks_.begin(), blocks_.end(), std::int32_t{0});
@@ -20,7 +27,7 @@ BlockSequence::BlockSequence(const BlockReach& reach) : blocks_(reach.own.size()
 }
 
 Colouring::Colouring(const BlockReach& reach)
-    : Colouring(reach, block_colours(reach.touches, reach.units), reach.units,
+    : Colouring(reach, free_colours(reach), reach.units,
                 [&](std::size_t b, std::vector<std::int32_t>& touched) { touched = reach.touches[b]; }) {}
 
 Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch) {

@@ -41,6 +41,9 @@ class BlockSequence {
   std::size_t early_ = 0;
 };
 
+/// By block: the first colour of which no earlier block touches one of the same units.
+std::vector<std::int32_t> free_colours(const BlockReach& reach);
+
 class Colouring {
  public:
   Colouring() = default;

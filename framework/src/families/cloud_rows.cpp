@@ -27,18 +27,18 @@ void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows,
   });
 }
 
-BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points) {
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points) {
   BlockReach reach;
-  reach.units = (points + block_points - 1) / block_points;
+  reach.units = cloud_blocks(points);
   reach.touches.resize(reach.units);
   for (std::size_t b = 0; b < reach.units; ++b) {
     reach.own.push_back(static_cast<std::int32_t>(b));
     std::vector<std::int32_t>& units = reach.touches[b];
     units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
         const auto unit =
-            static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / block_points);
+            static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / cloud_block_points);
         if (unit != units.back()) units.push_back(unit);
       }
     }
@@ -48,26 +48,25 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::siz
   return reach;
 }
 
-Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach, std::size_t block_points) {
+Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach) {
   const std::size_t points = families.first.size() - 1, groups = padded(points) / padding;
-  const std::vector<std::int32_t>* prescribed = body.block_colours(block_points);
   std::vector<std::size_t> found(groups);  // one more than the block that has listed a group last
   const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
     const auto add = [&](std::size_t point) {
       const std::size_t group = point / padding;
       if (std::exchange(found[group], b + 1) != b + 1) touched.push_back(static_cast<std::int32_t>(group));
     };
-    for (std::size_t p = b * block_points; p < std::min(points, (b + 1) * block_points); ++p) {
+    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
       add(p);
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k)
         add(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]));
     }
   };
-  return Colouring(reach, prescribed ? *prescribed : block_colours(reach.touches, reach.units), groups, touch);
+  return Colouring(reach, body.block_colours().empty() ? free_colours(reach) : body.block_colours(), groups, touch);
 }
 
-bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points) noexcept {
-  return QuietBlocks::moves(u, b * block_points, std::min(points, (b + 1) * block_points));
+bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points) noexcept {
+  return QuietBlocks::moves(u, b * cloud_block_points, std::min(points, (b + 1) * cloud_block_points));
 }
 
 }  // namespace perikit

@@ -15,8 +15,6 @@ using Row = CountedRow;
 typedef double Row __attribute__((vector_size(32)));
 #endif
 
-inline constexpr std::size_t cloud_block_points = 32;
-
 constexpr std::size_t cloud_blocks(std::size_t points) noexcept {
   return (points + cloud_block_points - 1) / cloud_block_points;
 }
@@ -27,13 +25,13 @@ void complete_pieces(GroupMarks& marks, std::size_t points);
 /// rows[p] <- components of u at p, zero in the rest, and fourth[p] in the last place where it is given.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth = nullptr);
 
-/// Blocks of so many points, and those that hold neighbours of them.
-BlockReach cloud_reach(const FamilyLists& families, std::size_t points, std::size_t block_points = cloud_block_points);
+/// Blocks, and those that hold neighbours of them.
+BlockReach cloud_reach(const FamilyLists& families, std::size_t points);
 
 /// Colours of these blocks; on a part of a body those that they have in the whole one. Blocks wait for those that write to the same eight points.
-Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach, std::size_t block_points = cloud_block_points);
+Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach);
 
 /// Whether a point of block b moves.
-bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points, std::size_t block_points = cloud_block_points) noexcept;
+bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points) noexcept;
 
 }  // namespace perikit

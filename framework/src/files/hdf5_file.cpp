@@ -252,45 +252,62 @@ std::vector<std::size_t> Source::shape(const std::string& path) const {
   return {extent, extent + rank};
 }
 
-Handle Source::numbers(const std::string& path) const {
-  Handle data = dataset(path);
+void Source::read_rows(const std::string& path, std::size_t first, std::size_t rows, double* values) const {
+  const std::vector<std::size_t> extent = shape(path);
+  const Handle data = dataset(path);
   const Handle type(H5Dget_type(data.get()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(path, "must hold numbers");
-  return data;
+  if (rows == 0) return;
+  const hsize_t begin[] = {first, 0}, count[] = {rows, extent.size() > 1 ? extent[1] : 1};
+  const Handle file(H5Dget_space(data.get()), H5Sclose),
+      memory(H5Screate_simple(static_cast<int>(extent.size()), count, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) < 0 ||
+      H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), file.get(), H5P_DEFAULT, values) < 0)
+    refuse(path, "cannot be read");
 }
 
 void Source::each_row(const std::string& path, std::span<const std::int64_t> numbers,
                       const std::function<void(std::size_t, std::span<const double>)>& use) const {
   constexpr std::int64_t piece = 1 << 17;  // rows
-  const std::vector<std::size_t> shape = this->shape(path);
-  const Handle data = this->numbers(path);
-  const std::size_t width = shape.size() > 1 ? shape[1] : 1;
-  if (!numbers.empty() && numbers.back() >= static_cast<std::int64_t>(shape[0]))
-    refuse(path, fmt::format("has {} rows, and one of number {} is wanted", shape[0], numbers.back()));
+  const std::vector<std::size_t> extent = shape(path);
+  const std::size_t width = extent.size() > 1 ? extent[1] : 1;
+  if (!numbers.empty() && numbers.back() >= static_cast<std::int64_t>(extent[0]))
+    refuse(path, fmt::format("has {} rows, and one of number {} is wanted", extent[0], numbers.back()));
   std::vector<double> rows;
   for (std::size_t begin = 0, end = 0; begin < numbers.size(); begin = end) {
     while (end < numbers.size() && numbers[end] < numbers[begin] + piece) ++end;
-    const hsize_t first[] = {static_cast<hsize_t>(numbers[begin]), 0},
-                  count[] = {static_cast<hsize_t>(numbers[end - 1] - numbers[begin] + 1), width};
-    rows.resize(count[0] * width);
-    const Handle file(H5Dget_space(data.get()), H5Sclose),
-        memory(H5Screate_simple(static_cast<int>(shape.size()), count, nullptr), H5Sclose);
-    if (H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, first, nullptr, count, nullptr) < 0 ||
-        H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), file.get(), H5P_DEFAULT, rows.data()) < 0)
-      refuse(path, "cannot be read");
+    const auto count = static_cast<std::size_t>(numbers[end - 1] - numbers[begin] + 1);
+    rows.resize(count * width);
+    read_rows(path, static_cast<std::size_t>(numbers[begin]), count, rows.data());
     for (std::size_t k = begin; k < end; ++k)
       use(k, std::span(rows).subspan(static_cast<std::size_t>(numbers[k] - numbers[begin]) * width, width));
   }
 }
 
 Source::Array Source::read(const std::string& path) const {
-  Array array{shape(path), {}};
-  const Handle data = numbers(path);
-  array.data.resize(array.rows() * static_cast<std::size_t>(array.width()));
-  if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) < 0)
-    refuse(path, "cannot be read");
+  Array array{shape(path), std::vector<double>(values(path))};
+  read_rows(path, 0, array.rows(), array.data.data());
   return array;
+}
+
+std::size_t Source::values(const std::string& path) const {
+  std::size_t values = 1;
+  for (const std::size_t extent : shape(path)) values *= extent;
+  return values;
+}
+
+std::vector<double> Source::read(const std::string& path, std::size_t first, std::size_t last) const {
+  const std::vector<std::size_t> extent = shape(path);
+  const std::size_t width = extent.size() > 1 ? std::max<std::size_t>(1, extent[1]) : 1;
+  // The rows that hold these values.
+  const std::size_t begin = first / width, count = (last + width - 1) / width - begin;
+  std::vector<double> rows(count * width);
+  if (rows.empty()) return rows;
+  read_rows(path, begin, count, rows.data());
+  rows.erase(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(first - begin * width));
+  rows.resize(last - first);
+  return rows;
 }
 
 std::vector<std::byte> Source::read_bytes(const std::string& path) const {

@@ -123,6 +123,9 @@ class Source {
   /// use(k, row numbers[k] of it), for ascending numbers; a piece of it is in memory at a time.
   void each_row(const std::string& path, std::span<const std::int64_t> numbers,
                 const std::function<void(std::size_t k, std::span<const double> row)>& use) const;
+  /// How many values there are in it, and those first ... last - 1 of them, row by row.
+  std::size_t values(const std::string& path) const;
+  std::vector<double> read(const std::string& path, std::size_t first, std::size_t last) const;
   /// A flat dataset that was written from bytes; some of it.
   std::vector<std::byte> read_bytes(const std::string& path) const;
   std::vector<std::byte> read_bytes(const std::string& path, std::uint64_t first, std::size_t count) const;
@@ -134,7 +137,8 @@ class Source {
  private:
   [[noreturn]] void refuse(const std::string& what, const std::string& message) const;
   Handle dataset(const std::string& path) const;
-  Handle numbers(const std::string& path) const;
+  /// So many rows from `first` on.
+  void read_rows(const std::string& path, std::size_t first, std::size_t rows, double* values) const;
   Handle attribute(const std::string& group, const std::string& name) const;
 
   std::filesystem::path path_;

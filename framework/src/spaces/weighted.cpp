@@ -327,7 +327,7 @@ void Weighted<D>::run(Pass& pass) {
     quiet_.wake();
   else
     quiet_.look(1, [&](std::size_t b) {
-      return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points(), cloud_block);
+      return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points());
     });
   (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
     if (quiet_.awake(b, 1)) block(b, pass);

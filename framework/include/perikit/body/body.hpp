@@ -45,18 +45,24 @@ enum class Role : std::uint8_t { absent, far, near, image, own };
 struct BodyPart {
   std::vector<Role> roles;                      ///< by input number
   std::array<std::int64_t, 3> first{}, last{};  ///< lattices: the box of cells that holds all but absent points
-  /// Clouds: by size of the blocks of points that loops run over, the colour of each block of the part. Its blocks are whole ones
-  /// of the body.
-  std::map<std::size_t, std::vector<std::int32_t>> colours;
 };
 
-/// A rank's part of a lattice that no rank has as a whole.
-struct LatticePart {
-  std::array<std::int64_t, 3> first{}, last{};  ///< the box of cells that holds the part
-  std::vector<std::int64_t> places;             ///< indices in the whole lattice, in input order
-  std::vector<Role> roles;                      ///< of these points
-  std::vector<std::int64_t> numbers;            ///< their input numbers in the whole body
+/// A rank's part of a body that no rank has as a whole. By point:
+struct LocalPart {
+  std::vector<std::int64_t> places;  ///< in the fields of the whole body
+  std::vector<Role> roles;
+  std::vector<std::int64_t> numbers;  ///< of the input, in the whole body
   std::int64_t points_of_all_ranks = 0;
+};
+
+/// Of a lattice, in input order; places are indices of cells.
+struct LatticePart : LocalPart {
+  std::array<std::int64_t, 3> first{}, last{};  ///< the box of cells that holds the part
+};
+
+/// Of a cloud, in the order of the curve, in whole blocks.
+struct CloudPart : LocalPart {
+  AlignedVector<double> rows;  ///< {x, y, z, V}, and zeros up to the stride
 };
 
 /// What a body is beside its points.
@@ -68,6 +74,9 @@ struct BodyFrame {
   std::vector<Crack> cracks;
 };
 
+/// Points of a cloud that loops take together, one after the other along the curve that orders them.
+inline constexpr std::size_t cloud_block_points = 32;
+
 /// Internal indices run over [0, stride); only `points` of them are alive, the rest is padding of zero volume.
 class Body {
  public:
@@ -77,8 +86,9 @@ class Body {
   Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes);
   /// A rank's part of another body, in the same order. Far points have a material of their own; sets keep the rank's own points.
   Body(const Body& whole, const BodyPart& part, std::uint16_t far_material);
-  /// The same of a lattice; without sets, and near points have the material 0.
+  /// The same of a body that no rank has as a whole; without sets, and near points have the material 0.
   Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_t far_material);
+  Body(BodyFrame frame, CloudPart part, std::uint16_t far_material);
 
   /// A body with images of its points: input numbers after those of `whole`, a material of their own, in no set. Throws std::domain_error
   /// where two points of a lattice would be one.
@@ -95,6 +105,8 @@ class Body {
   void set_number(std::size_t internal_index, std::int64_t number) {
     numbers_[static_cast<std::size_t>(input_[internal_index])] = number;
   }
+  /// Of a part of a cloud: the colours that its blocks have in the whole body.
+  void set_block_colours(std::vector<std::int32_t> colours) { colours_ = std::move(colours); }
 
   int dimension() const noexcept { return perikit::dimension(frame_.space); }
   Space space() const noexcept { return frame_.space; }
@@ -143,11 +155,8 @@ class Body {
   bool owns(std::size_t internal_index) const noexcept { return own_.empty() || own_[internal_index]; }
   /// Internal indices of the points whose forces are complete here: those of this rank, and the images of them. One rank: all.
   std::span<const std::int32_t> complete() const noexcept { return own_.empty() ? internal_ : complete_; }
-  /// Of a part of a cloud; null: the colours of blocks are not prescribed.
-  const std::vector<std::int32_t>* block_colours(std::size_t block_points) const noexcept {
-    const auto known = colours_.find(block_points);
-    return known == colours_.end() ? nullptr : &known->second;
-  }
+  /// Of a part of a cloud; empty: the colours of blocks are not prescribed.
+  const std::vector<std::int32_t>& block_colours() const noexcept { return colours_; }
 
   /// Points that belong to this body alone: all of them, but for ghosts and images.
   const std::vector<std::int32_t>& owned() const noexcept { return owned_.empty() ? internal_ : owned_; }
@@ -174,6 +183,7 @@ class Body {
   void place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions);
   void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
   void keep_places(const std::vector<std::int64_t>& places, const std::vector<Role>& roles);
+  void keep_far_material(const std::vector<Role>& roles, std::uint16_t far_material);
 
   BodyFrame frame_;
   std::size_t stride_ = 0, margin_ = 0;
@@ -195,7 +205,7 @@ class Body {
   std::vector<std::int32_t> complete_;
   std::size_t stride_of_whole_ = 0;
   std::optional<Lattice> whole_lattice_;
-  std::map<std::size_t, std::vector<std::int32_t>> colours_;
+  std::vector<std::int32_t> colours_;
 };
 
 /// Neighbour lists of a cloud in compressed rows: the family of p is neighbour[first[p] ... first[p + 1]), ascending.
@@ -211,13 +221,7 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
 std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
                                         std::vector<std::uint8_t> from);
 
-/// Blocks of so many points of a cloud, and which of them hold points of their families, but for bonds that cracks cut.
-std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t block_points);
-
-/// The first colour of which no earlier block touches one of the same units, block by block.
-std::vector<std::int32_t> block_colours(const std::vector<std::vector<std::int32_t>>& touches, std::size_t units);
-
-/// Order of points along a space-filling (Morton) curve of boxes of size `cell`.
-std::vector<std::int32_t> morton_order(const std::vector<Point>& positions, double cell);
+/// Of the blocks first ... last - 1 of a cloud: which blocks hold points of their families, but for bonds that cracks cut.
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t first, std::size_t last);
 
 }  // namespace perikit

@@ -13,6 +13,7 @@
 
 namespace perikit {
 
+class CloudShares;
 class LatticeShares;
 
 class Partition {
@@ -32,6 +33,8 @@ class Partition {
   /// more cells than indices can tell apart.
   Partition(const BodyFrame& frame, const Lattice& lattice, const LatticeShares& shares,
             const std::function<bool(const Point&)>& inside, const Reach& reach);
+  /// Of a cloud without images that no rank has as a whole. All ranks must call it. Throws std::domain_error as above.
+  Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach);
 
   /// Null where no rank has it.
   const Body* whole() const noexcept { return whole_ ? &*whole_ : nullptr; }
@@ -56,8 +59,10 @@ class Partition {
   void choose_images();
   void keep_cells(const Reach& reach);
   void keep_families(const Reach& reach);
+  std::size_t owner(const Body& part, std::int32_t p) const;
   void exchange_borders(const Body& part);
   void exchange_numbers(Body& part) const;
+  Body finished(Body part);
 
   /// visit(input number, input number of the source) of the images.
   template <class Visit>
@@ -70,7 +75,8 @@ class Partition {
   BodyFrame frame_;  ///< where there is none
   Lattice lattice_;
   LatticePart lattice_part_;
-  std::vector<std::uint16_t> owner_;  ///< by input number of the whole body, else of the part
+  CloudPart cloud_part_;
+  std::vector<std::uint16_t> owner_;  ///< by input number of the whole body, else of the part of a lattice
   std::vector<std::int64_t> points_;
   std::vector<std::vector<std::int32_t>> lent_, borrowed_;
 };

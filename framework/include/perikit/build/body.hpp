@@ -10,9 +10,10 @@ namespace perikit {
 /// Throws InputError for an empty body, an empty set, a horizon smaller than the spacing of all points, too many points.
 Body build_body(const Scene& scene);
 
-/// Whether one rank can have the lattice of the scene as a whole, as far as its size says.
+/// Whether one rank can have the body of the scene as a whole, as far as its size is known before it is read.
 bool one_rank_holds(const Scene& scene);
-/// The one of so many ranks that has most cells of the scene's lattice, with those within two horizons of its own.
+/// The one of so many ranks that has most cells of the scene's lattice, with those within two horizons of its own. Ranks have
+/// about as many points of a cloud each: one in the middle of the curve.
 int heaviest_rank(const Scene& scene, int ranks);
 
 }  // namespace perikit

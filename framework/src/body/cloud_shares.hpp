@@ -1,0 +1,59 @@
+#pragma once
+/// A cloud that no rank has as a whole: ranks bring points in the order of the input, and get those of their pieces of the curve.
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "body/curve.hpp"
+#include "perikit/body/point_file.hpp"
+#include "perikit/core/communicator.hpp"
+
+namespace perikit {
+
+class CloudShares {
+ public:
+  struct OnePoint {
+    Point x;
+    double volume;
+    std::int64_t number;  ///< of the input
+  };
+  using Points = std::vector<OnePoint>;
+
+  /// mine: this rank's run of the points in the order of the input, after those of lower ranks. A rank without others brings all
+  /// of them. All ranks must call what is here.
+  CloudShares(PointCloud mine, double cube);
+
+  const CurveShares& pieces() const noexcept { return pieces_; }
+  /// The rank's own points in the order of the curve, and where they begin on it.
+  std::span<const OnePoint> own() const noexcept;
+  std::int64_t first_own() const noexcept { return pieces_.first(communicator().rank()); }
+  /// The blocks, on whatever rank, that hold points of the cubes that a sphere around one of the points meets. Each once.
+  std::vector<std::int64_t> blocks_around(std::span<const OnePoint> points, double radius) const;
+  /// The points of blocks, whoever owns them.
+  std::map<std::int64_t, Points> fetch(const std::vector<std::int64_t>& blocks) const;
+
+ private:
+  /// Where a piece begins.
+  struct Start {
+    std::uint64_t key;
+    std::int64_t number;
+  };
+  struct Sorted;
+  std::vector<Start> find_starts(const Sorted& mine) const;
+  /// Who has the points from here on; a rank without others has all.
+  std::size_t holder(const Start& at) const noexcept;
+  std::size_t holder_of_block(std::int64_t block) const noexcept;
+  std::span<const OnePoint> held_block(std::int64_t block) const noexcept;
+
+  CurveShares pieces_;
+  Curve curve_;
+  std::vector<Start> starts_;  ///< by rank
+  // In the order of the curve: the rank's own points, or all where the others are not there.
+  std::int64_t first_held_ = 0;
+  Points held_;
+  std::vector<std::uint64_t> keys_;
+};
+
+}  // namespace perikit

@@ -1,0 +1,10 @@
+#pragma once
+#include "perikit/body/point_file.hpp"
+
+namespace perikit {
+
+/// As read_points, of which each rank gets a run: those of lower ranks come before in the file. What is wrong with the points is
+/// what read_points would say. All ranks must call it; a rank without others gets all points.
+PointCloud read_run_of_points(const std::filesystem::path& file, int dimension);
+
+}  // namespace perikit

@@ -1,0 +1,185 @@
+#include "build/cloud_points.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <random>
+
+#include "body/point_share.hpp"
+#include "body/positions_file.hpp"
+#include "build/held_surfaces.hpp"
+#include "build/partial_cells.hpp"
+#include "build/scene_lattice.hpp"
+#include "build/size_check.hpp"
+#include "build/volumes.hpp"
+#include "perikit/core/rank_values.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Uniform in [-1, 1), the same on every platform.
+double centred(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0;
+}
+
+Run run_of(std::int64_t count, WhichPoints which) {
+  return which == WhichPoints::all ? Run{0, count} : own_run(count);
+}
+
+Counted counted_of(std::size_t points, WhichPoints which) {
+  const auto mine = static_cast<std::int64_t>(points);
+  return which == WhichPoints::all ? Counted{0, mine} : counted(mine);
+}
+
+/// points: of all ranks.
+void check_cloud(const Scene& scene, double points, double ratio, WhichPoints which) {
+  const bool part = which == WhichPoints::run;
+  const double of_rank = part ? points / communicator().size() : points;
+  check_index(scene, of_rank);
+  check_horizon(scene, ratio);
+  check_memory(scene, of_rank, ratio, true, part);
+  if (part && !communicator().complete()) check_lone(scene, points);
+}
+
+/// Voronoi cells of all points.
+std::vector<double> cells_of_jittered(const Scene& scene, const Lattice& lattice, const std::vector<Point>& positions) {
+  const LatticeDescription& description = *scene.body.lattice;
+  // The box of the cells that there are: jittered points may leave it by no more than half a spacing.
+  Point lower = description.lower, upper = lattice.lower;
+  const std::array<std::int64_t, 3> counts = input_cells(lattice);
+  for (std::size_t c = 0; c < 3; ++c) upper[c] = description.lower[c] + static_cast<double>(counts[c]) * description.spacing;
+  for (const Point& x : positions)
+    for (std::size_t c = 0; c < 3; ++c) {
+      lower[c] = std::min(lower[c], x[c]);
+      upper[c] = std::max(upper[c], x[c]);
+    }
+  return voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr);
+}
+
+/// The cells that the scene keeps, each moved at random by at most `jitter` spacings along each axis.
+PointCloud jittered(const Scene& scene, const Lattice& lattice, WhichPoints which) {
+  const LatticeDescription& description = *scene.body.lattice;
+  const std::array<std::int64_t, 3> cells = input_cells(lattice);
+  std::vector<std::int64_t> kept;
+  over_kept_cells(description, lattice, run_of(cells[0] * cells[1] * cells[2], which),
+                  [&](std::int64_t index) { kept.push_back(index); });
+  const Counted points = counted_of(kept.size(), which);
+  if (points.all == 0) refuse_empty_lattice(description);
+  check_cloud(scene, static_cast<double>(points.all), scene_horizon(scene, description.spacing) / description.spacing, which);
+  // Points draw one after the other, whichever ranks have them.
+  std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
+  if (description.jitter > 0)
+    random.discard(static_cast<std::uint64_t>(points.before) * static_cast<std::uint64_t>(scene.body.dimension));
+  PointCloud cloud;
+  cloud.position.reserve(kept.size());
+  for (const std::int64_t index : kept) {
+    Point x = lattice.position(index);
+    for (int a = 0; a < scene.body.dimension && description.jitter > 0; ++a)
+      x[static_cast<std::size_t>(a)] += description.jitter * description.spacing * centred(random);
+    cloud.position.push_back(x);
+  }
+  keep_off_surfaces(scene, description.spacing, cloud.position);
+  cloud.volume = scene.body.voronoi ? cells_of_jittered(scene, lattice, cloud.position)
+                                    : std::vector<double>(kept.size(), std::pow(description.spacing, scene.body.dimension));
+  for (double& volume : cloud.volume) volume *= scene.body.section;
+  return cloud;
+}
+
+/// The cells of a lattice that lie inside at least in part.
+PointCloud partial_cells(const Scene& scene, const Lattice& lattice, WhichPoints which) {
+  const LatticeDescription& description = *scene.body.lattice;
+  check_cloud(scene, estimated_cells(scene), scene_horizon(scene, description.spacing) / description.spacing, which);
+  const std::int64_t layers = input_cells(lattice)[static_cast<std::size_t>(scene.body.dimension - 1)];
+  PartialCells cells = cells_inside(*description.inside, lattice, run_of(layers, which));
+  if (counted_of(cells.position.size(), which).all == 0) {
+    throw InputError(
+        description.position, "body.lattice.inside",
+        "found an expression that keeps no cell of the lattice; allowed: one that is true in a part of one cell or more");
+  }
+  const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
+  for (double& volume : cells.volume) volume *= whole;
+  keep_off_surfaces(scene, description.spacing, cells.position);
+  return {std::move(cells.position), std::move(cells.volume)};
+}
+
+CloudPoints points_of_lattice(const Scene& scene, WhichPoints which) {
+  const LatticeDescription& description = *scene.body.lattice;
+  const Lattice lattice = scene_lattice(scene);
+  if (!description.inside)
+    check_cloud(scene, estimated_cells(scene), scene_horizon(scene, description.spacing) / description.spacing, which);
+  return {scene.partial_volume ? partial_cells(scene, lattice, which) : jittered(scene, lattice, which), description.spacing};
+}
+
+/// Points of a file with the volumes of their Voronoi cells.
+PointCloud cells_of_points(const Scene& scene) {
+  const BodyDescription& body = scene.body;
+  PointCloud cloud = read_positions(*body.points_file, body.dimension);
+  Point lower = cloud.position.front(), upper = lower;
+  for (const Point& x : cloud.position)
+    for (std::size_t c = 0; c < 3; ++c) {
+      lower[c] = std::min(lower[c], x[c]);
+      upper[c] = std::max(upper[c], x[c]);
+    }
+  const Point first = lower, last = upper;
+  // The spacing that the points have in the box that is larger than they by half of it.
+  double spacing = 0;
+  for (int step = 0; step < 50; ++step) {
+    double size = 1;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) size *= last[c] - first[c] + spacing;
+    spacing = std::pow(size / static_cast<double>(cloud.position.size()), 1.0 / body.dimension);
+  }
+  for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) {
+    lower[c] = body.points_lower ? (*body.points_lower)[c] : lower[c] - 0.5 * spacing;
+    upper[c] = body.points_upper ? (*body.points_upper)[c] : upper[c] + 0.5 * spacing;
+    if (lower[c] > first[c] || upper[c] < last[c]) {
+      throw InputError(body.volume_position, lower[c] > first[c] ? "body.points.lower" : "body.points.upper",
+                       fmt::format("found {} along {}, with points from {} to {}; allowed: a box that holds all points",
+                                   lower[c] > first[c] ? lower[c] : upper[c], "xyz"[c], first[c], last[c]));
+    }
+  }
+  cloud.volume =
+      voronoi_volumes(cloud.position, body.dimension, lower, upper, body.points_inside ? &*body.points_inside : nullptr);
+  for (std::size_t n = 0; n < cloud.volume.size(); ++n) {
+    if (cloud.volume[n] > 0) continue;
+    const Point& x = cloud.position[n];
+    throw InputError(
+        body.volume_position, "body.points.inside",
+        fmt::format(
+            "found nothing inside around the point at ({:.6g}, {:.6g}, {:.6g}); allowed: points inside, at different places",
+            x[0], x[1], x[2]));
+  }
+  for (double& volume : cloud.volume) volume *= body.section;
+  return cloud;
+}
+
+CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
+  const std::filesystem::path& file = *scene.body.points_file;
+  const int dimension = scene.body.dimension;
+  PointCloud cloud = scene.body.voronoi          ? cells_of_points(scene)
+                     : which == WhichPoints::all ? read_points(file, dimension)
+                                                 : read_run_of_points(file, dimension);
+  ExactSum volumes;
+  for (const double volume : cloud.volume) volumes.add(volume);
+  const double total = which == WhichPoints::all ? volumes.value() : total_over_ranks(volumes),
+               points = static_cast<double>(counted_of(cloud.volume.size(), which).all),
+               spacing = std::pow(total / scene.body.section / points, 1.0 / dimension), reach = scene_horizon(scene, spacing);
+  check_cloud(scene, points, reach / spacing, which);
+  if (reach < spacing) {
+    throw InputError(scene.body.position, "family.horizon",
+                     fmt::format("found {}; allowed: at least the mean spacing of the points, {:.6g}", reach, spacing));
+  }
+  return {std::move(cloud), spacing};
+}
+
+}  // namespace
+
+bool is_cloud(const Scene& scene) {
+  return !scene.body.lattice || scene.body.lattice->jitter > 0 || scene.partial_volume;
+}
+
+CloudPoints cloud_points(const Scene& scene, WhichPoints which) {
+  return scene.body.lattice ? points_of_lattice(scene, which) : points_of_file(scene, which);
+}
+
+}  // namespace perikit
