@@ -367,8 +367,8 @@ TEST_CASE("local bodies: clouds of no point, and of too few for the ranks, are r
                     doctest::Contains("found an expression that keeps no point"));
   CHECK_THROWS_WITH(on(3, scene_text(2, lattice(2, "[40, 30]", "x > 50"), sets, "horizon_ratio = 2\npartial_volume = true")),
                     doctest::Contains("found an expression that keeps no cell"));
-  CHECK_THROWS_WITH(on(6, scene_text(2, lattice(2, "[40, 30]", "", "jitter = 0.1"), sets)),
-                    doctest::Contains("found 6 ranks for a body of 1200 points"));
+  CHECK_THROWS_WITH(on(6, scene_text(2, lattice(2, "[12, 10]", "", "jitter = 0.1"), sets)),
+                    doctest::Contains("found 6 ranks for a body of 120 points"));
   CHECK_THROWS_WITH(on(7, scene_text(1, lattice(1, "[3]", "", "jitter = 0.1"), sets)),
                     doctest::Contains("found 7 ranks for a body of 3 points"));
 }
