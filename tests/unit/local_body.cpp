@@ -81,7 +81,7 @@ bool same(const A& a, const B& b) {
 
 /// The colours that blocks have on one rank, by block of the whole body.
 std::vector<std::int32_t> colours_of_whole(const Body& whole) {
-  const std::size_t blocks = (whole.points() + cloud_block_points - 1) / cloud_block_points;
+  const std::size_t blocks = (whole.points() + whole.block_points() - 1) / whole.block_points();
   FreeColours free(blocks);
   std::vector<std::int32_t> colours;
   for (const std::vector<std::int32_t>& units : block_reach(whole, 0, blocks)) colours.push_back(free.next(std::span(units)));
@@ -90,10 +90,12 @@ std::vector<std::int32_t> colours_of_whole(const Body& whole) {
 
 void compare_colours(const Body& part, const Body& whole) {
   const std::vector<std::int32_t> expected = colours_of_whole(whole), &found = part.block_colours();
-  REQUIRE(found.size() == (part.points() + cloud_block_points - 1) / cloud_block_points);
+  const std::size_t block = whole.block_points();
+  REQUIRE(part.block_points() == block);
+  REQUIRE(found.size() == (part.points() + block - 1) / block);
   bool right = true;
   for (std::size_t b = 0; b < found.size(); ++b)
-    right = right && found[b] == expected[static_cast<std::size_t>(part.places().place[b * cloud_block_points]) / cloud_block_points];
+    right = right && found[b] == expected[static_cast<std::size_t>(part.places().place[b * block]) / block];
   CHECK(right);
 }
 

@@ -31,7 +31,8 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
       far_share_(formulation_.far_share),
       symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
       interfaces_(parts.interfaces),
-      colouring_(cloud_reach(rows.lists(), rows.size())) {
+      blocks_(rows.size(), rows.body().block_points()),
+      colouring_(cloud_reach(rows.lists(), blocks_)) {
   read_bonds();
 }
 
@@ -321,7 +322,7 @@ std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::int64_t point = add_bonds(b * cloud_block_points, std::min(rows, (b + 1) * cloud_block_points), u, K.convex, memory_.mine());
+    const std::int64_t point = add_bonds(blocks_.begin(b), blocks_.end(b), u, K.convex, memory_.mine());
     if (point >= 0) bad.report(point);
   });
   if (bad.point() >= 0) return bad.point();

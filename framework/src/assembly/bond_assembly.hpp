@@ -3,7 +3,7 @@
 #include "assembly/block_pattern.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "body/interfaces.hpp"
-#include "families/blocks.hpp"
+#include "families/cloud_rows.hpp"
 #include "spaces/evaluation_space.hpp"
 
 namespace perikit {
@@ -72,6 +72,7 @@ class BondAssembly final : public Assembly {
   AlignedVector<double> Hbar_;                     ///< by row
   AlignedVector<double> volume_share_;             ///< selective: c by row
   AlignedVector<double> diagonal_, off_diagonal_;  ///< Q by row, by bond
+  CloudBlocks blocks_;
   Colouring colouring_;
   PerThread<Memory> memory_;
 };

@@ -14,7 +14,8 @@ ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& ro
       laws_(parts.laws),
       interfaces_(parts.interfaces),
       shape_{parts.formulation, parts.formulation.parts(D), parts.factors, parts.shift},
-      colouring_(cloud_reach(rows.lists(), rows.size())) {
+      blocks_(rows.size(), rows.body().block_points()),
+      colouring_(cloud_reach(rows.lists(), blocks_)) {
   for (std::size_t r = 0; r < rows.size() && !whole_; ++r) {
     if (!rows.whole(r)) continue;
     ElementScratch<D> scratch;
@@ -97,8 +98,8 @@ std::int64_t ElementAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
       std::max<std::size_t>(1, batch_points / (shape_.parts > 0 ? static_cast<std::size_t>(shape_.parts) : bonds));
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::size_t end = std::min(rows_.size(), (b + 1) * cloud_block_points);
-    for (std::size_t r = b * cloud_block_points; r < end; r += at_once) {
+    const std::size_t end = blocks_.end(b);
+    for (std::size_t r = blocks_.begin(b); r < end; r += at_once) {
       const std::int64_t point = fill_rows(r, std::min(end, r + at_once), u, K, memory_.mine());
       if (point >= 0) return bad.report(point);
     }

@@ -5,7 +5,7 @@
 #include "assembly/point_element.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "body/interfaces.hpp"
-#include "families/blocks.hpp"
+#include "families/cloud_rows.hpp"
 #include "spaces/evaluation_space.hpp"
 
 namespace perikit {
@@ -41,6 +41,7 @@ class ElementAssembly final : public Assembly {
   std::shared_ptr<const Interfaces> interfaces_;
   ElementShape shape_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family
+  CloudBlocks blocks_;
   Colouring colouring_;
   PerThread<Memory> memory_;
 };

@@ -12,12 +12,13 @@ struct BlocksOfPart {
   std::size_t first_own = 0, last_own = 0;
 
   explicit BlocksOfPart(const Body& part) {
-    for (std::size_t p = 0; p < part.points(); p += cloud_block_points) {
+    const std::size_t block = part.block_points();
+    for (std::size_t p = 0; p < part.points(); p += block) {
       if (part.owns(p)) {
         if (last_own == 0) first_own = number.size();
         last_own = number.size() + 1;
       }
-      number.push_back(part.places().place[p] / CurveShares::block);
+      number.push_back(part.places().place[p] / static_cast<std::int64_t>(block));
     }
   }
 };
@@ -71,8 +72,7 @@ std::vector<std::int64_t> own_colours(std::vector<std::int64_t> touches, std::si
 
 }  // namespace
 
-void fill_blocks(std::vector<std::uint8_t>& marked) {
-  constexpr std::size_t block = cloud_block_points;
+void fill_blocks(std::size_t block, std::vector<std::uint8_t>& marked) {
   for (std::size_t b = 0; b < marked.size(); b += block) {
     const auto begin = marked.begin() + static_cast<std::ptrdiff_t>(b),
                end = marked.begin() + static_cast<std::ptrdiff_t>(std::min(marked.size(), b + block));
@@ -86,7 +86,7 @@ void colour_blocks(const CurveShares& pieces, Body& part) {
   const BlocksOfPart blocks(part);
   const std::vector<std::int64_t> own =
       own_colours(touches_of(blocks, part), blocks.last_own - blocks.first_own,
-                  (static_cast<std::size_t>(pieces.points()) + cloud_block_points - 1) / cloud_block_points);
+                  static_cast<std::size_t>(pieces.blocks()));
   std::vector<std::vector<std::int64_t>> wanted(size);
   for (const std::int64_t number : blocks.number)
     wanted[static_cast<std::size_t>(pieces.owner_of_block(number))].push_back(number);

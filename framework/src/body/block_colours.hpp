@@ -30,8 +30,8 @@ class FreeColours {
   std::vector<std::vector<bool>> used_;  ///< by colour and unit
 };
 
-/// By internal index: whole blocks where a point of them is marked.
-void fill_blocks(std::vector<std::uint8_t>& marked);
+/// By internal index: whole blocks of so many points where one of them is marked.
+void fill_blocks(std::size_t block, std::vector<std::uint8_t>& marked);
 
 /// Gives the blocks of a part of a cloud the colours that they have in the whole body. The colour of a block follows from those
 /// before it, so rank 0 finds them, for one rank after the other. All ranks must call it; a rank without others leaves it.

@@ -18,8 +18,8 @@ class KeptBlocks {
   /// The rank's own blocks.
   KeptBlocks(const BodyFrame& frame, const CloudShares& shares) : frame_(frame), shares_(shares) {
     const std::span<const CloudShares::OnePoint> own = shares.own();
-    constexpr auto size = static_cast<std::size_t>(CurveShares::block);
-    std::int64_t number = CurveShares::block_of(shares.first_own());
+    const auto size = static_cast<std::size_t>(shares.pieces().block());
+    std::int64_t number = shares.pieces().block_of(shares.first_own());
     for (std::size_t at = 0; at < own.size(); at += size) {
       const auto block = own.subspan(at, std::min(size, own.size() - at));
       blocks_.emplace(number++, CloudShares::Points(block.begin(), block.end()));
@@ -70,7 +70,7 @@ class KeptBlocks {
   void over_points(Visit&& visit) const {
     std::size_t p = 0;
     for (const auto& [number, of] : blocks_) {
-      std::int64_t place = number * CurveShares::block;
+      std::int64_t place = number * shares_.pieces().block();
       for (const CloudShares::OnePoint& point : of) visit(p++, place++, point);
     }
   }
@@ -106,7 +106,7 @@ Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Re
   const double bond = frame.horizon * (1 + 1e-9);
   blocks.fetch_around((reach.bonds - 1) * bond, reached);
   for (int k = 1; k < reach.bonds; ++k) reached = blocks.with_families(std::move(reached));
-  if (reach.blocks) fill_blocks(reached);
+  if (reach.blocks) fill_blocks(static_cast<std::size_t>(pieces.block()), reached);
   blocks.fetch_around(bond, reached);
   CloudPart& part = cloud_part_;
   std::vector<std::int64_t> near;  // places, ascending

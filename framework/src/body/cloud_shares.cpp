@@ -97,7 +97,7 @@ std::size_t CloudShares::holder_of_block(std::int64_t block) const noexcept {
 }
 
 std::span<const CloudShares::OnePoint> CloudShares::held_block(std::int64_t block) const noexcept {
-  const std::int64_t first = block * CurveShares::block, last = std::min(pieces_.points(), first + CurveShares::block);
+  const std::int64_t first = block * pieces_.block(), last = std::min(pieces_.points(), first + pieces_.block());
   return std::span(held_).subspan(static_cast<std::size_t>(first - first_held_), static_cast<std::size_t>(last - first));
 }
 
@@ -140,9 +140,9 @@ std::vector<std::int64_t> CloudShares::blocks_around(std::span<const OnePoint> p
     for (const std::uint64_t key : asked_here[r]) {
       from = std::lower_bound(from, keys_.end(), key);
       for (auto at = from; at != keys_.end() && *at == key;) {
-        const std::int64_t block = CurveShares::block_of(first_held_ + (at - keys_.begin()));
+        const std::int64_t block = pieces_.block_of(first_held_ + (at - keys_.begin()));
         if (found[r].empty() || found[r].back() != block) found[r].push_back(block);
-        at = keys_.begin() + std::min(std::ssize(keys_), CurveShares::block * (block + 1) - first_held_);
+        at = keys_.begin() + std::min(std::ssize(keys_), pieces_.block() * (block + 1) - first_held_);
       }
     }
   }
@@ -167,7 +167,7 @@ std::map<std::int64_t, CloudShares::Points> CloudShares::fetch(const std::vector
   for (std::size_t r = 0; r < got.size(); ++r) {
     auto next = got[r].begin();
     for (const std::int64_t block : asked[r]) {
-      const auto end = next + std::min(CurveShares::block, got[r].end() - next);
+      const auto end = next + std::min(pieces_.block(), got[r].end() - next);
       fetched.emplace(block, Points(next, end));
       next = end;
     }

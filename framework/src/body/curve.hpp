@@ -41,20 +41,25 @@ std::vector<std::int32_t> curve_order(const std::vector<Point>& positions, doubl
 class CurveShares {
  public:
   CurveShares(std::int64_t points, int ranks)
-      : points_(points), blocks_((points + block - 1) / block), ranks_(static_cast<std::int64_t>(ranks)) {}
+      : points_(points),
+        block_(static_cast<std::int64_t>(cloud_block_points(static_cast<std::size_t>(points)))),
+        blocks_((points + block_ - 1) / block_),
+        ranks_(static_cast<std::int64_t>(ranks)) {}
 
-  static constexpr auto block = static_cast<std::int64_t>(cloud_block_points);
-  static std::int64_t block_of(std::int64_t place) noexcept { return place / block; }
   std::int64_t points() const noexcept { return points_; }
+  std::int64_t blocks() const noexcept { return blocks_; }
+  /// Points of a block.
+  std::int64_t block() const noexcept { return block_; }
+  std::int64_t block_of(std::int64_t place) const noexcept { return place / block_; }
   int owner_of_block(std::int64_t b) const noexcept { return static_cast<int>(b * ranks_ / blocks_); }
   int owner(std::int64_t place) const noexcept { return owner_of_block(block_of(place)); }
   /// The first place of a rank; of the one after the last: how many there are.
   std::int64_t first(std::int64_t rank) const noexcept {
-    return std::min(points_, block * ((rank * blocks_ + ranks_ - 1) / ranks_));
+    return std::min(points_, block_ * ((rank * blocks_ + ranks_ - 1) / ranks_));
   }
 
  private:
-  std::int64_t points_, blocks_, ranks_;
+  std::int64_t points_, block_, blocks_, ranks_;
 };
 
 }  // namespace perikit

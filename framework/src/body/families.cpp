@@ -201,14 +201,15 @@ std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t
   const std::size_t points = body.points();
   const CellList cells(rows, points, body.dimension(), body.horizon());
   const double limit = body.horizon() * (1 + 1e-10);
+  const std::size_t block = body.block_points();
   std::vector<std::vector<std::int32_t>> touches(last - first);
   parallel_for(touches.size(), [&](std::size_t k) {
     const std::size_t b = first + k;
     std::vector<std::int32_t>& units = touches[k];
     units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p)
+    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p)
       cells.around(&rows[4 * p], [&](std::int32_t q) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / cloud_block_points);
+        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / block);
         if (unit == units.back() || std::ranges::find(units, unit) != units.end()) return;
         if (squared_distance(rows, p, static_cast<std::size_t>(q)) > limit * limit) return;
         if (!body.cut(body.position(p), body.position(static_cast<std::size_t>(q)))) units.push_back(unit);

@@ -166,7 +166,7 @@ void Partition::keep_families(const Reach& reach) {
   };
   for (std::size_t n = 0; n < points; ++n) at(n) = part_.roles[n] >= Role::image;
   for (int k = 1; k < reach.bonds; ++k) step();
-  if (reach.blocks) fill_blocks(reached);
+  if (reach.blocks) fill_blocks(whole_->block_points(), reached);
   // Of images that are there, the sources are, too.
   bool more = false;
   const auto add_sources = [&] {
@@ -181,7 +181,7 @@ void Partition::keep_families(const Reach& reach) {
   mark(Role::near);
   step();
   do {
-    fill_blocks(reached);
+    fill_blocks(whole_->block_points(), reached);
     add_sources();
   } while (more);
   mark(Role::far);

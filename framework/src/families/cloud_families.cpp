@@ -56,9 +56,10 @@ template <int D>
 void CloudFamilies::measure() {
   const Row* position = positions(body_);
   std::atomic<std::size_t> cut{0}, irregular{0};
-  parallel_for(cloud_blocks(body_.points()), [&](std::size_t block) {
+  const CloudBlocks pieces = pieces_of(body_.points());
+  parallel_for(pieces.count(), [&](std::size_t block) {
     std::vector<double> r, omega;
-    for (std::size_t p = block * cloud_block_points; p < std::min(body_.points(), (block + 1) * cloud_block_points); ++p) {
+    for (std::size_t p = pieces.begin(block); p < pieces.end(block); ++p) {
       const std::span<std::int32_t> family(lists_.neighbour.data() + lists_.first[p], neighbours(p).size());
       const Point x = body_.position(p);
       r.clear();

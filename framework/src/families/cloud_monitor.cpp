@@ -104,10 +104,11 @@ void CloudMonitor::bound_motion(ConstFieldView u, std::span<double> moved) {
 bool CloudMonitor::begin(ConstFieldView u) {
   const AlignedVector<Row>* known = known_ ? known_->u : nullptr;
   std::atomic<bool> same{known != nullptr};
+  const CloudBlocks pieces = pieces_of(body_.points());
   if (known)
-    parallel_for(cloud_blocks(body_.points()), [&](std::size_t b) {
+    parallel_for(pieces.count(), [&](std::size_t b) {
       bool here = true;
-      for (std::size_t p = b * cloud_block_points; p < std::min(body_.points(), (b + 1) * cloud_block_points); ++p)
+      for (std::size_t p = pieces.begin(b); p < pieces.end(b); ++p)
         for (int c = 0; c < u.components; ++c) here &= u.component(c)[p] == (*known)[p][c];
       if (!here) same = false;
     });

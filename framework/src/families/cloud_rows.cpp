@@ -17,28 +17,26 @@ void complete_pieces(GroupMarks& marks, std::size_t points) {
 
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth) {
   rows.resize(points);
-  parallel_for(cloud_blocks(points), [&](std::size_t b) {
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
-      Row row{};
-      for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
-      if (fourth) row[3] = fourth[p];
-      rows[p] = row;
-    }
+  pieces_of(points).over_points([&](std::size_t p) {
+    Row row{};
+    for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
+    if (fourth) row[3] = fourth[p];
+    rows[p] = row;
   });
 }
 
-BlockReach cloud_reach(const FamilyLists& families, std::size_t points) {
+BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks) {
   BlockReach reach;
-  reach.units = cloud_blocks(points);
+  reach.units = blocks.count();
   reach.touches.resize(reach.units);
   for (std::size_t b = 0; b < reach.units; ++b) {
     reach.own.push_back(static_cast<std::int32_t>(b));
     std::vector<std::int32_t>& units = reach.touches[b];
     units.push_back(static_cast<std::int32_t>(b));
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+    for (std::size_t p = blocks.begin(b); p < blocks.end(b); ++p) {
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k) {
         const auto unit =
-            static_cast<std::int32_t>(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]) / cloud_block_points);
+            static_cast<std::int32_t>(blocks.of(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)])));
         if (unit != units.back()) units.push_back(unit);
       }
     }
@@ -48,7 +46,7 @@ BlockReach cloud_reach(const FamilyLists& families, std::size_t points) {
   return reach;
 }
 
-Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach) {
+Colouring cloud_colouring(const Body& body, const FamilyLists& families, const CloudBlocks& blocks, const BlockReach& reach) {
   const std::size_t points = families.first.size() - 1, groups = padded(points) / padding;
   std::vector<std::size_t> found(groups);  // one more than the block that has listed a group last
   const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
@@ -56,7 +54,7 @@ Colouring cloud_colouring(const Body& body, const FamilyLists& families, const B
       const std::size_t group = point / padding;
       if (std::exchange(found[group], b + 1) != b + 1) touched.push_back(static_cast<std::int32_t>(group));
     };
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) {
+    for (std::size_t p = blocks.begin(b); p < blocks.end(b); ++p) {
       add(p);
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k)
         add(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]));
@@ -65,8 +63,6 @@ Colouring cloud_colouring(const Body& body, const FamilyLists& families, const B
   return Colouring(reach, body.block_colours().empty() ? free_colours(reach) : body.block_colours(), groups, touch);
 }
 
-bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points) noexcept {
-  return QuietBlocks::moves(u, b * cloud_block_points, std::min(points, (b + 1) * cloud_block_points));
-}
+bool CloudBlocks::moves(ConstFieldView u, std::size_t b) const noexcept { return QuietBlocks::moves(u, begin(b), end(b)); }
 
 }  // namespace perikit

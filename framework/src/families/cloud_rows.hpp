@@ -1,6 +1,8 @@
 #pragma once
 /// What the loops over clouds share: point-major mirrors of fields, and blocks of points.
 
+#include <algorithm>
+
 #include "families/blocks.hpp"
 #include "families/counted_row.hpp"
 #include "perikit/body/body.hpp"
@@ -15,9 +17,33 @@ using Row = CountedRow;
 typedef double Row __attribute__((vector_size(32)));
 #endif
 
-constexpr std::size_t cloud_blocks(std::size_t points) noexcept {
-  return (points + cloud_block_points - 1) / cloud_block_points;
-}
+/// Pieces of so many points that follow each other; of a cloud: the blocks that its loops run over.
+class CloudBlocks {
+ public:
+  CloudBlocks() = default;
+  CloudBlocks(std::size_t points, std::size_t size) : points_(points), size_(size) {}
+  explicit CloudBlocks(const Body& body) : CloudBlocks(body.points(), body.block_points()) {}
+  std::size_t count() const noexcept { return (points_ + size_ - 1) / size_; }
+  std::size_t size() const noexcept { return size_; }
+  std::size_t begin(std::size_t b) const noexcept { return b * size_; }
+  std::size_t end(std::size_t b) const noexcept { return std::min(points_, (b + 1) * size_); }
+  std::size_t of(std::size_t point) const noexcept { return point / size_; }
+  /// Whether a point of block b moves.
+  bool moves(ConstFieldView u, std::size_t b) const noexcept;
+  /// body(p) for all points of all blocks, in parallel.
+  template <class Use>
+  void over_points(Use&& use) const {
+    parallel_for(count(), [&](std::size_t b) {
+      for (std::size_t p = begin(b); p < end(b); ++p) use(p);
+    });
+  }
+
+ private:
+  std::size_t points_ = 0, size_ = 256;
+};
+
+/// For loops over points that leave each other alone.
+inline CloudBlocks pieces_of(std::size_t points) noexcept { return {points, 256}; }
 
 /// Marks all groups of the pieces of so many points that have a marked one.
 void complete_pieces(GroupMarks& marks, std::size_t points);
@@ -26,12 +52,9 @@ void complete_pieces(GroupMarks& marks, std::size_t points);
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth = nullptr);
 
 /// Blocks, and those that hold neighbours of them.
-BlockReach cloud_reach(const FamilyLists& families, std::size_t points);
+BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks);
 
 /// Colours of these blocks; on a part of a body those that they have in the whole one. Blocks wait for those that write to the same eight points.
-Colouring cloud_colouring(const Body& body, const FamilyLists& families, const BlockReach& reach);
-
-/// Whether a point of block b moves.
-bool cloud_moves(ConstFieldView u, std::size_t b, std::size_t points) noexcept;
+Colouring cloud_colouring(const Body& body, const FamilyLists& families, const CloudBlocks& blocks, const BlockReach& reach);
 
 }  // namespace perikit

@@ -14,6 +14,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
       points_(families_.body().points()),
+      blocks_(families_.body()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
       gradient_of_(families_, formulation_.order),
       upper_(points_),
@@ -22,8 +23,8 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       gradient_(D * points_),
       flux_(D * points_),
       force_(points_) {
-  const BlockReach reach = cloud_reach(families_.lists(), points_);
-  colouring_ = cloud_colouring(families_.body(), families_.lists(), reach);
+  const BlockReach reach = cloud_reach(families_.lists(), blocks_);
+  colouring_ = cloud_colouring(families_.body(), families_.lists(), blocks_, reach);
   quiet_ = parts.quiet_blocks(reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
@@ -52,7 +53,7 @@ void CloudBonds<D>::set_factors(std::span<const double> factors) {
   if (!pairs_) return;
   far_factor_.resize(factors.size());
   const FamilyLists& lists = families_.lists();
-  parallel_for(factor_ ? blocks() : 0, [&](std::size_t b) {
+  parallel_for(factor_ ? blocks_.count() : 0, [&](std::size_t b) {
     over_points(b, [&](std::size_t p) {
       for (auto k = static_cast<std::size_t>(upper_[p]); k < static_cast<std::size_t>(lists.first[p + 1]); ++k)
         far_factor_[k] = factors[static_cast<std::size_t>(families_.index(lists.neighbour[k], static_cast<std::int32_t>(p)))];
@@ -243,8 +244,8 @@ template <int D>
 void CloudBonds<D>::volumes(std::size_t b, const Pass& pass) noexcept {
   const bool tangent = pass.work.tangent();
   double H[9 * padding], dH[9 * padding], volume[volume_components * padding] = {};
-  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
-  for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+  const std::size_t end = blocks_.end(b);
+  for (std::size_t first = blocks_.begin(b); first < end; first += padding) {
     if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
@@ -259,8 +260,8 @@ template <int D>
 void CloudBonds<D>::pressures(std::size_t b, const Pass& pass) noexcept {
   const bool tangent = pass.work.tangent();
   double H[9 * padding], dH[9 * padding], pressure[2][padding] = {};
-  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
-  for (std::size_t first = b * cloud_block_points; first < end; first += padding) {
+  const std::size_t end = blocks_.end(b);
+  for (std::size_t first = blocks_.begin(b); first < end; first += padding) {
     if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
@@ -292,7 +293,7 @@ void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
 template <int D>
 void CloudBonds<D>::bonds(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
-  for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+  for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) {
     GroupEnergy unwanted, &energy = pass.energies ? pass.energies[p / padding] : unwanted;
     if (pass.wanted(static_cast<std::int64_t>(p)) && bonds_of_point(p, s, pass, &energy) >= 0) return pass.report(static_cast<std::int64_t>(p));
   }
@@ -311,19 +312,19 @@ void CloudBonds<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(last, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+    quiet_.look(last, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
   // Each pass reads what the one before it left at one family's reach.
   const auto awake = [&](auto&& block) {
     return [&](std::size_t b) {
       if (quiet_.awake(b, 2)) block(b);
     };
   };
-  parallel_for(blocks(), [&](std::size_t b) {
+  parallel_for(blocks_.count(), [&](std::size_t b) {
     if (quiet_.begins(b)) gradients(b, pass);
   });
-  if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { bonds(b, pass); });
+  if (pass.alone()) return parallel_for(blocks_.count(), [&](std::size_t b) { bonds(b, pass); });
   colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
-  if (selective_) parallel_for(blocks(), awake([&](std::size_t b) { pressures(b, pass); }));
+  if (selective_) parallel_for(blocks_.count(), awake([&](std::size_t b) { pressures(b, pass); }));
   auto stress_on_points = [&](std::size_t b) {
     if (!quiet_.awake(b, 2)) return;
     over_points(b, [&](std::size_t p) {
@@ -334,9 +335,9 @@ void CloudBonds<D>::run(Pass& pass) {
     });
   };
   if (gradient_of_.stored()) colouring_.for_each(stress_on_points);
-  else parallel_for(blocks(), stress_on_points);
+  else parallel_for(blocks_.count(), stress_on_points);
   if (pass.bad >= 0) return;
-  parallel_for(blocks(), [&](std::size_t b) {
+  parallel_for(blocks_.count(), [&](std::size_t b) {
     const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
     over_points(b, [&](std::size_t p) {
       if (!pass.wanted(static_cast<std::int64_t>(p))) return;

@@ -24,7 +24,6 @@ class CloudBonds final : public EvaluationSpace {
   void report(ModelReport& report) const override;
 
  private:
-  std::size_t blocks() const noexcept { return cloud_blocks(points_); }
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
   int bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, GroupEnergy* energy);
@@ -43,7 +42,7 @@ class CloudBonds final : public EvaluationSpace {
   }
   template <class Visit>
   void over_points(std::size_t b, Visit&& visit) const {
-    for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) visit(p);
+    for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) visit(p);
   }
   int bonds_at_once() const noexcept { return selective_ && pairs_ ? batch_points / 2 : batch_points; }
   std::int64_t first_bond(std::size_t p) const noexcept { return pairs_ ? upper_[p] : families_.lists().first[p]; }
@@ -56,6 +55,7 @@ class CloudBonds final : public EvaluationSpace {
   bool pairs_;       ///< each bond evaluated once for both ends
   bool two_states_;  ///< and yet with a history of its own for each
   std::size_t points_;
+  CloudBlocks blocks_;
   const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_of_;
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index

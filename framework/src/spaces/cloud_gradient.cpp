@@ -21,10 +21,7 @@ template <int D>
 void CloudGradient<D>::store_stencils() {
   stencil_.assign(D * families_.bonds(), 0.0);
   std::atomic<std::size_t> lower{0};
-  const std::size_t points = families_.body().points();
-  parallel_for(cloud_blocks(points), [&](std::size_t b) {
-    for (std::size_t p = b * cloud_block_points; p < std::min(points, (b + 1) * cloud_block_points); ++p) lower += store_stencil(p);
-  });
+  pieces_of(families_.body().points()).over_points([&](std::size_t p) { lower += store_stencil(p); });
   fallbacks_ = lower;
 }
 

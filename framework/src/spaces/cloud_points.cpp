@@ -9,25 +9,26 @@ CloudPoints<D>::CloudPoints(const SpaceParts& parts)
     : families_(*parts.families.cloud()),
       laws_(parts.laws),
       points_(families_.body().points()),
+      blocks_(families_.body()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
       gradient_(families_),
       u_(points_),
       flux_(D * points_) {
-  const BlockReach reach = cloud_reach(families_.lists(), points_);
+  const BlockReach reach = cloud_reach(families_.lists(), blocks_);
   quiet_ = parts.quiet_blocks(reach);
 }
 
 template <int D>
 void CloudPoints<D>::block(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
-  const std::size_t end = std::min(points_, (b + 1) * cloud_block_points);
+  const std::size_t end = blocks_.end(b);
   const auto gradient_lane = [&](std::size_t p, const AlignedVector<Row>& u, double* H) {
     Row h[D];
     gradient_.at(p, u, h);
     for (int c = 0; c < D; ++c)
       for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points] = h[e][c];
   };
-  for (std::size_t first = b * cloud_block_points; first < end; first += batch_points) {
+  for (std::size_t first = blocks_.begin(b); first < end; first += batch_points) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
     if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding,
@@ -80,14 +81,14 @@ void CloudPoints<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(2, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
-  parallel_for(blocks(), [&](std::size_t b) {
+    quiet_.look(2, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
+  parallel_for(blocks_.count(), [&](std::size_t b) {
     if (quiet_.begins(b)) block(b, pass);
   });
   if (pass.bad >= 0 || pass.alone()) return;
-  parallel_for(blocks(), [&](std::size_t b) {
+  parallel_for(blocks_.count(), [&](std::size_t b) {
     if (!quiet_.awake(b, 2)) return;
-    for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+    for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) {
       if (!pass.wanted(static_cast<std::int64_t>(p))) continue;
       const Row f = gradient_.divergence(p, flux_, stress_);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];

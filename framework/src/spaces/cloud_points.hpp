@@ -19,12 +19,12 @@ class CloudPoints final : public EvaluationSpace {
   void report(ModelReport& report) const override;
 
  private:
-  std::size_t blocks() const noexcept { return cloud_blocks(points_); }
   void block(std::size_t b, Pass& pass);
 
   const CloudFamilies& families_;
   const Laws& laws_;
   std::size_t points_;
+  CloudBlocks blocks_;
   const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_;
   AlignedVector<Row> u_, w_;          ///< mirrors

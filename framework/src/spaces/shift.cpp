@@ -72,8 +72,8 @@ class ShiftSystem {
   /// visit(block, its first point, the end of its points).
   template <class Visit>
   void over_blocks(Visit&& visit) const {
-    parallel_for(cloud_blocks(body_.points()),
-                 [&](std::size_t b) { visit(b, b * cloud_block_points, std::min(body_.points(), (b + 1) * cloud_block_points)); });
+    const CloudBlocks pieces = pieces_of(body_.points());
+    parallel_for(pieces.count(), [&](std::size_t b) { visit(b, pieces.begin(b), pieces.end(b)); });
   }
   template <class Visit>
   void over_points(Visit&& visit) const {
@@ -301,7 +301,7 @@ class PartShift : public ShiftSystem<D> {
     gradients_.resize(part_.size() * D);
     reverse_.resize(this->families_.lists().neighbour.size());
     first_.resize(reverse_.size() + 1);
-    std::vector<std::vector<Seen>> seen(cloud_blocks(this->body_.points()));  // by block of points, put together below
+    std::vector<std::vector<Seen>> seen(pieces_of(this->body_.points()).count());  // by block of points, put together below
     this->over_blocks([&](std::size_t b, std::size_t begin, std::size_t end) {
       LocalStencil<D> stencil;
       FamilyArrays family;

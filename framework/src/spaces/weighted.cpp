@@ -327,15 +327,14 @@ void Weighted<D>::run(Pass& pass) {
     quiet_.wake();
   else
     quiet_.look(1, [&](std::size_t b) {
-      return lattice_ ? lattice_->tiles.moves(b, pass.u) : cloud_moves(pass.u, b, body_.points());
+      return lattice_ ? lattice_->tiles.moves(b, pass.u) : CloudBlocks(body_).moves(pass.u, b);
     });
   (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
     if (quiet_.awake(b, 1)) block(b, pass);
   });
   if (!singles_) return;
-  parallel_for(cloud_blocks(stride), [&](std::size_t b) {
-    for (std::size_t p = b * cloud_block_points; p < std::min(stride, (b + 1) * cloud_block_points); ++p)
-      for (int c = 0; c < D; ++c) pass.out.component(c)[p] += out_rows_[p][c];
+  pieces_of(stride).over_points([&](std::size_t p) {
+    for (int c = 0; c < D; ++c) pass.out.component(c)[p] += out_rows_[p][c];
   });
 }
 

@@ -29,7 +29,7 @@ class Weighted final : public EvaluationSpace {
   void run(Pass& pass) override;
   void complete(GroupMarks& marks) const override {
     if (lattice_) lattice_->tiles.complete(marks);
-    else complete_pieces(marks, cloud_block_points);
+    else complete_pieces(marks, body_.block_points());
   }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;
@@ -43,7 +43,7 @@ class Weighted final : public EvaluationSpace {
  private:
   std::size_t blocks() const noexcept { return block_first_.size() - 1; }
   /// Where a run puts the energy of block b.
-  std::size_t first_group(std::size_t b) const noexcept { return lattice_ ? lattice_->tiles.first_group(b) : b * cloud_block_points / padding; }
+  std::size_t first_group(std::size_t b) const noexcept { return lattice_ ? lattice_->tiles.first_group(b) : b * body_.block_points() / padding; }
   static constexpr std::size_t stencil_bytes = std::size_t{256} << 20;  ///< cap for stored stencils
   /// Fewer points with an evaluation point at every bond are faster one by one.
   static constexpr std::size_t fewest_together = 3;

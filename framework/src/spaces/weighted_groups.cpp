@@ -17,7 +17,7 @@ Weighted<D>::Weighted(const SpaceParts& parts)
       // Local force states have no common adjoint: every point makes its own stencil.
       share_(parts.share && formulation_.force_state == ForceState::variational), owners_(selective_ ? 1 : 0), parts_(formulation_.parts(D)) {
   lattice_ ? prepare_lattice() : prepare_cloud();
-  const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), body_.points());
+  const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), CloudBlocks(body_));
   quiet_ = parts.quiet_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
   if (parts.numbered()) number_groups();
@@ -101,8 +101,9 @@ void Weighted<D>::group_points(std::span<const std::int32_t> points, std::int32_
 template <int D>
 void Weighted<D>::prepare_cloud() {
   const std::size_t together = parts_ > 0 ? 8 : 1;
+  const CloudBlocks blocks(body_);
   for (std::size_t p = 0; p < body_.points(); ++p) {
-    if (p % cloud_block_points == 0) block_first_.push_back(groups_.size());
+    if (p % blocks.size() == 0) block_first_.push_back(groups_.size());
     if (cloud_->neighbours(p).empty()) continue;
     if (groups_.size() == block_first_.back() || groups_.back().count == together)
       groups_.push_back({static_cast<std::uint32_t>(members_.size()), -1, -1, 0, false});
@@ -111,7 +112,7 @@ void Weighted<D>::prepare_cloud() {
   }
   block_first_.push_back(groups_.size());
   make_cloud_stencils();
-  cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), cloud_reach(cloud_->lists(), body_.points()));
+  cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), blocks, cloud_reach(cloud_->lists(), blocks));
 }
 
 template <int D>

@@ -24,7 +24,7 @@ class CloudPairs final : public PairLoop {
     fails_ = true;
     return &nearest_;
   }
-  std::size_t blocks() const noexcept override { return cloud_blocks(points_); }
+  std::size_t blocks() const noexcept override { return blocks_.count(); }
   std::size_t bytes() const noexcept override {
     return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
   }
@@ -62,6 +62,7 @@ class CloudPairs final : public PairLoop {
   bool dilatation_;
   bool fails_ = false;
   std::size_t points_;
+  CloudBlocks blocks_;
   const Row* position_;                        ///< {x, y, z, V}
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
   NearestFailure nearest_;                     ///< only where damage is on
@@ -74,11 +75,11 @@ class CloudPairs final : public PairLoop {
 template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
     : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
-      dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()),
+      dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()), blocks_(families_.body()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
-  const BlockReach reach = cloud_reach(lists_, points_);
-  colouring_ = cloud_colouring(families_.body(), lists_, reach);
+  const BlockReach reach = cloud_reach(lists_, blocks_);
+  colouring_ = cloud_colouring(families_.body(), lists_, blocks_, reach);
   if (parts.quiet) watch_waves(reach);
 }
 
@@ -277,7 +278,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
 template <int D>
 template <PairWork work>
 void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
-  for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) {
+  for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) {
     if (pass.only && !pass.only[p / padding]) continue;
     double energy = 0;
     if (!run_point<work>(p, pass, energy)) return report_bad(static_cast<std::int64_t>(p));
@@ -288,7 +289,7 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
 template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
-  look(pass, [&](std::size_t b) { return cloud_moves(pass.u, b, points_); });
+  look(pass, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
   mirror_rows(pass.u, points_, u_);
   if (fails_) {
@@ -297,12 +298,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   }
   if (pass.w.data) mirror_rows(pass.w, points_, w_);
   if (fields_.modulus.size() > 0) moduli_.resize(points_);
-  const auto over_points = [&](auto&& body) {
-    parallel_for(blocks(), [&](std::size_t b) {
-      for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) body(p);
-    });
-  };
-  over_points([&](std::size_t p) {
+  blocks_.over_points([&](std::size_t p) {
     if (pass.q.data) u_[p][3] = pass.q.data[p];
     if (pass.dq.data) w_[p][3] = pass.dq.data[p];
     if (!moduli_.empty()) {
@@ -318,7 +314,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   each_block(pass, colouring_, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
   if (pass.work == PairWork::force && fails_ && !pass.only && bad() < 0) nearest_.u = &u_;
   if (vectors && bad() < 0) {
-    over_points([&](std::size_t p) {
+    blocks_.over_points([&](std::size_t p) {
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += force_[p][c];
     });
   }

@@ -25,9 +25,10 @@ class CloudPenalty final : public ZeroEnergyPenalty {
         gradient_(families_),
         position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
         points_(families_.body().points()),
+        blocks_(families_.body()),
         M_(columns * points_, Column{}),
         flux_(D * points_) {
-    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists(), points_));
+    if (parts.skip) quiet_ = QuietBlocks(cloud_reach(families_.lists(), blocks_));
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
@@ -35,7 +36,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     mirror(u);
     if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
-    else quiet_.look(2, [&](std::size_t b) { return cloud_moves(u, b, points_); });
+    else quiet_.look(2, [&](std::size_t b) { return blocks_.moves(u, b); });
     const auto meant = [&](std::size_t p) { return !only || only[p / padding]; };
     over_points([&](std::size_t b) { return quiet_.begins(b); },
                 [&](std::size_t p) {
@@ -79,9 +80,9 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   /// body(p) for the points of the blocks with wanted(b).
   template <class Wanted, class Body>
   void over_points(Wanted&& wanted, Body&& body) const {
-    parallel_for(cloud_blocks(points_), [&](std::size_t b) {
+    parallel_for(blocks_.count(), [&](std::size_t b) {
       if (!wanted(b)) return;
-      for (std::size_t p = b * cloud_block_points; p < std::min(points_, (b + 1) * cloud_block_points); ++p) body(p);
+      for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) body(p);
     });
   }
 
@@ -162,6 +163,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   CloudGradient<D> gradient_;
   const Row* position_;          ///< {x, y, z, V}
   std::size_t points_;
+  CloudBlocks blocks_;
   AlignedVector<Column> M_;
   AlignedVector<Row> u_, flux_;  ///< mirror of u, {u, M} where M is a number; H, then Q, by columns
   QuietBlocks quiet_;

@@ -9,7 +9,7 @@ namespace perikit {
 
 template <int D>
 PenaltyAssembly<D>::PenaltyAssembly(const PenaltyParts& parts, const BlockRows& rows)
-    : parts_(parts), rows_(rows), colouring_(cloud_reach(rows.lists(), rows.size())) {}
+    : parts_(parts), rows_(rows), blocks_(rows.size(), rows.body().block_points()), colouring_(cloud_reach(rows.lists(), blocks_)) {}
 
 template <int D>
 void PenaltyAssembly<D>::add_row(std::size_t row, BlockMatrix& K, Memory& m) const {
@@ -32,7 +32,7 @@ template <int D>
 std::int64_t PenaltyAssembly<D>::add(ConstFieldView, BlockMatrix& K) {
   memory_.prepare([] { return std::make_unique<Memory>(); });
   colouring_.for_each([&](std::size_t b) {
-    for (std::size_t r = b * cloud_block_points; r < std::min(rows_.size(), (b + 1) * cloud_block_points); ++r) add_row(r, K, memory_.mine());
+    for (std::size_t r = blocks_.begin(b); r < blocks_.end(b); ++r) add_row(r, K, memory_.mine());
   });
   return -1;
 }

@@ -1,6 +1,6 @@
 #pragma once
 #include "assembly/assembly.hpp"
-#include "families/blocks.hpp"
+#include "families/cloud_rows.hpp"
 #include "terms/penalty_element.hpp"
 
 namespace perikit {
@@ -25,6 +25,7 @@ class PenaltyAssembly final : public Assembly {
 
   PenaltyParts parts_;
   const BlockRows& rows_;
+  CloudBlocks blocks_;
   Colouring colouring_;
   PerThread<Memory> memory_;
 };

@@ -137,9 +137,10 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       colouring_ = &tiles.colouring;
     } else {
       for (std::size_t r = 0; r < rows_.size(); ++r) row_order_.push_back(static_cast<std::int32_t>(r));
-      for (std::size_t b = 0; b < cloud_blocks(rows_.size()); ++b) block_end_.push_back(std::min(rows_.size(), (b + 1) * cloud_block_points));
-      reach = cloud_reach(rows_.lists(), rows_.size());
-      of_cloud_ = cloud_colouring(rows_.body(), rows_.lists(), reach);
+      const CloudBlocks blocks(rows_.size(), rows_.body().block_points());
+      for (std::size_t b = 0; b < blocks.count(); ++b) block_end_.push_back(blocks.end(b));
+      reach = cloud_reach(rows_.lists(), blocks);
+      of_cloud_ = cloud_colouring(rows_.body(), rows_.lists(), blocks, reach);
     }
     if (parts_.skip) quiet_ = QuietBlocks(std::move(reach));
   }

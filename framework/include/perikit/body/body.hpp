@@ -74,8 +74,13 @@ struct BodyFrame {
   std::vector<Crack> cracks;
 };
 
-/// Points of a cloud that loops take together, one after the other along the curve that orders them.
-inline constexpr std::size_t cloud_block_points = 32;
+/// How many points of a cloud of so many loops take together, one after the other along the curve that orders them: few where there are few, so that
+/// threads find blocks that do not touch, many where there are many, so that what a block touches stays in a cache for longer.
+constexpr std::size_t cloud_block_points(std::size_t points_of_all_ranks) noexcept {
+  std::size_t size = 32;
+  while (size < 256 && 2000 * size <= padded(points_of_all_ranks)) size *= 2;
+  return size;
+}
 
 /// Internal indices run over [0, stride); only `points` of them are alive, the rest is padding of zero volume.
 class Body {
@@ -141,6 +146,8 @@ class Body {
   bool part() const noexcept { return !places_.empty(); }
   /// Of the fields of the whole body.
   std::size_t stride_of_all_ranks() const noexcept { return part() ? stride_of_whole_ : stride_; }
+  /// Of a cloud: points of a block.
+  std::size_t block_points() const noexcept { return cloud_block_points(stride_of_all_ranks()); }
   /// Of a part: the internal index of the point at a place of the whole body; -1 where it is not here.
   std::int32_t at_place(std::int64_t place) const noexcept;
   /// Input number in the whole body.
