@@ -120,6 +120,15 @@ template <int D, class Visit>
   if constexpr (D > 2) visit(std::integral_constant<int, 2>());
 }
 
+/// Asks for the lists of the bonds first ... last - 1 before they are read. Those of a large cloud come from memory, and loops over one half of each
+/// family leave gaps that the processor does not foresee.
+inline void expect_bonds(const CloudFamilies& families, std::int64_t first, std::int64_t last) noexcept {
+  const std::int32_t* const neighbour = families.lists().neighbour.data();
+  for (std::int64_t k = first; k < last; k += 16) __builtin_prefetch(neighbour + k);
+  if (const double* const omega = families.whole_omegas())
+    for (std::int64_t k = first; k < last; k += 8) __builtin_prefetch(omega + k);
+}
+
 /// use(j, l, omega) for the bonds of p to j and l, two at a time, with their b omega by row. The last of an odd number goes with p itself, whose
 /// omega is 0. Like over_components, for lambdas that are PERIKIT_INLINE, so that sums stay in registers.
 template <class Use>

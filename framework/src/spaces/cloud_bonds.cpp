@@ -168,6 +168,7 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
   double* const dH = selective_ ? s.dHt : s.dH;
   double *xi = s.bond[0], *g = s.bond[1];
   const std::int64_t end = families_.lists().first[p + 1];
+  if (p + 1 < points_) expect_bonds(families_, both_ends ? upper_[p + 1] : end, families_.lists().first[p + 2]);
   for (std::int64_t begin = both_ends ? upper_[p] : families_.lists().first[p]; begin < end; begin += bonds_at_once()) {
     const int n = static_cast<int>(std::min<std::int64_t>(bonds_at_once(), end - begin));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));

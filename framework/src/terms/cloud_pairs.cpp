@@ -192,6 +192,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   bool finite = true;
   const Pack onset(nearest_.least_onset);
   Pack excess(-std::numeric_limits<double>::max());
+  if (p + 1 < points_) expect_bonds(families_, half ? upper_[p + 1] : end, lists_.first[p + 2]);
   for (std::int64_t begin = half ? upper_[p] : lists_.first[p]; begin < end; begin += batch_points) {
     const int n = static_cast<int>(std::min<std::int64_t>(batch_points, end - begin));
     gather<work>(p, begin, n, g, s);
