@@ -7,14 +7,6 @@
 
 namespace perikit {
 
-void complete_pieces(GroupMarks& marks, std::size_t points) {
-  const std::size_t groups = points / padding;
-  for (std::size_t first = 0; first < marks.size(); first += groups) {
-    const std::span piece = std::span(marks).subspan(first, std::min(groups, marks.size() - first));
-    if (std::ranges::find(piece, 1) != piece.end()) std::ranges::fill(piece, std::uint8_t{1});
-  }
-}
-
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth) {
   rows.resize(points);
   pieces_of(points).over_points([&](std::size_t p) {

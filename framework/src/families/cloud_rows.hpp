@@ -45,9 +45,6 @@ class CloudBlocks {
 /// For loops over points that leave each other alone.
 inline CloudBlocks pieces_of(std::size_t points) noexcept { return {points, 256}; }
 
-/// Marks all groups of the pieces of so many points that have a marked one.
-void complete_pieces(GroupMarks& marks, std::size_t points);
-
 /// rows[p] <- components of u at p, zero in the rest, and fourth[p] in the last place where it is given.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth = nullptr);
 

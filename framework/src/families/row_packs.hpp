@@ -35,6 +35,13 @@ inline Row row_at(const Pack* packs, int first) noexcept {
 #endif
 }
 
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+/// Four numbers from each place, aligned as rows are.
+inline Pack load_fours(const double* first, const double* second) noexcept {
+  return {reinterpret_cast<detail::Lanes>(_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(first)), _mm256_load_pd(second), 1))};
+}
+#endif
+
 /// Two rows side by side, those of two bonds of a family. They fill a register of eight numbers, two of four or four of two.
 class TwoRows {
  public:
@@ -43,8 +50,7 @@ class TwoRows {
   static TwoRows load(const Row& first, const Row& second) noexcept {
     TwoRows r;
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-    r.part_[0].v = reinterpret_cast<detail::Lanes>(
-        _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(numbers(first))), _mm256_load_pd(numbers(second)), 1));
+    r.part_[0] = load_fours(numbers(first), numbers(second));
 #else
     PERIKIT_UNROLL for (int i = 0; i < packs / 2; ++i) {
       r.part_[i] = Pack::load(numbers(first) + i * pack_width);
@@ -151,8 +157,7 @@ class RowColumns {
     const auto row = [&](int l) { return numbers(rows[stride * static_cast<std::size_t>(at[l])]); };
     RowColumns r;
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-    PERIKIT_UNROLL for (int i = 0; i < 4; ++i)
-      r.column_[i].v = reinterpret_cast<detail::Lanes>(_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(row(i))), _mm256_load_pd(row(i + 4)), 1));
+    PERIKIT_UNROLL for (int i = 0; i < 4; ++i) r.column_[i] = load_fours(row(i), row(i + 4));
 #else
     PERIKIT_UNROLL for (int i = 0; i < 4; ++i) r.column_[i] = Pack::load(row(i % pack_width) + i / pack_width * pack_width);
 #endif

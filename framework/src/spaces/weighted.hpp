@@ -2,6 +2,7 @@
 #include <memory>
 #include <vector>
 
+#include "body/block_colours.hpp"
 #include "families/blocks.hpp"
 #include "families/cloud_families.hpp"
 #include "families/cloud_rows.hpp"
@@ -29,7 +30,7 @@ class Weighted final : public EvaluationSpace {
   void run(Pass& pass) override;
   void complete(GroupMarks& marks) const override {
     if (lattice_) lattice_->tiles.complete(marks);
-    else complete_pieces(marks, body_.block_points());
+    else fill_blocks(body_.block_points() / padding, marks);
   }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;

@@ -292,16 +292,14 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
   look(pass, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
-  mirror_rows(pass.u, points_, u_);
+  mirror_rows(pass.u, points_, u_, pass.q.data);
   if (fails_) {
     nearest_.u = nullptr;
     nearest_.excess.resize(points_);
   }
-  if (pass.w.data) mirror_rows(pass.w, points_, w_);
+  if (pass.w.data) mirror_rows(pass.w, points_, w_, pass.dq.data);
   if (fields_.modulus.size() > 0) moduli_.resize(points_);
   blocks_.over_points([&](std::size_t p) {
-    if (pass.q.data) u_[p][3] = pass.q.data[p];
-    if (pass.dq.data) w_[p][3] = pass.dq.data[p];
     if (!moduli_.empty()) {
       Row row{};
       for (int c = 0; c < D && fields_.correction.size() > 0; ++c) row[c] = fields_.correction.component(c)[p];
