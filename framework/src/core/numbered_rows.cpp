@@ -16,8 +16,8 @@ struct Run {
 
 }  // namespace
 
-std::vector<std::byte> own_share(std::span<const std::int64_t> numbers, std::size_t first, std::size_t count,
-                                 const RowsOf& rows_of) {
+std::vector<std::int64_t> own_share(std::span<const std::int64_t> numbers, std::size_t first, std::size_t count,
+                                    const RowsOf& rows_of) {
   const auto begin = std::ranges::lower_bound(numbers, static_cast<std::int64_t>(first)),
              end = std::lower_bound(begin, numbers.end(), static_cast<std::int64_t>(first + count));
   std::vector<Run> runs;
@@ -28,17 +28,12 @@ std::vector<std::byte> own_share(std::span<const std::int64_t> numbers, std::siz
   }
   const std::span<const double> rows =
       rows_of(static_cast<std::size_t>(begin - numbers.begin()), static_cast<std::size_t>(end - numbers.begin()));
-  const std::uint64_t size = runs.size();
-  std::vector<std::byte> bytes(sizeof size + runs.size() * sizeof(Run) + rows.size_bytes());
-  std::byte* to = bytes.data();
-  const auto add = [&](const void* from, std::size_t of) {
-    if (of > 0) std::memcpy(to, from, of);
-    to += of;
-  };
-  add(&size, sizeof size);
-  add(runs.data(), runs.size() * sizeof(Run));
-  add(rows.data(), rows.size_bytes());
-  return bytes;
+  static_assert(sizeof(Run) == sizeof(std::int64_t));
+  std::vector<std::int64_t> words(1 + runs.size() + rows.size());
+  words[0] = std::ssize(runs);
+  if (!runs.empty()) std::memcpy(&words[1], runs.data(), runs.size() * sizeof(Run));
+  if (!rows.empty()) std::memcpy(&words[1 + runs.size()], rows.data(), rows.size_bytes());
+  return words;
 }
 
 void unpack_share(std::span<const std::byte> share, std::size_t width, std::span<double> rows) {
@@ -57,8 +52,9 @@ void unpack_share(std::span<const std::byte> share, std::size_t width, std::span
 
 std::vector<double> gather_piece(std::span<const std::int64_t> numbers, std::size_t first, std::size_t count, std::size_t width,
                                  const RowsOf& rows_of) {
+  const std::vector<std::int64_t> mine = own_share(numbers, first, count, rows_of);
   std::vector<double> rows;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(own_share(numbers, first, count, rows_of))) {
+  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
     rows.resize(count * width);
     unpack_share(of_rank, width, rows);
   }

@@ -81,16 +81,16 @@ void share_points(const BodyProblem& problem, std::span<const double> mine, std:
   std::vector<double> rows;
   for (std::size_t round = 0; round < all; round += ranks * piece) {
     // Everybody sends to everybody what is the other's in this round.
-    std::vector<std::vector<std::byte>> to;
+    std::vector<std::vector<std::int64_t>> to;
     for (std::size_t first = round; first < round + ranks * piece; first += piece)
-      to.push_back(points(first) == 0 ? std::vector<std::byte>()
+      to.push_back(points(first) == 0 ? std::vector<std::int64_t>()
                                       : own_share(numbers, first, points(first), [&](std::size_t from, std::size_t end) {
                                           return mine.subspan(from * width, (end - from) * width);
                                         }));
     const std::size_t first = round + static_cast<std::size_t>(communicator().rank()) * piece;
     rows.resize(points(first) * width);
-    for (const std::vector<std::byte>& of_rank : exchange_among_all(to))
-      if (!of_rank.empty()) unpack_share(of_rank, width, rows);
+    for (const std::vector<std::int64_t>& of_rank : exchanged(to))
+      if (!of_rank.empty()) unpack_share(std::as_bytes(std::span(of_rank)), width, rows);
     if (!rows.empty()) use(first, rows);
   }
 }

@@ -72,9 +72,6 @@ class CommunicatorScope {
   Communicator* before_;
 };
 
-/// What each rank has for each: to[k] goes to rank k. Returns what has come from each. All ranks must call it.
-std::vector<std::vector<std::byte>> exchange_among_all(const std::vector<std::vector<std::byte>>& to);
-
 /// The message of the lowest rank that has one, on all; empty where none has. All ranks must call it.
 std::string first_message(const std::string& mine);
 

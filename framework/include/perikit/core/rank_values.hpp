@@ -109,12 +109,7 @@ auto agreed(Work&& work) {
   } catch (const InputError& error) {
     failure = error.what();
   }
-  for (const std::vector<std::byte>& text : communicator().gather(std::as_bytes(std::span(failure))))
-    if (failure.empty()) failure.assign(reinterpret_cast<const char*>(text.data()), text.size());
-  std::vector<std::byte> told(failure.size());
-  std::memcpy(told.data(), failure.data(), failure.size());
-  communicator().broadcast(told);
-  if (!told.empty()) throw InputError(std::string(reinterpret_cast<const char*>(told.data()), told.size()));
+  if (const std::string first = first_message(failure); !first.empty()) throw InputError(first);
   return std::move(*result);
 }
 
