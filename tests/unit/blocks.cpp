@@ -178,6 +178,30 @@ TEST_CASE("colours of tiles: of one colour they are disjoint when grown by the r
   }
 }
 
+TEST_CASE("turns of a loop: each index once, after all that it waits for, and one thread comes soon to what waited") {
+  // Blocks in a row of which every other one waits for both neighbours.
+  constexpr int n = 101;
+  std::vector<std::vector<std::int32_t>> waits_for(n);
+  for (int i = 1; i < n; i += 2) waits_for[static_cast<std::size_t>(i)] = {i - 1, i + 1};
+  for (const int threads : {1, 2, 7, 64}) {
+    const std::vector<std::int32_t> turns = loop_turns(waits_for, threads);
+    REQUIRE(turns.size() == n);
+    std::vector<int> place(n, -1);
+    for (int k = 0; k < n; ++k) place[static_cast<std::size_t>(turns[static_cast<std::size_t>(k)])] = k;
+    CHECK(std::ranges::count(place, -1) == 0);
+    int farthest = 0, nearest = n;
+    for (int i = 1; i < n; i += 2)
+      for (const std::int32_t other : waits_for[static_cast<std::size_t>(i)]) {
+        const int apart = place[static_cast<std::size_t>(i)] - place[static_cast<std::size_t>(other)];
+        farthest = std::max(farthest, apart);
+        nearest = std::min(nearest, apart);
+      }
+    CHECK(nearest >= 1);
+    if (threads == 1) CHECK(farthest <= 3);
+    if (threads == 7) CHECK(farthest <= 28);  // a fourth of the loop, where all of one colour first would make it a half
+  }
+}
+
 TEST_CASE("times of loops: each index once, and how long they take on more threads") {
   CHECK(makespan({{3, 1, 1, 1}, {}}, 2) == 3);
   CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);   // in their order

@@ -20,11 +20,13 @@ namespace {
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 std::optional<std::vector<TimedLoop>> loop_times;
 
-void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), const LoopOrder* order = nullptr) {
+void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), LoopOrder* order = nullptr) {
   using Clock = std::chrono::steady_clock;
   TimedLoop loop{std::vector<double>(n), {}};
+  if (order) order->begin(1);
   auto before = Clock::now();
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t i = order ? order->turn(k) : k;
     body(context, i);
     const auto now = Clock::now();
     loop.seconds[i] = std::chrono::duration<double>(now - before).count();
@@ -45,23 +47,61 @@ std::vector<TimedLoop> LoopTimes::take() { return std::exchange(*loop_times, {})
 
 double makespan(const TimedLoop& loop, int threads) {
   std::priority_queue<double, std::vector<double>, std::greater<>> free_at(std::greater<>(), std::vector<double>(static_cast<std::size_t>(threads), 0.0));
-  std::vector<double> ends;
-  for (std::size_t i = 0; i < loop.seconds.size(); ++i) {
+  std::vector<double> ends(loop.seconds.size());
+  const auto run = [&](std::size_t i, std::span<const std::int32_t> waits_for) {
     double begin = free_at.top();
-    for (std::size_t k = 0; !loop.waits_for.empty() && k < loop.waits_for[i].size(); ++k)
-      begin = std::max(begin, ends[static_cast<std::size_t>(loop.waits_for[i][k])]);
+    for (const std::int32_t other : waits_for) begin = std::max(begin, ends[static_cast<std::size_t>(other)]);
     free_at.pop();
-    free_at.push(ends.emplace_back(begin + loop.seconds[i]));
-  }
+    free_at.push(ends[i] = begin + loop.seconds[i]);
+  };
+  for (const std::int32_t i : loop_turns(loop.waits_for, threads))
+    run(static_cast<std::size_t>(i), loop.waits_for[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < ends.size() && loop.waits_for.empty(); ++i) run(i, {});
   return ends.empty() ? 0 : *std::ranges::max_element(ends);
 }
 
-LoopOrder::LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for)
-    : ended_(std::make_unique<std::atomic<std::uint32_t>[]>(waits_for.size())) {
+/// As if all took equally long: again and again as many of the lowest that may begin as there are turns that do not follow each
+/// other up.
+std::vector<std::int32_t> loop_turns(const std::vector<std::vector<std::int32_t>>& waits_for, int threads) {
+  const std::size_t n = waits_for.size(), together = threads == 1 ? 1 : 2 * static_cast<std::size_t>(threads);
+  std::vector<std::size_t> awaited(n);
+  std::vector<std::vector<std::int32_t>> followers(n);
+  std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
+  for (std::size_t i = 0; i < n; ++i) {
+    awaited[i] = waits_for[i].size();
+    if (awaited[i] == 0) ready.push(static_cast<std::int32_t>(i));
+    for (const std::int32_t other : waits_for[i])
+      followers[static_cast<std::size_t>(other)].push_back(static_cast<std::int32_t>(i));
+  }
+  std::vector<std::int32_t> turns;
+  while (!ready.empty()) {
+    const std::size_t begin = turns.size();
+    for (; turns.size() < begin + together && !ready.empty(); ready.pop()) turns.push_back(ready.top());
+    for (std::size_t k = begin; k < turns.size(); ++k)
+      for (const std::int32_t follower : followers[static_cast<std::size_t>(turns[k])])
+        if (--awaited[static_cast<std::size_t>(follower)] == 0) ready.push(follower);
+  }
+  return turns;
+}
+
+LoopOrder::LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for, std::vector<std::uint8_t> late)
+    : late_(std::move(late)), ended_(std::make_unique<std::atomic<std::uint32_t>[]>(waits_for.size())) {
   for (const std::vector<std::int32_t>& of : waits_for) {
     waits_for_.insert(waits_for_.end(), of.begin(), of.end());
     first_.push_back(static_cast<std::int64_t>(waits_for_.size()));
   }
+  early_ = size() - static_cast<std::size_t>(std::ranges::count(late_, std::uint8_t{1}));
+}
+
+void LoopOrder::begin(int threads) {
+  ++round_;
+  if (threads_ == threads) return;
+  threads_ = threads;
+  std::vector<std::vector<std::int32_t>> waits;
+  for (std::size_t i = 0; i < size(); ++i) waits.emplace_back(waits_for(i).begin(), waits_for(i).end());
+  turns_ = loop_turns(waits, threads);
+  if (!late_.empty())
+    std::ranges::stable_partition(turns_, [&](std::int32_t i) { return late_[static_cast<std::size_t>(i)] == 0; });
 }
 
 namespace {
@@ -120,22 +160,24 @@ void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(v
   late.arrival->finish();
 }
 
-/// Indices are handed out in ascending order, so that the lowest of those that have not ended waits for nothing but what arrives.
-void parallel_for(LoopOrder& order, LateIndices late, void* context, void (*body)(void*, std::size_t)) {
+/// A turn comes after those of all that it waits for, so that the first of those that have not ended waits for nothing but what
+/// arrives.
+void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body)(void*, std::size_t)) {
   const std::size_t n = order.size();
+  const LateIndices late{order.early(), arrival};
   if (loop_times) [[unlikely]] {
-    if (late.any()) late.arrival->finish();
+    if (late.any()) arrival->finish();
     return run_timed(n, context, body, &order);
   }
-  if (threads == 1 || n < 2) return parallel_for(n, late, context, body);
   struct Ordered {
     LoopOrder& order;
     void* context;
     void (*body)(void*, std::size_t);
   } ordered{order, context, body};
-  order.begin();
-  parallel_for(n, late, &ordered, [](void* of, std::size_t i) {
+  order.begin(threads);
+  parallel_for(n, late, &ordered, [](void* of, std::size_t k) {
     const auto& [order, context, body] = *static_cast<Ordered*>(of);
+    const std::size_t i = order.turn(k);
     order.wait(i);
     body(context, i);
     order.end(i);

@@ -58,16 +58,13 @@ class Colouring {
   /// them.
   template <class Body>
   void for_each(Body&& body, Arrival* arrival = nullptr) const {
-    parallel_for(order_, [&](std::size_t i) { body(static_cast<std::size_t>(blocks_[i])); }, {early_, arrival});
+    parallel_for(order_, body, arrival);
   }
   std::size_t colours() const noexcept { return colours_; }
- private:
-  /// Puts those first that need not wait for what comes from other ranks; waits_for: by place in `blocks_`.
-  void put_late_last(const BlockReach& reach, std::vector<std::vector<std::int32_t>>& waits_for);
 
-  std::size_t colours_ = 0, early_ = 0;
-  std::vector<std::int32_t> blocks_;  ///< the first `early_` of them, and the others, colour by colour
-  mutable LoopOrder order_;           ///< of `blocks_`
+ private:
+  std::size_t colours_ = 0;
+  mutable LoopOrder order_;  ///< of blocks
 };
 
 }  // namespace perikit

@@ -24,8 +24,9 @@ class LoopTimes {
   std::vector<TimedLoop> take();
 };
 
-/// Seconds until the last thread is done when threads take indices in their order, each the next one as soon as it is free, and wait
-/// with it for what it waits for, as parallel_for does. Starting and ending the loop costs nothing here.
+/// Seconds until the last thread is done when threads take indices in their order (`loop_turns` where some wait), each the next
+/// one as soon as it is free, and wait with it for what it waits for, as parallel_for does. Starting and ending the loop costs
+/// nothing here.
 double makespan(const TimedLoop& loop, int threads);
 
 }  // namespace perikit
