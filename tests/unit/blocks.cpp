@@ -4,7 +4,9 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
 #include <set>
 
@@ -145,43 +147,46 @@ TEST_CASE("colouring: sums into shared units have one order, whatever the number
   set_thread_count(threads);
 }
 
-TEST_CASE("colours of tiles: of one colour they are disjoint when grown by the reach of a family, and there are no more than that takes") {
-  for (const std::array<int, 3>& extent : {std::array{200, 64, 64}, std::array{80, 10, 10}, std::array{31, 31, 31}, std::array{500, 300, 1}, std::array{9, 9, 9}}) {
-    Lattice lattice;
-    lattice.whole = {extent[0], extent[1], extent[2]};
-    const LatticeTiling tiling(lattice);
+TEST_CASE(
+    "colours of tiles: families of one colour touch disjoint cells, and there are no more colours than squares in place of discs "
+    "take") {
+  for (const std::array<int, 3>& extent : {std::array{200, 64, 64}, std::array{80, 10, 10}, std::array{31, 31, 31},
+                                           std::array{500, 300, 1}, std::array{9, 9, 9}, std::array{600, 12, 5}})
     for (const std::int64_t cells : {1, 3, 7}) {
-      const std::array<std::int64_t, 3> reach{(cells + 7) / 8, cells, extent[2] > 1 ? cells : 0};
-      std::set<std::int32_t> colours;
-      bool disjoint = true;
-      for (std::int64_t a = 0; a < tiling.tiles(); ++a) {
-        colours.insert(tiling.colour(a, reach));
-        for (std::int64_t b = 0; b < a; ++b) {
-          if (tiling.colour(a, reach) != tiling.colour(b, reach)) continue;
-          bool apart = false;
-          std::int64_t x = a, y = b;
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            const std::int64_t s = tiling.size[axis], between = std::abs(x % tiling.count[axis] - y % tiling.count[axis]) * s - s;
-            apart |= between >= 2 * reach[axis];
-            x /= tiling.count[axis];
-            y /= tiling.count[axis];
+      const auto [n0, n1, n2] = extent;
+      const Lattice lattice = make_lattice(n2 > 1 ? 3 : 2, 1, {0, 0, 0}, {double(n0), double(n1), double(n2)}, double(cells));
+      const LatticeTiling tiling(lattice);
+      const std::vector<std::array<int, 3>> offsets = family_offsets(lattice, double(cells));
+      const TileColours colours(tiling, offsets);
+      std::set<std::array<std::int64_t, 3>> reached{{0, 0, 0}};  // groups along rows, and rows
+      for (const auto& d : offsets)
+        for (const int side : {-1, 1}) reached.insert({(std::abs(d[0]) + 7) / 8 * side, d[1], d[2]});
+      std::map<std::array<std::int64_t, 4>, std::set<std::int64_t>> tiles;  // that touch a cell, by colour and cell
+      std::set<std::int32_t> found;
+      const std::int64_t groups = (lattice.whole[0] + 7) / 8;
+      for (std::int64_t k2 = 0; k2 < lattice.whole[2]; ++k2)
+        for (std::int64_t k1 = 0; k1 < lattice.whole[1]; ++k1)
+          for (std::int64_t g = 0; g<groups; g += tiling.count[0]> 1 ? 1 : groups) {
+            const std::int64_t tile = tiling.number(tiling.of({8 * g, k1, k2}));
+            const std::int32_t colour = colours.of(tile);
+            found.insert(colour);
+            for (const auto& d : reached) tiles[{colour, tiling.count[0] > 1 ? g + d[0] : 0, k1 + d[1], k2 + d[2]}].insert(tile);
           }
-          disjoint &= apart;
-        }
-      }
-      CHECK(disjoint);
+      CHECK(std::ranges::all_of(tiles, [](const auto& of_cell) { return of_cell.second.size() == 1; }));
       std::size_t most = 1;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        most *= static_cast<std::size_t>(std::min(tiling.count[axis], tiling.size[axis] >= 2 * reach[axis] ? std::int64_t{reach[axis] > 0 ? 2 : 1} : 1 + 2 * reach[axis]));
-      CHECK(colours.size() <= most);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::int64_t reach = axis == 0 ? (cells + 7) / 8 : std::min(cells, lattice.whole[axis] - 1);
+        most *=
+            static_cast<std::size_t>(std::min(tiling.count[axis], 1 + (2 * reach + tiling.size[axis] - 1) / tiling.size[axis]));
+      }
+      CHECK(found.size() <= most);
     }
-  }
 }
 
 TEST_CASE("turns of a loop: each index once, after all that it waits for, and one thread comes soon to what waited") {
   // Blocks in a row of which every other one waits for both neighbours.
   constexpr int n = 101;
-  std::vector<std::vector<std::int32_t>> waits_for(n);
+  LoopWaits waits_for(n);
   for (int i = 1; i < n; i += 2) waits_for[static_cast<std::size_t>(i)] = {i - 1, i + 1};
   for (const int threads : {1, 2, 7, 64}) {
     const std::vector<std::int32_t> turns = loop_turns(waits_for, threads);
@@ -198,7 +203,7 @@ TEST_CASE("turns of a loop: each index once, after all that it waits for, and on
       }
     CHECK(nearest >= 1);
     if (threads == 1) CHECK(farthest <= 3);
-    if (threads == 7) CHECK(farthest <= 28);  // a fourth of the loop, where all of one colour first would make it a half
+    if (threads == 2) CHECK(farthest <= 12);
   }
 }
 
@@ -208,8 +213,11 @@ TEST_CASE("times of loops: each index once, and how long they take on more threa
   CHECK(makespan({{1, 2, 3}, {}}, 1) == 6);
   CHECK(makespan({{1, 2, 3}, {}}, 64) == 3);
   CHECK(makespan({}, 4) == 0);
-  CHECK(makespan({{3, 1, 2, 1}, {{}, {}, {1}, {0, 2}}}, 2) == 4);
-  CHECK(makespan({{1, 1, 1}, {{}, {0}, {1}}}, 64) == 3);
+  const auto waiting = [](std::vector<double> seconds, LoopWaits waits_for) {
+    return TimedLoop{std::move(seconds), std::make_shared<const LoopWaits>(std::move(waits_for))};
+  };
+  CHECK(makespan(waiting({3, 1, 2, 1}, {{}, {}, {1}, {0, 2}}), 2) == 4);
+  CHECK(makespan(waiting({1, 1, 1}, {{}, {0}, {1}}), 64) == 3);
   LoopTimes times;
   std::vector<int> seen(7, 0);
   parallel_for(seen.size(), [&](std::size_t i) { ++seen[i]; });
@@ -217,7 +225,7 @@ TEST_CASE("times of loops: each index once, and how long they take on more threa
   CHECK(seen == std::vector<int>(7, 1));
   REQUIRE(loops.size() == 1);
   CHECK(loops[0].seconds.size() == 7);
-  CHECK(loops[0].waits_for.empty());
+  CHECK(loops[0].waits_for == nullptr);
   for (const double seconds : loops[0].seconds) CHECK(seconds >= 0);
   CHECK(times.take().empty());
 }

@@ -32,7 +32,7 @@ void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), L
     loop.seconds[i] = std::chrono::duration<double>(now - before).count();
     before = now;
   }
-  for (std::size_t i = 0; order && i < n; ++i) loop.waits_for.emplace_back(order->waits_for(i).begin(), order->waits_for(i).end());
+  if (order) loop.waits_for = order->waits_for();
   loop_times->push_back(std::move(loop));
 }
 }  // namespace
@@ -54,16 +54,18 @@ double makespan(const TimedLoop& loop, int threads) {
     free_at.pop();
     free_at.push(ends[i] = begin + loop.seconds[i]);
   };
-  for (const std::int32_t i : loop_turns(loop.waits_for, threads))
-    run(static_cast<std::size_t>(i), loop.waits_for[static_cast<std::size_t>(i)]);
-  for (std::size_t i = 0; i < ends.size() && loop.waits_for.empty(); ++i) run(i, {});
+  if (const LoopWaits* const waits = loop.waits_for.get())
+    for (const std::int32_t i : loop_turns(*waits, threads))
+      run(static_cast<std::size_t>(i), (*waits)[static_cast<std::size_t>(i)]);
+  else
+    for (std::size_t i = 0; i < ends.size(); ++i) run(i, {});
   return ends.empty() ? 0 : *std::ranges::max_element(ends);
 }
 
-/// As if all took equally long: again and again as many of the lowest that may begin as there are turns that do not follow each
-/// other up.
-std::vector<std::int32_t> loop_turns(const std::vector<std::vector<std::int32_t>>& waits_for, int threads) {
-  const std::size_t n = waits_for.size(), together = threads == 1 ? 1 : 2 * static_cast<std::size_t>(threads);
+/// As if all took equally long: again and again the lowest ones that may begin, then what waited for them. As many at a time as
+/// leave each of several threads several to do meanwhile.
+std::vector<std::int32_t> loop_turns(const LoopWaits& waits_for, int threads) {
+  const std::size_t n = waits_for.size(), together = static_cast<std::size_t>(threads) * static_cast<std::size_t>(threads);
   std::vector<std::size_t> awaited(n);
   std::vector<std::vector<std::int32_t>> followers(n);
   std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
@@ -84,22 +86,17 @@ std::vector<std::int32_t> loop_turns(const std::vector<std::vector<std::int32_t>
   return turns;
 }
 
-LoopOrder::LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for, std::vector<std::uint8_t> late)
-    : late_(std::move(late)), ended_(std::make_unique<std::atomic<std::uint32_t>[]>(waits_for.size())) {
-  for (const std::vector<std::int32_t>& of : waits_for) {
-    waits_for_.insert(waits_for_.end(), of.begin(), of.end());
-    first_.push_back(static_cast<std::int64_t>(waits_for_.size()));
-  }
-  early_ = size() - static_cast<std::size_t>(std::ranges::count(late_, std::uint8_t{1}));
-}
+LoopOrder::LoopOrder(LoopWaits waits_for, std::vector<std::uint8_t> late)
+    : waits_for_(std::make_shared<const LoopWaits>(std::move(waits_for))),
+      late_(std::move(late)),
+      early_(size() - static_cast<std::size_t>(std::ranges::count(late_, std::uint8_t{1}))),
+      ended_(std::make_unique<std::atomic<std::uint32_t>[]>(size())) {}
 
 void LoopOrder::begin(int threads) {
   ++round_;
   if (threads_ == threads) return;
   threads_ = threads;
-  std::vector<std::vector<std::int32_t>> waits;
-  for (std::size_t i = 0; i < size(); ++i) waits.emplace_back(waits_for(i).begin(), waits_for(i).end());
-  turns_ = loop_turns(waits, threads);
+  turns_ = loop_turns(*waits_for_, threads);
   if (!late_.empty())
     std::ranges::stable_partition(turns_, [&](std::int32_t i) { return late_[static_cast<std::size_t>(i)] == 0; });
 }
@@ -142,7 +139,7 @@ void run_alone(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
 }  // namespace
 
 void LoopOrder::wait(std::size_t i) const noexcept {
-  for (const std::int32_t other : waits_for(i))
+  for (const std::int32_t other : (*waits_for_)[i])
     await([&] { return ended_[static_cast<std::size_t>(other)].load(std::memory_order_acquire) == round_; });
 }
 

@@ -33,7 +33,8 @@ Colouring::Colouring(const BlockReach& reach)
 
 /// Of two blocks that touch a cell the one of the higher colour waits for the other. Who waits for a late block is late.
 Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& colour_of, std::size_t cells, const Touch& touch) {
-  std::vector<std::vector<std::int32_t>> of_colour, waits_for(colour_of.size());
+  std::vector<std::vector<std::int32_t>> of_colour;
+  LoopWaits waits_for(colour_of.size());
   for (std::size_t b = 0; b < colour_of.size(); ++b) {
     const auto colour = static_cast<std::size_t>(colour_of[b]);
     if (colour >= of_colour.size()) of_colour.resize(colour + 1);
@@ -57,7 +58,7 @@ Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& c
           reach.late(static_cast<std::size_t>(b)) ||
           std::ranges::any_of(before, [&](std::int32_t other) { return late[static_cast<std::size_t>(other)] != 0; });
     }
-  order_ = LoopOrder(waits_for, std::move(late));
+  order_ = LoopOrder(std::move(waits_for), std::move(late));
 }
 
 }  // namespace perikit

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <set>
+#include <utility>
 
 #include "families/lattice_slots.hpp"
 #include "families/quiet_blocks.hpp"
@@ -96,10 +98,11 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
             for (std::int64_t e = low[0]; e <= high[0]; ++e)
               touched.push_back(static_cast<std::int32_t>(tiling.number({e, d, c})));
       }
+  const TileColours colours(tiling, slots.offsets);
   std::vector<std::int32_t> of_blocks;
   reach.units = static_cast<std::size_t>(tiling.tiles());
   for (const std::int32_t tile : tiles) {
-    of_blocks.push_back(tiling.colour(tile, grow));
+    of_blocks.push_back(colours.of(tile));
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }
@@ -111,29 +114,26 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
   sequence = BlockSequence(reach);
   // Cells of the colouring: groups of eight along rows; whole rows where a tile is as long.
   const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;
+  std::set<std::array<int, 2>> to_rows{{0, 0}};
+  for (const auto& d : slots.offsets) to_rows.insert({d[1], d[2]});
+  const auto all_rows = static_cast<std::size_t>(lattice.extent[1] * lattice.extent[2]);
+  std::vector<std::size_t> found(all_rows);  // one more than the block that has listed a row last
   const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
-    const auto [k1_low, k1_high] = range_of(b, &LatticeRow::k1);
-    const auto [k2_low, k2_high] = range_of(b, &LatticeRow::k2);
-    const auto bound = [&](std::size_t a, std::int64_t k) { return std::clamp<std::int64_t>(k, 0, lattice.extent[a] - 1); };
-    const LatticeRow& row = rows[blocks[b].row_begin];
-    const std::int64_t chunk = row.first / chunk_points - lattice.index(0, row.k1, row.k2) / chunk_points;
-    const std::int64_t first = along == 1 ? 0 : std::max<std::int64_t>(0, chunk - grow[0]),
-                       last = along == 1 ? 0 : std::min(along - 1, chunk + row.chunks - 1 + grow[0]);
-    for (std::int64_t k2 = bound(2, k2_low - grow[2]); k2 <= bound(2, k2_high + grow[2]); ++k2)
-      for (std::int64_t k1 = bound(1, k1_low - grow[1]); k1 <= bound(1, k1_high + grow[1]); ++k1)
-        for (std::int64_t k0 = first; k0 <= last; ++k0)
-          touched.push_back(static_cast<std::int32_t>(k0 + along * (k1 + lattice.extent[1] * k2)));
+    for (std::size_t r = blocks[b].row_begin; r < blocks[b].row_end; ++r) {
+      const LatticeRow& row = rows[r];
+      const std::int64_t chunk = row.first / chunk_points - lattice.index(0, row.k1, row.k2) / chunk_points;
+      const std::int64_t first = along == 1 ? 0 : std::max<std::int64_t>(0, chunk - grow[0]),
+                         last = along == 1 ? 0 : std::min(along - 1, chunk + row.chunks - 1 + grow[0]);
+      for (const auto& [d1, d2] : to_rows) {
+        const std::int64_t k1 = row.k1 + d1, k2 = row.k2 + d2;
+        if (k1 < 0 || k1 >= lattice.extent[1] || k2 < 0 || k2 >= lattice.extent[2]) continue;
+        const std::int64_t to = k1 + lattice.extent[1] * k2;
+        if (std::exchange(found[static_cast<std::size_t>(to)], b + 1) == b + 1) continue;
+        for (std::int64_t k0 = first; k0 <= last; ++k0) touched.push_back(static_cast<std::int32_t>(k0 + along * to));
+      }
+    }
   };
-  colouring = Colouring(reach, of_blocks, static_cast<std::size_t>(along * lattice.extent[1] * lattice.extent[2]), touch);
-}
-
-std::pair<std::int64_t, std::int64_t> LatticeTiles::range_of(std::size_t b, std::int32_t LatticeRow::*index) const noexcept {
-  std::pair<std::int64_t, std::int64_t> range{rows[blocks[b].row_begin].*index, rows[blocks[b].row_begin].*index};
-  for (std::size_t r = blocks[b].row_begin; r < blocks[b].row_end; ++r) {
-    range.first = std::min<std::int64_t>(range.first, rows[r].*index);
-    range.second = std::max<std::int64_t>(range.second, rows[r].*index);
-  }
-  return range;
+  colouring = Colouring(reach, of_blocks, static_cast<std::size_t>(along) * all_rows, touch);
 }
 
 bool LatticeTiles::moves(std::size_t b, ConstFieldView u) const noexcept {

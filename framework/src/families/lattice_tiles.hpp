@@ -72,8 +72,6 @@ struct LatticeTiles {
  private:
   /// Which tiles a block touches, and its colour. tiles: by block.
   void colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Body& body, const LatticeSlots& slots);
-  /// The least and largest of an index of the rows of block b.
-  std::pair<std::int64_t, std::int64_t> range_of(std::size_t b, std::int32_t LatticeRow::*index) const noexcept;
 
   std::vector<std::int32_t> chunk_at_;  ///< by group of eight cells
   std::vector<std::pair<std::int32_t, std::uint8_t>>

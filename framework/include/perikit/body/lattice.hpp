@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace perikit {
@@ -56,11 +57,21 @@ struct LatticeTiling {
   std::int64_t number(const std::array<std::int64_t, 3>& tile) const noexcept {
     return tile[0] + count[0] * (tile[1] + count[1] * tile[2]);
   }
-  /// Of tile `number`: tiles of one colour touch disjoint cells when each of them is grown by `reach` (groups along axis 0, cells along the
-  /// others) on all sides.
-  std::int32_t colour(std::int64_t number, const std::array<std::int64_t, 3>& reach) const noexcept;
   /// The tile of a cell of the whole lattice.
   std::array<std::int64_t, 3> of(const std::array<std::int64_t, 3>& cell) const noexcept;
+};
+
+/// Few colours for tiles, such that the families of two tiles of one colour touch disjoint cells. Across rows the colour is first
+/// i + second j modulo the least number for which that holds, which for discs of rows are fewer than for squares.
+class TileColours {
+ public:
+  /// offsets: of the bonds of a family, internal axes [cells].
+  TileColours(const LatticeTiling& tiling, std::span<const std::array<int, 3>> offsets);
+  std::int32_t of(std::int64_t number) const noexcept;
+
+ private:
+  LatticeTiling tiling_;
+  std::int64_t along_, across_, first_ = 1, second_ = 1;  ///< colours along rows and across them
 };
 
 /// Integer offsets (internal axes) of the bonds of a whole family: |d| spacing <= horizon (1 + 1e-10), d != 0. The first half

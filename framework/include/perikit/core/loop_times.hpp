@@ -1,15 +1,17 @@
 #pragma once
 /// How long each block of each parallel loop takes, and what that makes on more threads than this machine has.
 
-#include <cstdint>
+#include <memory>
 #include <vector>
+
+#include "perikit/core/parallel.hpp"
 
 namespace perikit {
 
-/// A loop: the seconds of each index, and which indices it waits for (empty: none wait).
+/// A loop: the seconds of each index, and which indices it waits for (null: none wait).
 struct TimedLoop {
   std::vector<double> seconds;
-  std::vector<std::vector<std::int32_t>> waits_for;
+  std::shared_ptr<const LoopWaits> waits_for;
 };
 
 /// While one of these lives, loops run on one thread and are kept. One at a time.

@@ -18,6 +18,9 @@ void set_thread_count(int n) noexcept;
 /// 0 ... thread_count() - 1 inside a parallel_for, else 0: for choosing scratch memory, never for choosing work.
 int thread_index() noexcept;
 
+/// By index of a loop: those that it waits for, and never, by way of others, itself.
+using LoopWaits = std::vector<std::vector<std::int32_t>>;
+
 /// Which indices of a loop wait for which: an index begins when all those that it waits for have ended. What two of them do to
 /// the same memory comes in one order where one waits for the other, if only by way of others, on any number of threads.
 /// Otherwise the lowest indices come first, and those that waited for them soon after, so that what they share is still in the
@@ -25,14 +28,11 @@ int thread_index() noexcept;
 class LoopOrder {
  public:
   LoopOrder() = default;
-  /// By index: those that it waits for, and never, by way of others, itself. late: whether it reads what arrives, or waits for
-  /// one that does; empty: none.
-  explicit LoopOrder(const std::vector<std::vector<std::int32_t>>& waits_for, std::vector<std::uint8_t> late = {});
+  /// late: by index, whether it reads what arrives, or waits for one that does; empty: none.
+  explicit LoopOrder(LoopWaits waits_for, std::vector<std::uint8_t> late = {});
 
-  std::size_t size() const noexcept { return first_.size() - 1; }
-  std::span<const std::int32_t> waits_for(std::size_t i) const noexcept {
-    return std::span(waits_for_).subspan(static_cast<std::size_t>(first_[i]), static_cast<std::size_t>(first_[i + 1] - first_[i]));
-  }
+  std::size_t size() const noexcept { return waits_for_ ? waits_for_->size() : 0; }
+  std::shared_ptr<const LoopWaits> waits_for() const noexcept { return waits_for_; }
   /// How many indices are not late; they come before all others.
   std::size_t early() const noexcept { return early_; }
 
@@ -44,8 +44,7 @@ class LoopOrder {
   void end(std::size_t i) noexcept { ended_[i].store(round_, std::memory_order_release); }
 
  private:
-  std::vector<std::int64_t> first_{0};
-  std::vector<std::int32_t> waits_for_;
+  std::shared_ptr<const LoopWaits> waits_for_;
   std::vector<std::uint8_t> late_;
   std::size_t early_ = 0;
   std::vector<std::int32_t> turns_;                       ///< indices in the order in which threads take them
@@ -56,7 +55,7 @@ class LoopOrder {
 
 /// The order in which so many threads take the indices of a loop that wait for others, each for what follows it: the lowest first
 /// that wait for nothing among the last ones. One thread follows up what it has begun; several leave each other time to end.
-std::vector<std::int32_t> loop_turns(const std::vector<std::vector<std::int32_t>>& waits_for, int threads);
+std::vector<std::int32_t> loop_turns(const LoopWaits& waits_for, int threads);
 
 /// Values that are on their way while a loop runs. The thread that runs the loop looks after them, and no other calls what is not
 /// const.
