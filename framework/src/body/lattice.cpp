@@ -81,8 +81,8 @@ LatticeTiling::LatticeTiling(const Lattice& lattice) {
                      points = n[0] * n[1] * n[2];
   // Tiles that touch each other wait for each other, so that the rows of as many tiles as there are colours are the least time of
   // a step: of small tiles, that is a third. They cost a few percent, so large bodies, which have tiles enough, are spared them.
-  constexpr std::int64_t many_rows = 20000;
-  const bool small = n[2] > 1 && n[1] * n[2] < many_rows;
+  constexpr std::int64_t many_rows = 20000, few_points = 64000;
+  const bool small = n[2] > 1 && points >= few_points && n[1] * n[2] < many_rows;
   std::int64_t tile1 = small ? 4 : 8, tile2 = small ? 2 : 8;
   while (points / (tile1 * tile2 * std::min<std::int64_t>(n[0], segment * group)) < 16 && tile1 * tile2 > 1)
     (tile1 > tile2 ? tile1 : tile2) /= 2;
