@@ -130,13 +130,15 @@ void check(const Options& options) {
   if (options.ranks > 1 && !one_rank_holds(scene)) {
     summary = predict_ranks(scene, *registry, options.ranks, true);
   } else {
-    const PeakMemory peak;
-    Simulation simulation(scene, *registry);
-    summary = simulation.summary();  // which may still refuse
-    if (options.explain) summary += simulation.explanation(*registry);
-    try_step(simulation);
-    if (const double bytes = peak.bytes(); bytes > 0)
-      summary += fmt::format("process       about {:.3g} MB at most\n", bytes / 1e6);
+    {  // whose memory the parts of ranks need
+      const PeakMemory peak;
+      Simulation simulation(scene, *registry);
+      summary = simulation.summary();  // which may still refuse
+      if (options.explain) summary += simulation.explanation(*registry);
+      try_step(simulation);
+      if (const double bytes = peak.bytes(); bytes > 0)
+        summary += fmt::format("process       about {:.3g} MB at most\n", bytes / 1e6);
+    }
     if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks, false);
   }
   fmt::print("{}\n", scene.resolved);
