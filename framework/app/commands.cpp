@@ -13,6 +13,7 @@
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "new_project.hpp"
+#include "peak_memory.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
@@ -129,10 +130,16 @@ void check(const Options& options) {
   if (options.ranks > 1 && !one_rank_holds(scene)) {
     summary = predict_ranks(scene, *registry, options.ranks, true);
   } else {
-    Simulation simulation(scene, *registry);
-    summary = simulation.summary();  // which may still refuse
+    {  // whose memory the parts of ranks need
+      const PeakMemory peak;
+      Simulation simulation(scene, *registry);
+      summary = simulation.summary();  // which may still refuse
+      if (options.explain) summary += simulation.explanation(*registry);
+      try_step(simulation);
+      if (const double bytes = peak.bytes(); bytes > 0)
+        summary += fmt::format("process       about {:.3g} MB at most\n", bytes / 1e6);
+    }
     if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks, false);
-    if (options.explain) summary += simulation.explanation(*registry);
   }
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.

@@ -8,31 +8,67 @@
 #include <cstdlib>
 #include <vector>
 
+#include "peak_memory.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/serial_communicator.hpp"
+#include "perikit/fields/point_fields.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace perikit::app {
 
 namespace {
 
+/// Makes the fields of a frame after one step, and ends the run.
+class FrameAfterStep final : public Observer {
+ public:
+  explicit FrameAfterStep(Simulation& simulation) : simulation_(simulation) {}
+  void make() {
+    std::vector<std::string> names = simulation_.scene().output.fields;
+    if (names.empty()) names = {"displacement", simulation_.dynamic() ? "velocity" : "displacement", "strain_energy_density"};
+    PointFields fields(simulation_.problem(), simulation_.dynamic(), false);
+    fields.expect(names);
+    for (const std::string& name : names) {
+      fields.get(name);
+      fields.forget(name);
+    }
+  }
+  bool wants_sample(std::int64_t, double) override { return true; }
+  void step_done(const StepReport& report) override {
+    done_ = report.step > 0;
+    make();
+  }
+  void log(std::string_view) override {}
+  bool cancelled() const noexcept override { return done_; }
+
+ private:
+  Simulation& simulation_;
+  bool done_ = false;
+};
+
 struct Share {
-  double points = 0, near = 0, ghosts = 0, bytes = 0, of_all = 0;
-  bool placed_whole = false;
+  double points = 0, near = 0, ghosts = 0, bytes = 0, peak = 0, of_all = 0;
+  bool placed_whole = false, cloud = false;
 };
 
 Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks) {
   LoneRank alone(rank, ranks);
   const CommunicatorScope scope(alone);
-  Simulation simulation(scene, registry);
+  PeakMemory peak;
+  // A rank without others places its part in another way, which takes other memory.
+  Simulation simulation(scene, registry, [&](const std::string& step) {
+    if (step == "laws") peak.forget();
+  });
+  try_step(simulation);
   const Body& body = simulation.problem().body();
   Share share{static_cast<double>(body.owned().size()),
               0,
               0,
               static_cast<double>(simulation.problem().bytes()),
+              peak.bytes(),
               static_cast<double>(body.points_of_all_ranks()),
-              !simulation.problem().placed_whole().empty()};
+              !simulation.problem().placed_whole().empty(),
+              body.lattice() == nullptr};
   share.ghosts = static_cast<double>(body.points()) - share.points;
   const std::size_t materials = scene.regions.size() + 1;  // far points have one more
   for (const std::int32_t p : body.internal())
@@ -65,14 +101,21 @@ std::string crowded(int threads) {
       threads, cores, cores == 1 ? "" : "s", cores, threads);
 }
 
+void try_step(Simulation& simulation) {
+  try {
+    FrameAfterStep frame(simulation);
+    simulation.dynamic() ? simulation.run(frame) : frame.make();
+  } catch (const std::exception&) {
+    // A run says what is wrong, and a part alone has other forces than it has among others.
+  }
+}
+
 std::string predict_ranks(const Scene& scene, const Registry& registry, int ranks, bool heaviest_alone) {
-  Scene alone = scene;
-  alone.consistent = false;  // weights are found by all ranks together; they take 8 bytes a bond
   std::vector<Share> shares;
   if (heaviest_alone)
-    shares.push_back(share_of(alone, registry, heaviest_rank(scene, ranks), ranks));
+    shares.push_back(share_of(scene, registry, heaviest_rank(scene, ranks), ranks));
   else
-    for (int rank = 0; rank < ranks; ++rank) shares.push_back(share_of(alone, registry, rank, ranks));
+    for (int rank = 0; rank < ranks; ++rank) shares.push_back(share_of(scene, registry, rank, ranks));
   const auto most = [&](auto&& value) { return std::ranges::max(shares, {}, value); };
   double exchanged = 0;
   for (const Share& share : shares) exchanged += share.ghosts;
@@ -83,11 +126,15 @@ std::string predict_ranks(const Scene& scene, const Registry& registry, int rank
       heaviest_alone ? std::string() : fmt::format(", {:.3g} MB by all", 8e-6 * scene.body.dimension * exchanged);
   const std::string whole =
       largest.placed_whole ? fmt::format(", and about {:.3g} MB of where all points are", 30e-6 * points) : std::string();
-  const std::string parts = heaviest_alone ? fmt::format(
-                                                 "points        {:.0f}, more than one rank here can hold; each rank places its "
-                                                 "own part, of which the largest was set up\n",
-                                                 points)
-                                           : std::string();
+  const double peak = most(&Share::peak).peak;
+  const std::string in_all = peak > 0 ? fmt::format(", about {:.3g} MB a process at most", peak / 1e6) : std::string();
+  const std::string parts =
+      heaviest_alone
+          ? fmt::format(
+                "points        {:.0f}, more than one rank here can hold; each rank places its own part, of which {}\n", points,
+                largest.cloud ? "one in the middle of the curve was set up; others have as many points, and about as many ghosts"
+                              : "the largest was set up")
+          : std::string();
   return parts + fmt::format(
                      "ranks         {}\n"
                      "balance       {:.0f} points on the largest rank, {:.3f} of the mean\n"
@@ -95,10 +142,10 @@ std::string predict_ranks(const Scene& scene, const Registry& registry, int rank
                      "exchange      at most {:.3g} MB a rank and step{}\n"
                      "work          {:.0f} points evaluated on the busiest rank: {:.2f} of the speed of {} ranks without ghosts, "
                      "at best\n"
-                     "memory        at most {:.3g} MB a rank of its part{}\n",
+                     "memory        at most {:.3g} MB of arrays of its part on a rank{}{}\n",
                      ranks, largest.points, largest.points / mean, deepest.ghosts, deepest.ghosts / mean,
                      8e-6 * scene.body.dimension * deepest.ghosts, by_all, busiest.points + busiest.near,
-                     mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, whole);
+                     mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, in_all, whole);
 }
 
 }  // namespace perikit::app

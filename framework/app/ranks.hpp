@@ -4,6 +4,7 @@
 #include <string>
 
 #include "perikit/plugin/registry.hpp"
+#include "perikit/run/simulation.hpp"
 #include "perikit/scene/scene.hpp"
 
 namespace perikit::app {
@@ -13,6 +14,10 @@ int cores_of_rank();
 
 /// A warning where a rank has more threads than cores; else empty.
 std::string crowded(int threads);
+
+/// Takes one step of an explicit run and computes the fields of a frame, so that all is there that a run has in memory. Nothing
+/// is said or written; the state is of no use afterwards.
+void try_step(Simulation& simulation);
 
 /// What each of so many ranks would hold and exchange, found by setting up one after the other, in lines. Throws InputError for
 /// what they would refuse. heaviest_alone: of the one that has most, where the whole body is too much for one process.

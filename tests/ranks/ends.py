@@ -86,6 +86,18 @@ def refusals():
             print(done.stderr)
 
 
+def named_pair():
+    """Of several pairs of points at one place any number of ranks names the one that comes first in the input."""
+    text = with_points("pairs", lambda lines: lines[:1] + lines[:0:-1] + [lines[10], lines[1100], lines[555]])
+    x, y = [float(cell) for cell in open(WORK + "/pairs.csv").read().split("\n")[1 + 32 * 38 - 1100].split(",")[:2]]
+    expected = "found two points at (%.6g, %.6g, 0)" % (x, y)
+    for ranks in (0, 1, 2, 3):
+        done = run(PROGRAM, text, WORK + "/pairs", ranks)
+        check(done.returncode == 2 and perikit_lines(done.stderr, expected) == 1, "%d ranks name the pair that comes first" % ranks)
+        if done.returncode != 2 or perikit_lines(done.stderr, expected) != 1:
+            print(done.stderr)
+
+
 def other_commands():
     done = subprocess.run(["mpirun", "--oversubscribe", "-np", "2", PROGRAM, "study", "none.toml"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
     check(done.returncode == 2 and perikit_lines(done.stderr, "found 2 processes (OMPI_COMM_WORLD_SIZE); allowed: one, but for `perikit run`") == 1, "perikit study on 2 ranks")
@@ -187,6 +199,7 @@ need(LIBRARY)
 shutil.rmtree(WORK, ignore_errors=True)
 os.makedirs(WORK)
 refusals()
+named_pair()
 throws()
 other_commands()
 output_fails()

@@ -226,6 +226,9 @@ def own_parts(everything):
         pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
         if cloud:  # before points are turned inside out
             pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
+        if cloud:
+            pushed = text[:text.index("[[load]]")] + '[[load]]\nset = "high"\ntraction = [%s]\nface = "+x"\n' % ", ".join(['"0.1*t"', "0.02", "0"][:dimension])
+            yield kind + "traction", pushed + text[text.index("[integrator]"):]
         yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
 
 

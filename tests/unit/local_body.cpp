@@ -14,6 +14,8 @@
 #include "body/block_colours.hpp"
 #include "body/input_numbers.hpp"
 #include "body/point_share.hpp"
+#include "build/cloud_points.hpp"
+#include "build/scene_lattice.hpp"
 #include "files/hdf5_file.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/memory.hpp"
@@ -417,17 +419,49 @@ TEST_CASE("local bodies: more points than 32 bits can number are refused on one 
   CHECK(heaviest_rank(scene, ranks) >= 0);
 }
 
-TEST_CASE("local bodies: a rank without others refuses a cloud whose points it cannot put in order") {
-  const Scene scene = parsed(scene_text(3, lattice(3, large, "", "jitter = 0.1"), sets));
-  const double bytes = 130.0 * side * side * side;
-  if (memory_limit() > bytes) return;
-  CHECK_FALSE(one_rank_holds(scene));
-  constexpr int ranks = 8192;
-  const int rank = heaviest_rank(scene, ranks);
-  CHECK(rank == ranks / 2);
-  LoneRank lone(rank, ranks);
-  const CommunicatorScope scope(lone);
-  CHECK_THROWS_WITH(build_local_body(scene, {}, 7), doctest::Contains("where one process shares out a cloud for all ranks"));
+namespace {
+
+/// Parts of five ranks that know of no others: of points that they keep, and of those that they go through.
+void compare_streamed(const std::string& text, const Partition::Reach& reach) {
+  const Scene scene = parsed(text);
+  constexpr int ranks = 5;
+  for (const int rank : {0, 3, 4}) {
+    LoneRank lone(rank, ranks);
+    const CommunicatorScope scope(lone);
+    const CloudOutline cloud = cloud_outline(scene);
+    const BodyFrame frame = scene_frame(scene, cloud.spacing);
+    Partition streamed(frame, StreamedCloud(cloud.points, cloud.extent, frame.horizon), reach);
+    Partition kept(frame, SharedCloud(cloud_points(scene, WhichPoints::run).points, frame.horizon), reach);
+    const Body found = streamed.make_part(7), expected = kept.make_part(7);
+    CHECK(streamed.points() == kept.points());
+    CHECK(same(found.owned(), expected.owned()));
+    CHECK(same(found.places().place, expected.places().place));
+    CHECK(same(found.material_ids(), expected.material_ids()));
+    CHECK(same(found.rows(), expected.rows()));
+    const bool same_numbers = std::ranges::all_of(found.internal(), [&](std::int32_t p) {
+      return found.number(static_cast<std::size_t>(p)) == expected.number(static_cast<std::size_t>(p));
+    });
+    CHECK(same_numbers);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("local bodies: a rank without others that goes through the points of a cloud has the part that it has of all of them") {
+  const TemporaryFolder folder;
+  const std::string sets = "low = \"x < 5\"\nsome = \"x > 9\"";
+  write_hdf5(folder.path / "cloud.h5", random_points(3000, {60, 50, 0}, 3), 2);
+  std::ofstream(folder.path / "cloud.csv", std::ios::binary) << csv(random_points(3000, {60, 50, 0}, 3), 2);
+  for (const Partition::Reach& reach : {Partition::Reach{2, false}, {2, true}, {3, true}}) {
+    INFO(reach.bonds, " bonds", std::string(reach.blocks ? ", whole blocks" : ""));
+    compare_streamed(scene_text(1, lattice(1, "[3000]", "x < 100 || x > 130", "jitter = 0.3"), sets), reach);
+    compare_streamed(scene_text(2, lattice(2, "[61, 53]", "(x - 14)^2 + (y - 20)^2 > 40", "jitter = 0.2"), sets), reach);
+    compare_streamed(scene_text(2, lattice(2, "[50, 60]", "x + y > 7.3"), sets, "horizon_ratio = 2.015\npartial_volume = true"),
+                     reach);
+    compare_streamed(scene_text(3, lattice(3, "[16, 14, 12]", "", "jitter = 0.1"), sets), reach);
+    compare_streamed(scene_text(2, file_body(folder.path / "cloud.h5"), sets), reach);
+    compare_streamed(scene_text(2, file_body(folder.path / "cloud.csv"), sets), reach);
+  }
 }
 
 TEST_CASE("local bodies: a part that is too large is refused, and so are more points than ranks can name") {

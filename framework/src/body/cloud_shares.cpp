@@ -36,77 +36,6 @@ void keep_each_once(std::vector<T>& values) {
 
 }  // namespace
 
-/// Points of the rank's run of the input along the curve.
-struct CloudShares::Sorted {
-  std::vector<std::pair<std::uint64_t, std::int64_t>> order;  ///< key and number of the input
-
-  Sorted(const Curve& curve, const std::vector<Point>& positions, std::int64_t first) {
-    order.reserve(positions.size());
-    for (const Point& x : positions) order.emplace_back(curve.key(x), first + std::ssize(order));
-    std::ranges::sort(order);
-  }
-  /// How many come before a place of the curve.
-  std::int64_t before(const Start& at) const {
-    return std::ranges::lower_bound(order, std::pair(at.key, at.number)) - order.begin();
-  }
-};
-
-CloudShares::CloudShares(PointCloud mine, double cube)
-    : pieces_(counted(std::ssize(mine.position)).all, communicator().size()), curve_(lowest(mine.position), cube) {
-  const std::int64_t first = counted(std::ssize(mine.position)).before;
-  const Sorted sorted(curve_, mine.position, first);
-  starts_ = find_starts(sorted);
-  std::vector<Points> to(rank_count());
-  for (const auto& [key, number] : sorted.order) {
-    const auto n = static_cast<std::size_t>(number - first);
-    to[holder({key, number})].push_back({mine.position[n], mine.volume[n], number});
-  }
-  mine = {};
-  for (const Points& points : exchanged(to)) held_.insert(held_.end(), points.begin(), points.end());
-  to = {};
-  std::ranges::sort(held_, {}, [&](const OnePoint& point) { return std::pair(curve_.key(point.x), point.number); });
-  keys_.reserve(held_.size());
-  for (const OnePoint& point : held_) keys_.push_back(curve_.key(point.x));
-  if (communicator().complete()) first_held_ = pieces_.first(communicator().rank());
-}
-
-/// Bit by bit, all pieces at once: the last place of the curve before which there are no more points than come before the piece.
-std::vector<CloudShares::Start> CloudShares::find_starts(const Sorted& mine) const {
-  std::vector<Start> starts(rank_count(), Start{0, 0});
-  const auto try_bits = [&](auto&& with_bit) {
-    std::vector<std::int64_t> before;
-    for (const Start& start : starts) before.push_back(mine.before(with_bit(start)));
-    communicator().sum(before);
-    for (std::size_t r = 1; r < starts.size(); ++r)  // the first piece begins with the curve
-      if (before[r] <= pieces_.first(static_cast<std::int64_t>(r))) starts[r] = with_bit(starts[r]);
-  };
-  for (int bit = 62; bit >= 0; --bit) try_bits([&](const Start& start) { return Start{start.key | std::uint64_t{1} << bit, 0}; });
-  for (int bit = 62; bit >= 0; --bit)
-    try_bits([&](const Start& start) { return Start{start.key, start.number | std::int64_t{1} << bit}; });
-  return starts;
-}
-
-std::size_t CloudShares::holder(const Start& at) const noexcept {
-  if (!communicator().complete()) return own_rank();
-  const auto place = [](const Start& start) { return std::pair(start.key, start.number); };
-  return static_cast<std::size_t>(std::ranges::upper_bound(starts_, place(at), {}, place) - starts_.begin() - 1);
-}
-
-std::size_t CloudShares::holder_of_block(std::int64_t block) const noexcept {
-  return communicator().complete() ? static_cast<std::size_t>(pieces_.owner_of_block(block)) : own_rank();
-}
-
-std::span<const CloudShares::OnePoint> CloudShares::held_block(std::int64_t block) const noexcept {
-  const std::int64_t first = block * pieces_.block(), last = std::min(pieces_.points(), first + pieces_.block());
-  return std::span(held_).subspan(static_cast<std::size_t>(first - first_held_), static_cast<std::size_t>(last - first));
-}
-
-std::span<const CloudShares::OnePoint> CloudShares::own() const noexcept {
-  const std::int64_t rank = communicator().rank(), first = pieces_.first(rank);
-  return std::span(held_).subspan(static_cast<std::size_t>(first - first_held_),
-                                  static_cast<std::size_t>(pieces_.first(rank + 1) - first));
-}
-
 std::vector<std::int64_t> CloudShares::blocks_around(std::span<const OnePoint> points, double radius) const {
   // Points of a cube are asked for together.
   struct Box {
@@ -129,8 +58,83 @@ std::vector<std::int64_t> CloudShares::blocks_around(std::span<const OnePoint> p
     curve_.add_keys(box.low, box.high, wanted);
   }
   keep_each_once(wanted);
+  return blocks_with(wanted);
+}
+
+/// Points of the rank's run of the input along the curve.
+struct SharedCloud::Sorted {
+  std::vector<std::pair<std::uint64_t, std::int64_t>> order;  ///< key and number of the input
+
+  Sorted(const Curve& curve, const std::vector<Point>& positions, std::int64_t first) {
+    order.reserve(positions.size());
+    for (const Point& x : positions) order.emplace_back(curve.key(x), first + std::ssize(order));
+    std::ranges::sort(order);
+  }
+  /// How many come before a place of the curve.
+  std::int64_t before(const Start& at) const {
+    return std::ranges::lower_bound(order, std::pair(at.key, at.number)) - order.begin();
+  }
+};
+
+SharedCloud::SharedCloud(PointCloud mine, double cube)
+    : CloudShares({counted(std::ssize(mine.position)).all, communicator().size()}, {lowest(mine.position), cube}) {
+  const std::int64_t first = counted(std::ssize(mine.position)).before;
+  const Sorted sorted(curve_, mine.position, first);
+  starts_ = find_starts(sorted);
+  std::vector<Points> to(rank_count());
+  for (const auto& [key, number] : sorted.order) {
+    const auto n = static_cast<std::size_t>(number - first);
+    to[holder({key, number})].push_back({mine.position[n], mine.volume[n], number});
+  }
+  mine = {};
+  for (const Points& points : exchanged(to)) held_.insert(held_.end(), points.begin(), points.end());
+  to = {};
+  std::ranges::sort(held_, {}, [&](const OnePoint& point) { return std::pair(curve_.key(point.x), point.number); });
+  keys_.reserve(held_.size());
+  for (const OnePoint& point : held_) keys_.push_back(curve_.key(point.x));
+  if (communicator().complete()) first_held_ = pieces_.first(communicator().rank());
+}
+
+/// Bit by bit, all pieces at once: the last place of the curve before which there are no more points than come before the piece.
+std::vector<SharedCloud::Start> SharedCloud::find_starts(const Sorted& mine) const {
+  std::vector<Start> starts(rank_count(), Start{0, 0});
+  const auto try_bits = [&](auto&& with_bit) {
+    std::vector<std::int64_t> before;
+    for (const Start& start : starts) before.push_back(mine.before(with_bit(start)));
+    communicator().sum(before);
+    for (std::size_t r = 1; r < starts.size(); ++r)  // the first piece begins with the curve
+      if (before[r] <= pieces_.first(static_cast<std::int64_t>(r))) starts[r] = with_bit(starts[r]);
+  };
+  for (int bit = 62; bit >= 0; --bit) try_bits([&](const Start& start) { return Start{start.key | std::uint64_t{1} << bit, 0}; });
+  for (int bit = 62; bit >= 0; --bit)
+    try_bits([&](const Start& start) { return Start{start.key, start.number | std::int64_t{1} << bit}; });
+  return starts;
+}
+
+std::size_t SharedCloud::holder(const Start& at) const noexcept {
+  if (!communicator().complete()) return own_rank();
+  const auto place = [](const Start& start) { return std::pair(start.key, start.number); };
+  return static_cast<std::size_t>(std::ranges::upper_bound(starts_, place(at), {}, place) - starts_.begin() - 1);
+}
+
+std::size_t SharedCloud::holder_of_block(std::int64_t block) const noexcept {
+  return communicator().complete() ? static_cast<std::size_t>(pieces_.owner_of_block(block)) : own_rank();
+}
+
+std::span<const CloudShares::OnePoint> SharedCloud::held_block(std::int64_t block) const noexcept {
+  const std::int64_t first = block * pieces_.block(), last = std::min(pieces_.points(), first + pieces_.block());
+  return std::span(held_).subspan(static_cast<std::size_t>(first - first_held_), static_cast<std::size_t>(last - first));
+}
+
+std::span<const CloudShares::OnePoint> SharedCloud::own() const noexcept {
+  const std::int64_t rank = communicator().rank(), first = pieces_.first(rank);
+  return std::span(held_).subspan(static_cast<std::size_t>(first - first_held_),
+                                  static_cast<std::size_t>(pieces_.first(rank + 1) - first));
+}
+
+std::vector<std::int64_t> SharedCloud::blocks_with(const std::vector<std::uint64_t>& keys) const {
   std::vector<std::vector<std::uint64_t>> asked(rank_count());
-  for (const std::uint64_t key : wanted)
+  for (const std::uint64_t key : keys)
     for (std::size_t r = holder({key, 0}); r <= holder({key, std::numeric_limits<std::int64_t>::max()}); ++r)
       asked[r].push_back(key);
   std::vector<std::vector<std::int64_t>> found(rank_count());
@@ -152,7 +156,7 @@ std::vector<std::int64_t> CloudShares::blocks_around(std::span<const OnePoint> p
   return blocks;
 }
 
-std::map<std::int64_t, CloudShares::Points> CloudShares::fetch(const std::vector<std::int64_t>& blocks) const {
+std::map<std::int64_t, CloudShares::Points> SharedCloud::fetch(const std::vector<std::int64_t>& blocks) const {
   std::vector<std::vector<std::int64_t>> asked(rank_count());
   for (const std::int64_t block : blocks) asked[holder_of_block(block)].push_back(block);
   std::vector<Points> answers(rank_count());

@@ -1,5 +1,5 @@
 #pragma once
-/// A cloud that no rank has as a whole: ranks bring points in the order of the input, and get those of their pieces of the curve.
+/// A cloud that no rank has as a whole, as a rank sees it that is to have a piece of the curve and what lies around it.
 
 #include <cstdint>
 #include <map>
@@ -21,20 +21,38 @@ class CloudShares {
   };
   using Points = std::vector<OnePoint>;
 
-  /// mine: this rank's run of the points in the order of the input, after those of lower ranks. A rank without others brings all
-  /// of them. All ranks must call what is here.
-  CloudShares(PointCloud mine, double cube);
-
+  virtual ~CloudShares() = default;
+  // All ranks must call what is here.
   const CurveShares& pieces() const noexcept { return pieces_; }
   /// The rank's own points in the order of the curve, and where they begin on it.
-  std::span<const OnePoint> own() const noexcept;
+  virtual std::span<const OnePoint> own() const noexcept = 0;
   std::int64_t first_own() const noexcept { return pieces_.first(communicator().rank()); }
   /// The blocks, on whatever rank, that hold points of the cubes that a sphere around one of the points meets. Each once.
   std::vector<std::int64_t> blocks_around(std::span<const OnePoint> points, double radius) const;
-  /// The points of blocks, whoever owns them.
-  std::map<std::int64_t, Points> fetch(const std::vector<std::int64_t>& blocks) const;
+  /// The points of blocks, whoever owns them: some of those that `blocks_around` has found last.
+  virtual std::map<std::int64_t, Points> fetch(const std::vector<std::int64_t>& blocks) const = 0;
+
+ protected:
+  CloudShares(const CurveShares& pieces, const Curve& curve) : pieces_(pieces), curve_(curve) {}
+  /// The blocks that hold points of cubes, by their keys, which ascend. Each once.
+  virtual std::vector<std::int64_t> blocks_with(const std::vector<std::uint64_t>& keys) const = 0;
+
+  CurveShares pieces_;
+  Curve curve_;
+};
+
+/// Ranks bring points in the order of the input, and get those of their pieces of the curve.
+class SharedCloud final : public CloudShares {
+ public:
+  /// mine: this rank's run of the points in the order of the input, after those of lower ranks. A rank without others brings all
+  /// of them.
+  SharedCloud(PointCloud mine, double cube);
+
+  std::span<const OnePoint> own() const noexcept override;
+  std::map<std::int64_t, Points> fetch(const std::vector<std::int64_t>& blocks) const override;
 
  private:
+  std::vector<std::int64_t> blocks_with(const std::vector<std::uint64_t>& keys) const override;
   /// Where a piece begins.
   struct Start {
     std::uint64_t key;
@@ -47,8 +65,6 @@ class CloudShares {
   std::size_t holder_of_block(std::int64_t block) const noexcept;
   std::span<const OnePoint> held_block(std::int64_t block) const noexcept;
 
-  CurveShares pieces_;
-  Curve curve_;
   std::vector<Start> starts_;  ///< by rank
   // In the order of the curve: the rank's own points, or all where the others are not there.
   std::int64_t first_held_ = 0;

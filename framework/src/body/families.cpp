@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numeric>
-#include <stdexcept>
+#include <optional>
 
 #include "perikit/body/body.hpp"
 #include "perikit/core/field.hpp"
@@ -143,7 +143,13 @@ double squared_distance(std::span<const double> rows, std::size_t p, std::size_t
 
 }  // namespace
 
-FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon) {
+CoincidentPoints::CoincidentPoints(std::int64_t number, const Point& x)
+    : std::domain_error(
+          fmt::format("found two points at ({:.6g}, {:.6g}, {:.6g}); allowed: points at different places", x[0], x[1], x[2])),
+      number_(number) {}
+
+FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
+                          const std::function<std::int64_t(std::size_t p)>& number) {
   const CellList cells(rows, points, dimension, horizon);
   const double limit = horizon * (1 + 1e-10), coincident = 1e-12 * horizon;
   // The points of a box look through the same others, eight at a time.
@@ -164,17 +170,15 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
   over_points([&](std::size_t p, const PointsAround& around) { lists.first[p + 1] = around.count(&rows[4 * p], limit) - 1; });
   std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
   lists.neighbour.resize(static_cast<std::size_t>(lists.first.back()));
-  std::atomic<std::int64_t> twice{-1};
+  std::mutex one;
+  std::optional<CoincidentPoints> twice;
   over_points([&](std::size_t p, const PointsAround& around) {
     if (!around.list(static_cast<std::int32_t>(p), &rows[4 * p], limit, coincident, lists.neighbour.data() + lists.first[p])) return;
-    const auto found = static_cast<std::int64_t>(p);
-    for (std::int64_t known = twice; (known < 0 || found < known) && !twice.compare_exchange_weak(known, found);) {}
+    const std::lock_guard lock(one);
+    const std::int64_t found = number ? number(p) : static_cast<std::int64_t>(p);
+    if (!twice || found < twice->number()) twice.emplace(found, Point{rows[4 * p], rows[4 * p + 1], rows[4 * p + 2]});
   });
-  if (const std::int64_t p = twice; p >= 0) {
-    const auto at = static_cast<std::size_t>(4 * p);
-    throw std::domain_error(fmt::format("found two points at ({:.6g}, {:.6g}, {:.6g}); allowed: points at different places",
-                                        rows[at], rows[at + 1], rows[at + 2]));
-  }
+  if (twice) throw *twice;
   return lists;
 }
 

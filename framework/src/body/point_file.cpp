@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -71,7 +72,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 /// Which of so many things that follow each other are wanted: own_run or all of them.
-using WantedRun = Run (*)(std::int64_t count);
+using WantedRun = std::function<Run(std::int64_t count)>;
 Run all_of(std::int64_t count) {
   return {0, count};
 }
@@ -89,7 +90,7 @@ class CsvReader {
   }
 
   /// The points of the lines that begin in a run of what follows the header line.
-  PointCloud read(WantedRun wanted_run) {
+  PointCloud read(const WantedRun& wanted_run) {
     const Run run = wanted_run(size_ - data_);
     read_lines(data_ + run.first, data_ + run.last);
     PointCloud cloud;
@@ -255,7 +256,7 @@ class CsvReader {
   std::vector<int> order_;  ///< column of each cell
 };
 
-PointCloud read_hdf5(const std::filesystem::path& file, const Wanted& wanted, WantedRun wanted_run) {
+PointCloud read_hdf5(const std::filesystem::path& file, const Wanted& wanted, const WantedRun& wanted_run) {
   const hdf5::Source source(file);
   const auto refuse = [&](int column, const std::string& message) {
     throw InputError({file.string(), 0, 0}, column_names[static_cast<std::size_t>(column)], message);
@@ -297,7 +298,7 @@ PointCloud read_hdf5(const std::filesystem::path& file, const Wanted& wanted, Wa
   return cloud;
 }
 
-PointCloud read(const std::filesystem::path& file, const Wanted& wanted, WantedRun wanted_run) {
+PointCloud read(const std::filesystem::path& file, const Wanted& wanted, const WantedRun& wanted_run) {
   const std::filesystem::path extension = file.extension();
   if (extension == ".h5" || extension == ".hdf5") return read_hdf5(file, wanted, wanted_run);
   return CsvReader(file, wanted).read(wanted_run);
@@ -328,6 +329,20 @@ PointCloud read_run_of_points(const std::filesystem::path& file, int dimension) 
   PointCloud cloud = agreed([&] { return read(file, {dimension, true}, own_run); });
   refuse_empty(file, counted(std::ssize(cloud.volume)).all);
   return cloud;
+}
+
+void over_points_of_file(const std::filesystem::path& file, int dimension, const std::function<void(const PointCloud&)>& use) {
+  constexpr std::int64_t piece = 1 << 22;  // bytes of lines, or points
+  std::int64_t all = 1, points = 0;
+  for (std::int64_t first = 0; first < all; first += piece) {
+    const PointCloud cloud = read(file, {dimension, true}, [&](std::int64_t count) {
+      all = count;
+      return Run{first, std::min(count, first + piece)};
+    });
+    points += std::ssize(cloud.volume);
+    use(cloud);
+  }
+  refuse_empty(file, points);
 }
 
 }  // namespace perikit

@@ -9,8 +9,7 @@ namespace perikit {
 
 namespace {
 
-Body cloud_body(const Scene& scene) {
-  const CloudPoints cloud = cloud_points(scene, WhichPoints::all);
+Body cloud_body(const Scene& scene, const CloudPoints& cloud) {
   return Body(scene_frame(scene, cloud.spacing), cloud.points.position, cloud.points.volume);
 }
 
@@ -19,7 +18,7 @@ Body lattice_body(const Scene& scene) {
   const double spacing = description.spacing, ratio = scene_horizon(scene, spacing) / spacing, estimate = estimated_cells(scene);
   // What `inside` leaves is known after it was asked for every cell.
   check_index(scene, estimate);
-  if (is_cloud(scene)) return cloud_body(scene);
+  if (is_cloud(scene)) return cloud_body(scene, cloud_points(scene, WhichPoints::all));
   const Lattice lattice = scene_lattice(scene);
   if (!description.inside) check_memory(scene, estimate, ratio, false);
   const std::array<std::int64_t, 3> cells = input_cells(lattice);
@@ -28,7 +27,7 @@ Body lattice_body(const Scene& scene) {
                   [&](std::int64_t index) { kept.push_back(static_cast<std::int32_t>(index)); });
   if (kept.empty()) refuse_empty_lattice(description);
   // So is a body that fills so little of its box that dead cells would dominate.
-  if (sparse(static_cast<double>(kept.size()), lattice)) return cloud_body(scene);
+  if (sparse(static_cast<double>(kept.size()), lattice)) return cloud_body(scene, points_in_cells(scene, lattice, kept));
   check_memory(scene, static_cast<double>(lattice.cells), ratio, false);
   return Body(scene_frame(scene, spacing), lattice, std::move(kept));
 }
@@ -37,7 +36,7 @@ Body lattice_body(const Scene& scene) {
 
 Body build_body(const Scene& scene) {
   check_volumes(scene);
-  Body body = scene.body.lattice ? lattice_body(scene) : cloud_body(scene);
+  Body body = scene.body.lattice ? lattice_body(scene) : cloud_body(scene, cloud_points(scene, WhichPoints::all));
   add_sets(scene.sets, body);
   if (scene.regions.empty()) return body;
   std::vector<std::uint16_t> ids(body.stride(), 0);

@@ -32,6 +32,11 @@ Counted counted_of(std::size_t points, WhichPoints which) {
   return which == WhichPoints::all ? Counted{0, mine} : counted(mine);
 }
 
+/// The mean spacing of a file's points.
+double mean_spacing(const Scene& scene, double volume, double points) {
+  return std::pow(volume / scene.body.section / points, 1.0 / scene.body.dimension);
+}
+
 /// points: of all ranks.
 void check_cloud(const Scene& scene, double points, double ratio, WhichPoints which) {
   const bool part = which == WhichPoints::run;
@@ -39,7 +44,6 @@ void check_cloud(const Scene& scene, double points, double ratio, WhichPoints wh
   check_index(scene, of_rank);
   check_horizon(scene, ratio);
   check_memory(scene, of_rank, ratio, true, part);
-  if (part && !communicator().complete()) check_lone(scene, points);
 }
 
 /// Voronoi cells of all points.
@@ -57,13 +61,29 @@ std::vector<double> cells_of_jittered(const Scene& scene, const Lattice& lattice
   return voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr);
 }
 
-/// The cells that the scene keeps, each moved at random by at most `jitter` spacings along each axis.
-PointCloud jittered(const Scene& scene, const Lattice& lattice, WhichPoints which) {
+/// One point in each of these cells, moved at random by at most `jitter` spacings along each axis; without volumes.
+template <class Index>
+PointCloud moved(const Scene& scene, const Lattice& lattice, std::span<const Index> kept, std::mt19937_64& random) {
   const LatticeDescription& description = *scene.body.lattice;
-  const std::array<std::int64_t, 3> cells = input_cells(lattice);
-  std::vector<std::int64_t> kept;
-  over_kept_cells(description, lattice, run_of(cells[0] * cells[1] * cells[2], which),
-                  [&](std::int64_t index) { kept.push_back(index); });
+  PointCloud cloud;
+  cloud.position.reserve(kept.size());
+  for (const Index index : kept) {
+    Point x = lattice.position(index);
+    for (int a = 0; a < scene.body.dimension && description.jitter > 0; ++a)
+      x[static_cast<std::size_t>(a)] += description.jitter * description.spacing * centred(random);
+    cloud.position.push_back(x);
+  }
+  keep_off_surfaces(scene, description.spacing, cloud.position);
+  return cloud;
+}
+
+double cell_volume(const Scene& scene) {
+  return std::pow(scene.body.lattice->spacing, scene.body.dimension);
+}
+
+template <class Index>
+PointCloud jittered(const Scene& scene, const Lattice& lattice, std::span<const Index> kept, WhichPoints which) {
+  const LatticeDescription& description = *scene.body.lattice;
   const Counted points = counted_of(kept.size(), which);
   if (points.all == 0) refuse_empty_lattice(description);
   check_cloud(scene, static_cast<double>(points.all), scene_horizon(scene, description.spacing) / description.spacing, which);
@@ -71,19 +91,26 @@ PointCloud jittered(const Scene& scene, const Lattice& lattice, WhichPoints whic
   std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
   if (description.jitter > 0)
     random.discard(static_cast<std::uint64_t>(points.before) * static_cast<std::uint64_t>(scene.body.dimension));
-  PointCloud cloud;
-  cloud.position.reserve(kept.size());
-  for (const std::int64_t index : kept) {
-    Point x = lattice.position(index);
-    for (int a = 0; a < scene.body.dimension && description.jitter > 0; ++a)
-      x[static_cast<std::size_t>(a)] += description.jitter * description.spacing * centred(random);
-    cloud.position.push_back(x);
-  }
-  keep_off_surfaces(scene, description.spacing, cloud.position);
+  PointCloud cloud = moved(scene, lattice, kept, random);
   cloud.volume = scene.body.voronoi ? cells_of_jittered(scene, lattice, cloud.position)
-                                    : std::vector<double>(kept.size(), std::pow(description.spacing, scene.body.dimension));
+                                    : std::vector<double>(kept.size(), cell_volume(scene));
   for (double& volume : cloud.volume) volume *= scene.body.section;
   return cloud;
+}
+
+/// The cells that the scene keeps.
+PointCloud points_of_cells(const Scene& scene, const Lattice& lattice, WhichPoints which) {
+  const std::array<std::int64_t, 3> cells = input_cells(lattice);
+  std::vector<std::int64_t> kept;
+  over_kept_cells(*scene.body.lattice, lattice, run_of(cells[0] * cells[1] * cells[2], which),
+                  [&](std::int64_t index) { kept.push_back(index); });
+  return jittered<std::int64_t>(scene, lattice, kept, which);
+}
+
+PointCloud with_volumes(const Scene& scene, PartialCells cells) {
+  for (double& volume : cells.volume) volume *= cell_volume(scene) * scene.body.section;
+  keep_off_surfaces(scene, scene.body.lattice->spacing, cells.position);
+  return {std::move(cells.position), std::move(cells.volume)};
 }
 
 /// The cells of a lattice that lie inside at least in part.
@@ -97,10 +124,7 @@ PointCloud partial_cells(const Scene& scene, const Lattice& lattice, WhichPoints
         description.position, "body.lattice.inside",
         "found an expression that keeps no cell of the lattice; allowed: one that is true in a part of one cell or more");
   }
-  const double whole = std::pow(description.spacing, scene.body.dimension) * scene.body.section;
-  for (double& volume : cells.volume) volume *= whole;
-  keep_off_surfaces(scene, description.spacing, cells.position);
-  return {std::move(cells.position), std::move(cells.volume)};
+  return with_volumes(scene, std::move(cells));
 }
 
 CloudPoints points_of_lattice(const Scene& scene, WhichPoints which) {
@@ -108,7 +132,8 @@ CloudPoints points_of_lattice(const Scene& scene, WhichPoints which) {
   const Lattice lattice = scene_lattice(scene);
   if (!description.inside)
     check_cloud(scene, estimated_cells(scene), scene_horizon(scene, description.spacing) / description.spacing, which);
-  return {scene.partial_volume ? partial_cells(scene, lattice, which) : jittered(scene, lattice, which), description.spacing};
+  return {scene.partial_volume ? partial_cells(scene, lattice, which) : points_of_cells(scene, lattice, which),
+          description.spacing};
 }
 
 /// Points of a file with the volumes of their Voronoi cells.
@@ -163,7 +188,7 @@ CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
   for (const double volume : cloud.volume) volumes.add(volume);
   const double total = which == WhichPoints::all ? volumes.value() : total_over_ranks(volumes),
                points = static_cast<double>(counted_of(cloud.volume.size(), which).all),
-               spacing = std::pow(total / scene.body.section / points, 1.0 / dimension), reach = scene_horizon(scene, spacing);
+               spacing = mean_spacing(scene, total, points), reach = scene_horizon(scene, spacing);
   check_cloud(scene, points, reach / spacing, which);
   if (reach < spacing) {
     throw InputError(scene.body.position, "family.horizon",
@@ -172,7 +197,48 @@ CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
   return {std::move(cloud), spacing};
 }
 
+/// The scene must outlive it.
+PointStream point_stream(const Scene& scene) {
+  if (!scene.body.lattice)
+    return [&scene](const auto& use) { over_points_of_file(*scene.body.points_file, scene.body.dimension, use); };
+  return [&scene, lattice = scene_lattice(scene)](const auto& use) {
+    const LatticeDescription& description = *scene.body.lattice;
+    const std::array<std::int64_t, 3> cells = input_cells(lattice);
+    std::mt19937_64 random(static_cast<std::uint64_t>(description.seed));
+    const std::int64_t layers = cells[static_cast<std::size_t>(scene.body.dimension - 1)],
+                       all = scene.partial_volume ? layers : cells[0] * cells[1] * cells[2],
+                       piece = scene.partial_volume ? 8 : 1 << 16;
+    std::vector<std::int64_t> kept;
+    for (std::int64_t first = 0; first < all; first += piece) {
+      const Run run{first, std::min(all, first + piece)};
+      if (scene.partial_volume) {
+        use(with_volumes(scene, cells_inside(*description.inside, lattice, run)));
+        continue;
+      }
+      kept.clear();
+      over_kept_cells(description, lattice, run, [&](std::int64_t index) { kept.push_back(index); });
+      PointCloud cloud = moved<std::int64_t>(scene, lattice, kept, random);
+      cloud.volume.assign(kept.size(), cell_volume(scene) * scene.body.section);
+      use(cloud);
+    }
+  };
+}
+
 }  // namespace
+
+CloudOutline cloud_outline(const Scene& scene) {
+  const PointStream all = point_stream(scene);
+  const CloudExtent extent = extent_of(all);
+  if (extent.points == 0) refuse_empty_lattice(*scene.body.lattice);  // files refuse that themselves
+  const auto points = static_cast<double>(extent.points);
+  const double spacing = scene.body.lattice ? scene.body.lattice->spacing : mean_spacing(scene, extent.volume, points);
+  check_cloud(scene, points, scene_horizon(scene, spacing) / spacing, WhichPoints::run);
+  return {all, extent, spacing};
+}
+
+CloudPoints points_in_cells(const Scene& scene, const Lattice& lattice, std::span<const std::int32_t> cells) {
+  return {jittered(scene, lattice, cells, WhichPoints::all), scene.body.lattice->spacing};
+}
 
 bool is_cloud(const Scene& scene) {
   return !scene.body.lattice || scene.body.lattice->jitter > 0 || scene.partial_volume;

@@ -1,13 +1,15 @@
 #include "build/face_shares.hpp"
 
-#include "families/families.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "families/families.hpp"
+#include "perikit/core/exact_sum.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -93,27 +95,33 @@ Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const Term
 }
 
 /// A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
-/// the set holds a second layer, linear weights over both put the resultant on the face.
+/// the set holds a second layer, linear weights over both put the resultant on the face. Of a part of a body that is found with
+/// all ranks, which must all call it.
 Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const Body& body) {
   const double dx = body.spacing();
   const auto along = [&](std::int32_t p) {
     return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)];
   };
+  const auto largest = [&](double value) { return body.part() ? communicator().largest(value) : value; };
+  const auto value_of = [&](ExactSum& sum) { return body.part() ? total_over_ranks(sum) : sum.value(); };
   double extreme = -std::numeric_limits<double>::infinity();
   for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
-  double total = 0, m0 = 0, m1 = 0, m2 = 0;
+  extreme = largest(extreme);
+  ExactSum areas, volumes, moments, squares;
   bool second = false;
   for (const std::int32_t p : points) {
     const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
     if (depth > 2.2 * dx) continue;
     if (depth <= 1.2 * dx)
-      total += v / dx;
+      areas.add(v / dx);
     else
       second = true;
-    m0 += v;
-    m1 += v * depth;
-    m2 += v * depth * depth;
+    volumes.add(v);
+    moments.add(v * depth);
+    squares.add(v * depth * depth);
   }
+  second = largest(second ? 1 : 0) > 0;
+  const double total = value_of(areas), m0 = value_of(volumes), m1 = value_of(moments), m2 = value_of(squares);
   Shares shares;
   for (const std::int32_t p : points) {
     const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
@@ -129,7 +137,7 @@ Shares face_shares(const LoadDescription& load, const TermParts& parts, const Im
   const Face face(load);
   const std::vector<std::int32_t>& points = parts.families->body().set(load.set);
   Shares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts.families->body());
-  if (shares.empty()) {
+  if (counted(std::ssize(shares)).all == 0 && communicator().complete()) {
     throw InputError(
         load.position, "load.face",
         fmt::format("found \"{}\", on which no point of the set \"{}\" lies; allowed: a face of the set", load.face, load.set));

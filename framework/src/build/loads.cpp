@@ -92,7 +92,7 @@ std::vector<Load> loads_along_axes(const SpaceTimeFunction& value, const Surface
 /// Where shares and areas are found: the body of all ranks.
 struct Whole {
   TermParts parts;
-  std::unique_ptr<Families> families;           ///< null: those of `parts` are of all ranks
+  std::unique_ptr<Families> families;  ///< null: those of `parts` are of all ranks, or shares are found without them
   std::optional<const ImageMap> images_of_all;
   const ImageMap* images;
 
@@ -100,7 +100,7 @@ struct Whole {
       : parts(of_rank), images(of_body) {
     using Type = LoadDescription::Type;
     const bool surfaces = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; });
-    if (!partition || !surfaces) return;
+    if (!partition || !partition->whole() || !surfaces) return;
     families = Families::make(*partition->whole(), of_rank.families->influence(), of_rank.families->needs());
     parts.families = families.get();
     if (!images) return;

@@ -5,6 +5,7 @@
 
 #include "body/cloud_shares.hpp"
 #include "body/lattice_shares.hpp"
+#include "body/streamed_cloud.hpp"
 #include "build/cloud_points.hpp"
 #include "build/scene_lattice.hpp"
 #include "build/sets.hpp"
@@ -45,9 +46,15 @@ Inside inside_of(const Scene& scene) {
 }
 
 std::unique_ptr<Partition> part_of_cloud(const Scene& scene, const Partition::Reach& reach) {
+  if (!communicator().complete()) {
+    const CloudOutline cloud = cloud_outline(scene);
+    const BodyFrame frame = scene_frame(scene, cloud.spacing);
+    if (!lone_rank_orders(static_cast<double>(cloud.extent.points)))
+      return std::make_unique<Partition>(frame, StreamedCloud(cloud.points, cloud.extent, frame.horizon), reach);
+  }
   CloudPoints cloud = cloud_points(scene, WhichPoints::run);
   const BodyFrame frame = scene_frame(scene, cloud.spacing);
-  return std::make_unique<Partition>(frame, CloudShares(std::move(cloud.points), frame.horizon), reach);
+  return std::make_unique<Partition>(frame, SharedCloud(std::move(cloud.points), frame.horizon), reach);
 }
 
 std::unique_ptr<Partition> part_of_lattice(const Scene& scene, const Partition::Reach& reach) {
@@ -68,17 +75,19 @@ std::unique_ptr<Partition> part_of_lattice(const Scene& scene, const Partition::
 }  // namespace
 
 bool one_rank_holds(const Scene& scene) {
-  if (!scene.body.lattice) return true;
-  const double cells = estimated_cells(scene);
+  const auto& lattice = scene.body.lattice;
+  const double cells = lattice ? estimated_cells(scene) : 0;
   try {
     check_index(scene, cells);
-    if (!scene.body.lattice->inside)
-      check_memory(scene, cells, scene_horizon(scene, scene.body.lattice->spacing) / scene.body.lattice->spacing,
-                   is_cloud(scene));
+    if (lattice && !lattice->inside)
+      return likely_held(scene.body.dimension, cells, scene_horizon(scene, lattice->spacing) / lattice->spacing, is_cloud(scene));
+    if (!is_cloud(scene) || scene.body.voronoi) return true;
+    const CloudOutline cloud = cloud_outline(scene);
+    return likely_held(scene.body.dimension, static_cast<double>(cloud.extent.points),
+                       scene_horizon(scene, cloud.spacing) / cloud.spacing, true);
   } catch (const InputError&) {
     return false;
   }
-  return true;
 }
 
 int heaviest_rank(const Scene& scene, int ranks) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -135,13 +136,21 @@ std::unique_ptr<Families> build_families(const Scene& scene, const PartFactory& 
   const FamilyNeeds needs{.influence = !formulation.pairs || formulation.pair_traits.influence, .shapes = !formulation.pairs};
   const std::shared_ptr<const InfluenceFunction> influence = factory.influence(*scene.influence);
   if (needs.influence) refuse_no_influence(scene, *influence);
-  return agreed([&] {  // points at the same place may lie on few ranks
-    try {
-      return Families::make(body, influence, needs);
-    } catch (const std::domain_error& error) {
-      throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points", error.what());
-    }
-  });
+  std::unique_ptr<Families> families;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double mine = none;  // the first of the points at one place, which may lie on few ranks; all say the same
+  std::string message;
+  try {
+    families = Families::make(body, influence, needs);
+  } catch (const CoincidentPoints& error) {
+    mine = static_cast<double>(error.number());
+    message = error.what();
+  }
+  const double first = -communicator().largest(-mine);
+  if (first < none)
+    throw InputError(scene.body.position, scene.body.lattice ? "body.lattice" : "body.points",
+                     first_message(mine == first ? message : ""));
+  return families;
 }
 
 /// Why no weights or gradients balance a constant stress on this body: what it is, and what there is instead. Nothing where some do.

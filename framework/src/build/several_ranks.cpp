@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "build/cloud_points.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -24,8 +25,10 @@ std::string needs_whole_body(const Scene& scene, bool quasi_static) {
     return "there are images beyond planes of symmetry or periodic sides";
   if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
     return "there are images beyond held faces or surfaces";
-  if (std::ranges::any_of(scene.loads,
-                          [](const LoadDescription& load) { return load.type == Type::traction || load.type == Type::pressure; }))
+  // On clouds a traction asks each point how deep it lies, and no neighbours.
+  if (std::ranges::any_of(scene.loads, [&](const LoadDescription& load) {
+        return load.type == Type::pressure || (load.type == Type::traction && !is_cloud(scene));
+      }))
     return "tractions and pressures share out the surface";
   return {};
 }

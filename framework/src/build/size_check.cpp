@@ -20,6 +20,9 @@ constexpr double largest_ball = 1.0e7;  // cells within the horizon, also of a b
 constexpr double bytes_a_shared_point = 130;  // while it is put in order
 constexpr double bytes_a_lattice_point = 100, bytes_a_cloud_point = 200, bytes_a_cloud_bond = 4;
 
+// What `conventional` takes, with the fields of an explicit run.
+constexpr double bytes_a_likely_lattice_point = 330, bytes_a_likely_cloud_bond = 22;
+
 /// Cells within the horizon.
 double ball(int dimension, double ratio) {
   if (dimension == 1) return 2 * ratio;
@@ -67,13 +70,14 @@ void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bo
   }
 }
 
-void check_lone(const Scene& scene, double points) {
-  const double bytes = points * bytes_a_shared_point, limit = memory_limit();
-  if (bytes <= limit) return;
-  throw InputError(scene.body.position, key_of(scene),
-                   fmt::format("found about {:.3g} points, which take {:.3g} GB where one process shares out a cloud for all "
-                               "ranks; allowed: the {:.3g} GB that this machine offers",
-                               points, bytes / 1e9, limit / 1e9));
+bool likely_held(int dimension, double cells, double ratio, bool cloud) {
+  const double of_point =
+      cloud ? std::min(ball(dimension, ratio), cells - 1) * bytes_a_likely_cloud_bond : bytes_a_likely_lattice_point;
+  return cells * of_point <= memory_limit();
+}
+
+bool lone_rank_orders(double points) {
+  return points * bytes_a_shared_point <= memory_limit();
 }
 
 }  // namespace perikit

@@ -13,7 +13,9 @@ void check_horizon(const Scene& scene, double ratio);
 /// Refuses what the memory of this machine cannot hold, whatever the kinematics. part: these are the cells of one of several
 /// ranks.
 void check_memory(const Scene& scene, double cells, double ratio, bool cloud, bool part = false);
-/// Refuses clouds all of whose points a rank without others cannot have at once.
-void check_lone(const Scene& scene, double points);
+/// Whether this machine can hold the set-up of kinematics with one gradient a point; others take up to three times that.
+bool likely_held(int dimension, double cells, double ratio, bool cloud);
+/// Whether a rank without others can put so many points of a cloud in order, all of them at once.
+bool lone_rank_orders(double points);
 
 }  // namespace perikit

@@ -31,7 +31,7 @@ enum class BondsOf { uncut, set_up, intact };
 
 class Families {
  public:
-  /// Throws std::domain_error where points coincide.
+  /// Throws CoincidentPoints.
   static std::unique_ptr<Families> make(const Body& body, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs);
   virtual ~Families() = default;
   Families(const Families&) = delete;

@@ -1,17 +1,20 @@
 #include "families/shared_bonds.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
+/// Points have the order here that they have in the whole body: the smaller index stays the smaller one.
+NamedChange SharedBonds::named(const BondChange& change) const noexcept {
+  return {{place(change.bond.point), place(change.bond.far)}, change.integrity};
+}
+
 /// On rank 0 those of all ranks, by places in the whole body.
 std::vector<NamedChange> SharedBonds::merged(std::span<const BondChange> mine) const {
   std::vector<NamedChange> named;
-  // Points have the order here that they have in the whole body: the smaller index stays the smaller one.
-  for (const auto& [bond, integrity] : mine) named.push_back({{place(bond.point), place(bond.far)}, integrity});
+  for (const BondChange& change : mine) named.push_back(this->named(change));
   std::vector<NamedChange> all = gathered<NamedChange>(named);
   std::ranges::sort(all, {}, &NamedChange::bond);
   const auto rest = std::ranges::unique(all, {}, &NamedChange::bond);
@@ -34,15 +37,10 @@ void SharedBonds::mark(GroupMarks& marks) const {
 }
 
 std::vector<NamedChange> SharedBonds::outward(std::span<const BondChange> changes) const {
-  std::vector<NamedChange> named;
-  if (!part()) {
-    for (const auto& [bond, integrity] : changes) named.push_back({{bond.point, bond.far}, integrity});
-    return named;
-  }
-  std::vector<BondChange> own;
-  std::ranges::copy_if(changes, std::back_inserter(own),
-                       [&](const BondChange& change) { return body_.owns(static_cast<std::size_t>(change.bond.point)); });
-  return merged(own);
+  std::vector<NamedChange> own;
+  for (const BondChange& change : changes)
+    if (!part() || body_.owns(static_cast<std::size_t>(change.bond.point))) own.push_back(named(change));
+  return own;
 }
 
 std::vector<BondChange> SharedBonds::inward(std::span<const NamedChange> changes) const {

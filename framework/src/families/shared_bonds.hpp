@@ -16,7 +16,7 @@ class SharedBonds {
   /// `body` must outlive it.
   explicit SharedBonds(const Body& body) : body_(body) {}
 
-  /// The changes that all ranks have, each once, ascending: on rank 0; on the others none. All ranks must call it.
+  /// Of ascending changes those of bonds that no other rank owns, ascending.
   std::vector<NamedChange> outward(std::span<const BondChange> changes) const;
   /// Of changes in the whole body those with both ends here.
   std::vector<BondChange> inward(std::span<const NamedChange> changes) const;
@@ -32,6 +32,7 @@ class SharedBonds {
 
  private:
   std::int64_t place(std::int32_t p) const noexcept { return part() ? body_.places().place[static_cast<std::size_t>(p)] : p; }
+  NamedChange named(const BondChange& change) const noexcept;
   std::vector<NamedChange> merged(std::span<const BondChange> mine) const;
 
   const Body& body_;

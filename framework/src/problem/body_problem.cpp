@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 
+#include "core/merged_rows.hpp"
 #include "families/families.hpp"
 #include "families/shared_bonds.hpp"
 #include "perikit/core/communicator.hpp"
@@ -224,11 +224,11 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
 void BodyProblem::find_pieces(bool fresh) {
   if (!weak_springs_) return;
   if (ghosts_ && parts_.fracture.damage()) {
-    const std::vector<NamedChange> of_all = terms().changed_bonds_of_all();  // rank 0 has them
-    if (parts_.whole) {
-      parts_.whole->families->mend();
-      parts_.whole->families->lower(SharedBonds(parts_.whole->families->body()).inward(of_all));
-    }
+    Families* const whole = parts_.whole ? parts_.whole->families.get() : nullptr;  // on rank 0
+    if (whole) whole->mend();
+    const std::vector<NamedChange> mine = terms().own_changed_bonds();
+    over_merged(std::span(mine),
+                [&](std::span<const NamedChange> piece) { whole->lower(SharedBonds(whole->body()).inward(piece)); });
   }
   weak_springs_->find(seen(state().displacement(), seen_), fresh);
 }
@@ -276,15 +276,13 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
 
 std::vector<std::byte> BodyProblem::bonds() const {
   ByteWriter out;
-  if (parts_.fracture.damage()) parts_.fracture.write(terms(), out);
-  std::vector<std::byte> of_all = out.take();  // rank 0 has them
-  if (ghosts_) communicator().broadcast(of_all);
-  return of_all;
+  if (parts_.fracture.damage()) parts_.fracture.write_here(terms(), out);
+  return out.take();
 }
 
 void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   ByteReader in(bonds);
-  parts_.fracture.read(terms(), in);
+  parts_.fracture.read_here(terms(), in);
   find_pieces(false);
 }
 
@@ -303,19 +301,21 @@ std::uint64_t stride_of(ByteReader& in) {
 
 void BodyProblem::write_snapshot(const std::function<void(std::uint64_t)>& begin,
                                  const std::function<void(std::span<const std::byte>)>& next) const {
-  ByteWriter before_state;
-  before_state.value(snapshot_format);
-  before_state.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
-  values_.constraints.write(before_state);
-  parts_.fracture.write(terms(), before_state);
-  HistoryRecord::of(terms()).write(before_state);
-  const std::vector<std::byte> bytes = before_state.take();
   const bool first = communicator().rank() == 0;
-  if (first) begin(bytes.size() + values_.state.written());
+  const HistoryRecord history(terms());
+  ByteWriter head;
+  head.value(snapshot_format);
+  head.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
+  values_.constraints.write(head);
+  const std::vector<std::byte> bytes = head.take();
+  const std::uint64_t size = bytes.size() + parts_.fracture.written(terms()) + history.written() + values_.state.written();
+  if (first) begin(size);
   ByteWriter out([&](std::span<const std::byte> piece) {
     if (first) next(piece);
   });
   out.bytes(bytes.data(), bytes.size());
+  parts_.fracture.write(terms(), out);
+  history.write(out);
   values_.state.write(out);
   out.finish();
 }
@@ -336,47 +336,34 @@ void BodyProblem::restore(ByteReader& in) {
   if (stride_of(in) != body().stride_of_all_ranks()) throw InputError("the saved state belongs to another body");
   constraints().read(in);
   parts_.fracture.read(terms(), in);
-  HistoryRecord::read(in).restore(terms());
+  HistoryRecord::read(in, terms());
   state().read(in);
   if (!in.done()) throw InputError("the saved state is damaged");
   find_pieces(false);
 }
 
-namespace {
-
-/// The beginning of a snapshot, up to the state.
-struct BeforeState {
-  std::uint64_t stride = 0;
-  std::vector<NamedChange> bonds;
-  HistoryRecord history;
-
-  explicit BeforeState(ByteReader& in) {
-    stride = stride_of(in);
-    in.value<double>();   // of the constraints
-    FractureRecord::read_bonds(in, bonds);
-    history = HistoryRecord::read(in);
-  }
-};
-
-}  // namespace
-
 BodyProblem::Carried BodyProblem::carried_by(ByteReader& snapshot) {
-  const BeforeState before(snapshot);
-  return {before.bonds.size(), before.history.values.size()};
+  stride_of(snapshot);
+  snapshot.value<double>();  // of the constraints
+  Carried carried;
+  FractureRecord::read_bonds(snapshot, [&](std::span<const NamedChange> bonds) { carried.bonds += bonds.size(); });
+  carried.history = HistoryRecord::count(snapshot);
+  return carried;
 }
 
 void BodyProblem::carry(ByteReader& snapshot) {
-  const BeforeState before(snapshot);
-  if (before.stride != body().stride_of_all_ranks()) throw InputError("the earlier run had another body");
-  const SharedBonds shared(body());
-  std::vector<NamedChange> lost;  // of the bonds that cracks of this scene leave
-  std::ranges::copy_if(before.bonds, std::back_inserter(lost), [&](const NamedChange& b) {
-    const std::vector<BondChange> here = shared.inward({&b, 1});
-    return !here.empty() && parts_.families->integrity(here.front().bond) > b.integrity;
+  if (stride_of(snapshot) != body().stride_of_all_ranks()) throw InputError("the earlier run had another body");
+  snapshot.value<double>();      // of the constraints
+  std::vector<BondChange> lost;  // of the bonds that cracks of this scene leave
+  bool any = false;
+  FractureRecord::read_bonds(snapshot, [&](std::span<const NamedChange> bonds) {
+    any = true;
+    for (const BondChange& change : terms().bonds_here(bonds))
+      if (parts_.families->integrity(change.bond) > change.integrity) lost.push_back(change);
   });
   // On several ranks all of them restore, whoever has such bonds.
-  if (!lost.empty() || (ghosts_ && !before.bonds.empty())) terms().restore_bonds_of_all(lost);
-  before.history.restore(terms());
+  if (!lost.empty() || (ghosts_ && any)) terms().restore_bonds(lost);
+  HistoryRecord::read(snapshot, terms());
 }
 
 std::size_t BodyProblem::bytes() const noexcept {

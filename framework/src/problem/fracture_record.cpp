@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "core/merged_rows.hpp"
 #include "problem/snapshot.hpp"
 
 namespace perikit {
@@ -55,30 +58,28 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
   return text;
 }
 
-void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
-  out.value(gains_);
-  out.value(gained_);
-  out.value(inside_out_);
-  out.value(held_);
-  const std::vector<NamedChange> bonds = terms.changed_bonds_of_all();
-  out.value(static_cast<std::uint64_t>(bonds.size()));
-  for (const NamedChange& b : bonds) out.value(b);
-}
-
 namespace {
 
-std::vector<NamedChange> read_changes(ByteReader& in) {
-  std::vector<NamedChange> bonds;
-  for (auto left = in.value<std::uint64_t>(); left > 0; --left) bonds.push_back(in.value<NamedChange>());
-  return bonds;
+/// Calls use(...) with all that `in` has of a list that follows its length, piece by piece.
+template <class T>
+void over_list(ByteReader& in, const std::function<void(std::span<const T>)>& use) {
+  constexpr std::uint64_t most = 1 << 12;
+  std::vector<T> piece;
+  for (auto left = in.value<std::uint64_t>(); left > 0; left -= piece.size()) {
+    in.expect(left, sizeof(T));
+    piece.resize(std::min(most, left));
+    in.bytes(piece.data(), piece.size() * sizeof(T));
+    use(piece);
+  }
 }
 
 }  // namespace
 
-void FractureRecord::read_bonds(ByteReader& in, std::vector<NamedChange>& bonds) {
-  FractureRecord record;
-  record.read_account(in);
-  bonds = read_changes(in);
+void FractureRecord::write_account(ByteWriter& out) const {
+  out.value(gains_);
+  out.value(gained_);
+  out.value(inside_out_);
+  out.value(held_);
 }
 
 void FractureRecord::read_account(ByteReader& in) {
@@ -88,9 +89,45 @@ void FractureRecord::read_account(ByteReader& in) {
   held_ = in.value<std::int64_t>();
 }
 
+std::uint64_t FractureRecord::written(const Terms& terms) const {
+  const auto bonds = static_cast<std::uint64_t>(counted(std::ssize(terms.own_changed_bonds())).all);
+  return sizeof gains_ + sizeof gained_ + sizeof inside_out_ + sizeof held_ + sizeof bonds + bonds * sizeof(NamedChange);
+}
+
+void FractureRecord::write(const Terms& terms, ByteWriter& out) const {
+  write_account(out);
+  const std::vector<NamedChange> mine = terms.own_changed_bonds();
+  out.value(static_cast<std::uint64_t>(counted(std::ssize(mine)).all));
+  over_merged(std::span(mine), [&](std::span<const NamedChange> bonds) { out.bytes(bonds.data(), bonds.size_bytes()); });
+}
+
+void FractureRecord::read_bonds(ByteReader& in, const std::function<void(std::span<const NamedChange>)>& use) {
+  FractureRecord().read_account(in);
+  over_list(in, use);
+}
+
 void FractureRecord::read(Terms& terms, ByteReader& in) {
   read_account(in);
-  terms.restore_bonds_of_all(read_changes(in));
+  std::vector<BondChange> bonds;
+  over_list<NamedChange>(in, [&](std::span<const NamedChange> of_all) {
+    const std::vector<BondChange> here = terms.bonds_here(of_all);
+    bonds.insert(bonds.end(), here.begin(), here.end());
+  });
+  terms.restore_bonds(bonds);
+}
+
+void FractureRecord::write_here(const Terms& terms, ByteWriter& out) const {
+  write_account(out);
+  const std::vector<BondChange> bonds = terms.changed_bonds();
+  out.value(static_cast<std::uint64_t>(bonds.size()));
+  out.bytes(bonds.data(), bonds.size() * sizeof(BondChange));
+}
+
+void FractureRecord::read_here(Terms& terms, ByteReader& in) {
+  read_account(in);
+  std::vector<BondChange> bonds;
+  over_list<BondChange>(in, [&](std::span<const BondChange> piece) { bonds.insert(bonds.end(), piece.begin(), piece.end()); });
+  terms.restore_bonds(bonds);
 }
 
 }  // namespace perikit

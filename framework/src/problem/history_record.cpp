@@ -1,77 +1,75 @@
 #include "problem/history_record.hpp"
 
 #include <algorithm>
-#include <numeric>
 
+#include "core/merged_rows.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
-HistoryRecord HistoryRecord::of(const Terms& terms) {
-  HistoryRecord record;
-  const LawHistory* const history = terms.history();
-  if (!history) return record;
-  const std::size_t width = history->components();
-  std::vector<HistoryPoint> points;
-  std::vector<double> values;
+HistoryRecord::HistoryRecord(const Terms& terms) : history_(terms.history()), components_(history_ ? history_->components() : 0) {
   for (const HistoryPlace& place : terms.history_points()) {
     if (!place.own) continue;
-    points.push_back(place.point);
-    for (std::size_t c = 0; c < width; ++c) values.push_back(history->begin()[c * history->stride() + static_cast<std::size_t>(place.number)]);
+    points_.push_back(place.point);
+    numbers_.push_back(place.number);
   }
-  record.components = width;
-  if (communicator().size() == 1) {
-    record.points = std::move(points);
-    record.values = std::move(values);
-    return record;
-  }
-  points = gathered<HistoryPoint>(points);
-  values = gathered<double>(values);
-  std::vector<std::size_t> order(points.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t k) { return points[k]; });
-  for (const std::size_t k : order) {
-    record.points.push_back(points[k]);
-    record.values.insert(record.values.end(), values.begin() + static_cast<std::ptrdiff_t>(k * width), values.begin() + static_cast<std::ptrdiff_t>((k + 1) * width));
-  }
-  return record;
+  points_of_all_ = static_cast<std::uint64_t>(counted(std::ssize(points_)).all);
 }
 
-void HistoryRecord::restore(Terms& terms) const {
+std::uint64_t HistoryRecord::written() const {
+  return sizeof(std::uint64_t) + sizeof points_of_all_ + points_of_all_ * (sizeof(HistoryPoint) + components_ * sizeof(double));
+}
+
+void HistoryRecord::write(ByteWriter& out) const {
+  out.value(static_cast<std::uint64_t>(components_));
+  out.value(points_of_all_);
+  const std::span<const HistoryPoint> points = points_;
+  over_merged(points, [&](std::span<const HistoryPoint> piece) { out.bytes(piece.data(), piece.size_bytes()); });
+  if (components_ == 0) return;
+  std::vector<double> values;
+  const auto values_of = [&](std::size_t from, std::size_t to) {
+    values.clear();
+    for (std::size_t k = from; k < to; ++k)
+      for (std::size_t c = 0; c < components_; ++c)
+        values.push_back(history_->begin()[c * history_->stride() + static_cast<std::size_t>(numbers_[k])]);
+    return std::span<const double>(values);
+  };
+  over_merged_rows(points, components_, values_of, [&](std::span<const HistoryPoint>, std::span<const double> rows) {
+    out.bytes(rows.data(), rows.size_bytes());
+  });
+}
+
+void HistoryRecord::read(ByteReader& in, Terms& terms) {
   LawHistory* const history = terms.history();
   const char* const other = "the saved state belongs to other materials";
+  const auto components = in.value<std::uint64_t>(), count = in.value<std::uint64_t>();
   if (components != (history ? history->components() : 0)) throw InputError(other);
+  in.expect(count, sizeof(HistoryPoint) + components * sizeof(double));
+  const std::vector<HistoryPlace> places = terms.history_points();
+  std::vector<std::uint64_t> rows;  // of these in the record; both ascend
+  for (std::uint64_t row = 0; row < count; ++row)
+    for (const auto point = in.value<HistoryPoint>(); rows.size() < places.size() && places[rows.size()].point == point;)
+      rows.push_back(row);
+  if (rows.size() < places.size()) throw InputError(other);
   if (!history) return;
   const std::span<double> all = history->values();
   std::ranges::fill(all, 0.0);
-  for (const HistoryPlace& place : terms.history_points()) {
-    const auto found = std::ranges::lower_bound(points, place.point);
-    if (found == points.end() || *found != place.point) throw InputError(other);
-    const auto row = static_cast<std::size_t>(found - points.begin());
-    for (std::size_t c = 0; c < components; ++c) all[c * history->stride() + static_cast<std::size_t>(place.number)] = values[row * components + c];
+  std::vector<double> values(components);
+  std::size_t next = 0;
+  for (std::uint64_t row = 0; row < count; ++row) {
+    in.bytes(values.data(), components * sizeof(double));
+    for (; next < rows.size() && rows[next] == row; ++next)
+      for (std::size_t c = 0; c < components; ++c)
+        all[c * history->stride() + static_cast<std::size_t>(places[next].number)] = values[c];
   }
   terms.history_restored();
 }
 
-void HistoryRecord::write(ByteWriter& out) const {
-  out.value(static_cast<std::uint64_t>(components));
-  out.value(static_cast<std::uint64_t>(points.size()));
-  out.bytes(points.data(), points.size() * sizeof(HistoryPoint));
-  out.bytes(values.data(), values.size() * sizeof(double));
-}
-
-HistoryRecord HistoryRecord::read(ByteReader& in) {
-  HistoryRecord record;
-  record.components = in.value<std::uint64_t>();
-  const auto count = in.value<std::uint64_t>();
-  in.expect(record.components, 1);
-  in.expect(count, sizeof(HistoryPoint) + record.components * sizeof(double));
-  record.points.resize(count);
-  record.values.resize(count * record.components);
-  in.bytes(record.points.data(), count * sizeof(HistoryPoint));
-  in.bytes(record.values.data(), record.values.size() * sizeof(double));
-  return record;
+std::size_t HistoryRecord::count(ByteReader& in) {
+  const auto components = in.value<std::uint64_t>(), points = in.value<std::uint64_t>();
+  in.expect(components, 1);
+  in.expect(points, sizeof(HistoryPoint) + components * sizeof(double));
+  return points * components;
 }
 
 }  // namespace perikit

@@ -2,41 +2,19 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
-#include <numeric>
 
-#include "core/numbered_rows.hpp"
+#include "core/merged_rows.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// Rows of all ranks in ascending order of their numbers; those of each rank ascend already.
-void put_in_order(const std::vector<std::vector<std::int64_t>>& numbers, std::size_t width, std::vector<double>& rows) {
-  std::vector<std::int64_t> all;
-  std::vector<std::size_t> ends, order;
-  for (const std::vector<std::int64_t>& of_rank : numbers) {
-    all.insert(all.end(), of_rank.begin(), of_rank.end());
-    ends.push_back(all.size());
-  }
-  order.resize(all.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
-  for (std::size_t k = 1; k < ends.size(); ++k)
-    std::inplace_merge(order.begin(), at(ends[k - 1]), at(ends[k]),
-                       [&](std::size_t a, std::size_t b) { return all[a] < all[b]; });
-  std::vector<double> sorted(rows.size());
-  for (std::size_t n = 0; n < order.size(); ++n) std::copy_n(&rows[order[n] * width], width, &sorted[n * width]);
-  rows = std::move(sorted);
-}
-
-/// In an order that the scene gives.
-void put_in_order(const std::vector<std::vector<std::int64_t>>& numbers, std::span<const std::int64_t> wanted, std::size_t width,
-                  std::vector<double>& rows) {
+/// Rows by number in an order that the scene gives.
+std::vector<double> in_order(const std::vector<std::int64_t>& numbers, std::span<const std::int64_t> wanted, std::size_t width,
+                             const std::vector<double>& rows) {
   std::vector<std::pair<std::int64_t, std::size_t>> place;
-  for (const std::vector<std::int64_t>& of_rank : numbers)
-    for (const std::int64_t number : of_rank) place.emplace_back(number, place.size());
+  for (const std::int64_t number : numbers) place.emplace_back(number, place.size());
   std::ranges::sort(place);
   std::vector<double> sorted;
   for (const std::int64_t number : wanted) {
@@ -44,7 +22,7 @@ void put_in_order(const std::vector<std::vector<std::int64_t>>& numbers, std::sp
     const auto row = rows.begin() + static_cast<std::ptrdiff_t>(found->second * width);
     sorted.insert(sorted.end(), row, row + static_cast<std::ptrdiff_t>(width));
   }
-  rows = std::move(sorted);
+  return sorted;
 }
 
 }  // namespace
@@ -110,27 +88,20 @@ std::vector<double> gather_rows(const Body& body, std::size_t first, std::size_t
                       [&](std::size_t, std::size_t) { return std::span<const double>(rows); });
 }
 
-std::vector<double> gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine,
-                               std::size_t width) {
-  if (!problem.partition()) return {mine.begin(), mine.end()};
+void gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine, std::size_t width,
+                const std::function<void(std::span<const double> rows)>& use) {
+  if (!problem.partition()) return use(mine);
+  if (set == "all") return gather_points(problem, mine, width, [&](std::size_t, std::span<const double> rows) { use(rows); });
   const Body& body = problem.body();
-  std::vector<double> all;
-  if (set == "all") {
-    gather_points(problem, mine, width,
-                  [&](std::size_t, std::span<const double> rows) { all.insert(all.end(), rows.begin(), rows.end()); });
-    return all;
-  }
   const std::vector<std::int64_t> own = body.numbers(body.set(set));
-  std::vector<std::vector<std::int64_t>> numbers;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(own)))) {
-    std::vector<std::int64_t>& values = numbers.emplace_back(of_rank.size() / sizeof(std::int64_t));
-    if (!of_rank.empty()) std::memcpy(values.data(), of_rank.data(), of_rank.size());
+  if (body.order_of(set).empty()) {
+    const auto rows_of = [&](std::size_t from, std::size_t to) { return mine.subspan(from * width, (to - from) * width); };
+    return over_merged_rows(std::span(own), width, rows_of,
+                            [&](std::span<const std::int64_t>, std::span<const double> rows) { use(rows); });
   }
-  all = gathered<double>(mine);
-  if (numbers.empty()) return all;
-  const std::span<const std::int64_t> wanted = body.order_of(set);
-  wanted.empty() ? put_in_order(numbers, width, all) : put_in_order(numbers, wanted, width, all);
-  return all;
+  const std::vector<std::int64_t> numbers = gathered<std::int64_t>(own);
+  const std::vector<double> rows = gathered<double>(mine);
+  if (communicator().rank() == 0) use(in_order(numbers, body.order_of(set), width, rows));
 }
 
 }  // namespace perikit

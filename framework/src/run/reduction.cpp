@@ -15,15 +15,32 @@ namespace perikit {
 
 namespace {
 
-/// At this rank's points of a set, in its order.
-std::vector<double> values_of(const HistoryDescription& record, const Body& body, PointFields& fields) {
+/// Of a point of a set. Place and volume are 0 where nobody asks for them.
+struct Row {
+  double value, x, y, z, volume;
+};
+
+/// use(row) in the order of the set, on rank 0. All ranks must call it.
+void over_rows(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields,
+               const std::function<void(const Row&)>& use) {
+  const Body& body = problem.body();
+  const std::span<const std::int32_t> points = body.set(record.set);
+  const bool places = record.reduce == "fit" || record.reduce == "error";
+  const std::size_t width = places ? 5 : 1;
   const int column = PointFields::column(record.quantity, record.component);
-  const OutputField field = fields.at(record.quantity, body.set(record.set));
+  const OutputField field = fields.at(record.quantity, points);
   const auto w = static_cast<std::size_t>(field.width);
-  std::vector<double> values;
-  for (const double* row = field.data.data(); row < field.data.data() + field.data.size(); row += w)
-    values.push_back(column >= 0 ? row[column] : std::sqrt(std::inner_product(row, row + w, row, 0.0)));
-  return values;
+  std::vector<double> mine;
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const double* const row = &field.data[n * w];
+    mine.push_back(column >= 0 ? row[column] : std::sqrt(std::inner_product(row, row + w, row, 0.0)));
+    const auto p = static_cast<std::size_t>(points[n]);
+    if (places) mine.insert(mine.end(), {body.position(p)[0], body.position(p)[1], body.position(p)[2], body.volume(p)});
+  }
+  gather_set(problem, record.set, mine, width, [&](std::span<const double> rows) {
+    for (std::size_t n = 0; n < rows.size(); n += width)
+      use(places ? Row{rows[n], rows[n + 1], rows[n + 2], rows[n + 3], rows[n + 4]} : Row{rows[n], 0, 0, 0, 0});
+  });
 }
 
 double product(const std::vector<double>& u, const std::vector<double>& v) {
@@ -52,37 +69,23 @@ std::array<Point, 3> orthogonalized(std::array<std::vector<double>, 3>& x) {
   return rotation;
 }
 
-/// Of the points of a set, in its order: place and volume.
-using Rows = std::vector<std::array<double, 4>>;
-
-/// On rank 0 those of all ranks. All of them must call it.
-Rows rows_of(const std::string& set, const BodyProblem& problem) {
-  const Body& body = problem.body();
-  std::vector<double> mine;
-  for (const std::int32_t index : body.set(set)) {
-    const auto p = static_cast<std::size_t>(index);
-    const Point x = body.position(p);
-    mine.insert(mine.end(), {x[0], x[1], x[2], body.volume(p)});
-  }
-  const std::vector<double> all = gather_set(problem, set, mine, 4);
-  Rows rows(all.size() / 4);
-  for (std::size_t n = 0; n < rows.size(); ++n) std::copy_n(&all[4 * n], 4, rows[n].begin());
-  return rows;
-}
-
-double fitted(const HistoryDescription& record, const Rows& rows, const std::vector<double>& values) {
+double fitted(const Point& at, const std::vector<Row>& rows) {
   const double n = static_cast<double>(rows.size());
   const auto mean_of = [n](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0) / n; };
   std::array<std::vector<double>, 3> x;   // places, from their centre
   Point centre{};
+  std::vector<double> off;  // values, from their mean
+  for (const Row& row : rows) {
+    const Point place{row.x, row.y, row.z};
+    for (std::size_t c = 0; c < 3; ++c) x[c].push_back(place[c]);
+    off.push_back(row.value);
+  }
   for (std::size_t c = 0; c < 3; ++c) {
-    for (const auto& row : rows) x[c].push_back(row[c]);
     centre[c] = mean_of(x[c]);
     for (double& coordinate : x[c]) coordinate -= centre[c];
   }
   const std::array<Point, 3> axes = orthogonalized(x);
-  const double mean = mean_of(values);
-  std::vector<double> off = values;
+  const double mean = mean_of(off);
   for (double& value : off) value -= mean;
   const double largest = std::max({product(x[0], x[0]), product(x[1], x[1]), product(x[2], x[2])});
   double fit = mean;
@@ -90,38 +93,39 @@ double fitted(const HistoryDescription& record, const Rows& rows, const std::vec
     const double extent = product(x[k], x[k]);
     if (extent <= 1e-18 * largest) continue;   // the points have no extent along this axis, and no slope
     double along = 0;
-    for (std::size_t c = 0; c < 3; ++c) along += axes[k][c] * (record.at[c] - centre[c]);
+    for (std::size_t c = 0; c < 3; ++c) along += axes[k][c] * (at[c] - centre[c]);
     fit += along * product(x[k], off) / extent;
   }
   return fit;
 }
 
-double error(const HistoryDescription& record, const Rows& rows, const std::vector<double>& values, double t) {
-  double distance = 0, size = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const double exact = (*record.exact)({rows[k][0], rows[k][1], rows[k][2]}, t), off = values[k] - exact, volume = rows[k][3];
-    distance += volume * off * off;
-    size += volume * exact * exact;
-  }
+}  // namespace
+
+double reduced(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields, double t) {
+  double sum = 0, least = 0, largest = 0, count = 0, distance = 0, size = 0;
+  std::vector<Row> all;
+  const bool fit = record.reduce == "fit", error = record.reduce == "error";
+  over_rows(record, problem, fields, [&](const Row& row) {
+    if (fit) return all.push_back(row);  // the one that goes over them several times
+    sum += row.value;
+    if (count == 0 || row.value < least) least = row.value;
+    if (count == 0 || largest < row.value) largest = row.value;
+    ++count;
+    if (!error) return;
+    const double exact = (*record.exact)({row.x, row.y, row.z}, t), off = row.value - exact;
+    distance += row.volume * off * off;
+    size += row.volume * exact * exact;
+  });
+  if (communicator().rank() != 0) return 0;
+  if (fit) return fitted(record.at, all);
+  if (record.reduce == "min") return least;
+  if (record.reduce == "max") return largest;
+  if (!error) return record.reduce == "sum" ? sum : sum / count;
   if (distance == 0) return 0;
   if (size > 0) return std::sqrt(distance / size);
   throw RunError(
       fmt::format("history column {}: `exact` is 0 at every point of \"{}\" at t = {:g}, and nothing to relate an error to",
                   record.name, record.set, t));
-}
-
-}  // namespace
-
-double reduced(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields, double t) {
-  const std::vector<double> values = gather_set(problem, record.set, values_of(record, problem.body(), fields));
-  const Rows rows = record.reduce == "fit" || record.reduce == "error" ? rows_of(record.set, problem) : Rows();
-  if (values.empty()) return 0;  // rank 0 has them
-  if (record.reduce == "fit") return fitted(record, rows, values);
-  if (record.reduce == "error") return error(record, rows, values, t);
-  if (record.reduce == "min") return *std::ranges::min_element(values);
-  if (record.reduce == "max") return *std::ranges::max_element(values);
-  const double sum = std::accumulate(values.begin(), values.end(), 0.0);
-  return record.reduce == "sum" ? sum : sum / static_cast<double>(values.size());
 }
 
 }  // namespace perikit

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "sdk/alternating_volumes.hpp"
 
@@ -263,7 +264,7 @@ class LoadSteps {
     copy(first_u_, u_);
     copy(first_driving_, old_driving_);
     copy(first_increment_, last_increment_);
-    if (problem_.bonds() == bonds_) return;
+    if (communicator().largest(problem_.bonds() == bonds_ ? 0 : 1) == 0) return;  // on no rank
     problem_.restore_bonds(bonds_);
     solver_.bonds_changed();
   }

@@ -250,6 +250,7 @@ BalanceEffort effort_of_balance(const SpaceParts& parts) {
     work += own_family ? std::max(bonds, bonds * bonds / 16) : bonds;
   }
   communicator().sum({&work, 1});
+  if (!communicator().complete()) return {0, 1};  // what it takes is all that a rank without others can find out
   const auto products = [&](double of_all, double least) {
     return static_cast<int>(std::clamp(of_all / static_cast<double>(std::max<std::int64_t>(work, 1)), least, 4000.0));
   };

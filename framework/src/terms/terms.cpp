@@ -384,12 +384,12 @@ std::vector<BondChange> Terms::changed_bonds() const {
   return parts_.families->changed();
 }
 
-std::vector<NamedChange> Terms::changed_bonds_of_all() const {
+std::vector<NamedChange> Terms::own_changed_bonds() const {
   return SharedBonds(parts_.families->body()).outward(changed_bonds());
 }
 
-void Terms::restore_bonds_of_all(std::span<const NamedChange> changes) {
-  restore_bonds(SharedBonds(parts_.families->body()).inward(changes));
+std::vector<BondChange> Terms::bonds_here(std::span<const NamedChange> changes) const {
+  return SharedBonds(parts_.families->body()).inward(changes);
 }
 
 void Terms::restore_bonds(std::span<const BondChange> changes) {

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -221,8 +223,20 @@ struct FamilyLists {
   std::vector<std::int32_t> neighbour;
 };
 
-/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws std::domain_error for coincident points.
-FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon);
+/// Points at one place. Of several pairs that one is named whose point has the lowest number.
+class CoincidentPoints : public std::domain_error {
+ public:
+  CoincidentPoints(std::int64_t number, const Point& x);
+  std::int64_t number() const noexcept { return number_; }
+
+ private:
+  std::int64_t number_;
+};
+
+/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws CoincidentPoints. number(p): of a
+/// point there; empty: p.
+FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
+                          const std::function<std::int64_t(std::size_t p)>& number = {});
 
 /// By point: whether it is one of `from`, or in the family of one. For points of bodies far larger than a family.
 std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,

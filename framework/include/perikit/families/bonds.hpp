@@ -66,6 +66,7 @@ struct NamedBond {
 struct NamedChange {
   NamedBond bond;
   double integrity = 0;
+  friend bool operator<(const NamedChange& a, const NamedChange& b) { return a.bond < b.bond; }
 };
 
 /// What a bond has of the stored energy.

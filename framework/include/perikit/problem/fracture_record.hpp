@@ -2,7 +2,9 @@
 /// The bonds of a problem and their account: which fail, and what that does to the energies.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "perikit/problem/state.hpp"
@@ -24,12 +26,21 @@ class FractureRecord {
   /// How bonds failed so far, in words; empty where they never fail.
   std::string summary(const BondChecks& checks, double dissipated) const;
 
+  // Run state of all ranks, a piece at a time. All ranks must call what is here, and read the same.
+  /// Bytes that `write` makes.
+  std::uint64_t written(const Terms& terms) const;
+  /// To rank 0; what the others write is worth nothing.
   void write(const Terms& terms, ByteWriter& out) const;
   void read(Terms& terms, ByteReader& in);
-  /// What `write` wrote, the bonds alone.
-  static void read_bonds(ByteReader& in, std::vector<NamedChange>& bonds);
+  /// Of what `write` made, the bonds alone: use(some of them) until all have come.
+  static void read_bonds(ByteReader& in, const std::function<void(std::span<const NamedChange>)>& use);
+
+  // The same of this rank alone, with its ghosts.
+  void write_here(const Terms& terms, ByteWriter& out) const;
+  void read_here(Terms& terms, ByteReader& in);
 
  private:
+  void write_account(ByteWriter& out) const;
   void read_account(ByteReader& in);
   void account(const BondUpdate& update, State& state);
 

@@ -86,9 +86,9 @@ class Problem {
   /// Where bonds have failed or weakened since the set-up, as they are now; null where none have, and in bodies with images. The problem
   /// must outlive it. All ranks must call it.
   virtual std::unique_ptr<DamagedPart> damaged_part() = 0;
-  /// With [damage]: the bonds as they are, to return to where a step is given up. Empty without.
+  /// With [damage]: the bonds as they are on this rank, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
-  /// Bonds of `bonds`, not empty.
+  /// Bonds of `bonds`, not empty. All ranks must call it.
   virtual void restore_bonds(std::span<const std::byte> bonds) = 0;
 
  private:

@@ -126,9 +126,10 @@ class Terms {
   /// Every bond here that is not as it was at the set-up.
   std::vector<BondChange> changed_bonds() const;
   void restore_bonds(std::span<const BondChange> changes);
-  /// The same of all ranks, on rank 0: run state, for checkpoints. All ranks must call both.
-  std::vector<NamedChange> changed_bonds_of_all() const;
-  void restore_bonds_of_all(std::span<const NamedChange> changes);
+  /// Those that no other rank owns, as all ranks name them: run state, for checkpoints. Ascending.
+  std::vector<NamedChange> own_changed_bonds() const;
+  /// Of changes in the whole body those of bonds with both ends here.
+  std::vector<BondChange> bonds_here(std::span<const NamedChange> changes) const;
   BondChecks bond_checks() const;
 
  private:

@@ -1,0 +1,18 @@
+#pragma once
+
+namespace perikit::app {
+
+/// The most memory that this process takes from the beginning on, beyond what it had then.
+class PeakMemory {
+ public:
+  PeakMemory();
+  /// What it took so far does not count.
+  void forget();
+  /// With what a process takes that has the program, its libraries and nothing else [bytes]; 0 where the system does not tell.
+  double bytes() const;
+
+ private:
+  double before_;
+};
+
+}  // namespace perikit::app
