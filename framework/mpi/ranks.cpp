@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "perikit/core/communicator.hpp"
+#include "perikit/plugin/abi.hpp"
 
 namespace perikit {
 
@@ -121,6 +122,8 @@ class MpiRanks final : public Communicator {
       MPI_Bcast(bytes.data() + at, static_cast<int>(std::min(piece, bytes.size() - at)), MPI_BYTE, 0, world_);
   }
 
+  void* mpi() noexcept override { return &world_; }
+
   [[noreturn]] void abort(int status) noexcept override {
     MPI_Abort(world_, status);
     std::_Exit(status);
@@ -136,8 +139,8 @@ class MpiRanks final : public Communicator {
 
 }  // namespace perikit
 
-/// Null where the caller is another version of perikit.
-extern "C" __attribute__((visibility("default"))) perikit::Communicator* perikit_mpi_ranks(const char* version) {
-  if (std::string_view(version) != PERIKIT_VERSION) return nullptr;
+/// Null where the caller is another perikit.
+PERIKIT_EXPORT perikit::Communicator* perikit_mpi_ranks(const char* build_id) {
+  if (std::string_view(build_id) != PERIKIT_BUILD) return nullptr;
   return new perikit::MpiRanks();
 }

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "assembled_tangent.hpp"
-#include "multigrid.hpp"
+#include "multigrid_cycle.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
-#include "perikit/problem/first_rank.hpp"
 #include "perikit/problem/motion.hpp"
 
 namespace perikit {
@@ -99,41 +97,26 @@ class BlockJacobi final : public Preconditioner {
   std::vector<double> inverse_;
 };
 
-/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly. Where there are several
-/// ranks the first one makes and applies that of the whole body: a solve takes the iterations that it takes on one.
+/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly.
 class CompanionCycle final : public Preconditioner {
  public:
-  CompanionCycle(Problem& problem, double most_bulk) : Preconditioner(problem), most_bulk_(most_bulk) {
-    if (communicator().size() > 1) first_rank_.emplace(problem.body(), problem.body().owned());
-  }
+  CompanionCycle(Problem& problem, double most_bulk, std::string& how)
+      : Preconditioner(problem), most_bulk_(most_bulk), cycle_(make_multigrid_cycle(problem, how)) {}
 
-  void apply(ConstFieldView r, FieldView z) override {
-    if (!first_rank_) return multigrid_.apply(r, z);
-    Field whole = first_rank_->gather(r);
-    if (communicator().rank() == 0) multigrid_.apply(whole, whole);
-    first_rank_->scatter(whole, z);
-  }
+  void apply(ConstFieldView r, FieldView z) override { cycle_->apply(r, z); }
 
  private:
   bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
-    equilibrium.problem().assemble_companion(u, springs_, most_bulk_);
-    std::vector<Field> rigid = rigid_motions(equilibrium.problem().body(), u);
-    if (!first_rank_) {
-      multigrid_.make(springs_, equilibrium.free(), rigid);
-      return true;
-    }
-    const BlockMatrix whole = first_rank_->gather(springs_);
-    const Field free = first_rank_->gather(equilibrium.free());
-    for (Field& motion : rigid) motion = first_rank_->gather(motion);
-    if (communicator().rank() == 0) multigrid_.make(whole, free, rigid);
+    Problem& problem = equilibrium.problem();
+    problem.assemble_companion(u, springs_, most_bulk_);
+    cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u));
     return true;
   }
   double patience() const noexcept override { return 1.3; }  // it is cheap
 
   double most_bulk_;  ///< in shear moduli
   BlockMatrix springs_;
-  Multigrid multigrid_;
-  std::optional<FirstRank> first_rank_;  ///< where there are several
+  std::unique_ptr<MultigridCycle> cycle_;
 };
 
 /// Largest ratio of bulk to shear modulus.
@@ -213,13 +196,19 @@ std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Pro
   // The assembled tangent needs the whole body on one rank.
   if (name == "auto") chosen = communicator().size() == 1 && factorisation_pays(problem) ? "factorisation" : "companion";
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
-  if (chosen == "companion") return make_companion_cycle(problem, std::numeric_limits<double>::infinity());
+  if (chosen == "companion") {
+    std::string how;
+    auto companion = make_companion_cycle(problem, std::numeric_limits<double>::infinity(), &how);
+    if (!how.empty()) chosen += ", " + how;
+    return companion;
+  }
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
   return nullptr;
 }
 
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk) {
-  return std::make_unique<CompanionCycle>(problem, most_bulk);
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how) {
+  std::string unasked;
+  return std::make_unique<CompanionCycle>(problem, most_bulk, how ? *how : unasked);
 }
 
 }  // namespace perikit

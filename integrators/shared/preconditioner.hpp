@@ -70,10 +70,10 @@ bool needs_one_rank(const std::string& preconditioner) noexcept;
 /// name: "none" (null), "jacobi" (inverses of the points' diagonal blocks), "factorisation" (the factorised tangent), "companion"
 /// (a multigrid cycle on springs between nearest neighbours, never the tangent), "auto": the factorisation in 1D, and in 2D for at
 /// most 4000 points or bulk moduli beyond 1000 shear moduli, where the assembled tangent takes at most 2 GB; else, and on several ranks, the companion.
-/// `chosen` <- what auto chose, for the log.
+/// `chosen` <- what auto chose, and how the companion is solved on several ranks, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
-/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli.
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk);
+/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli. *how <- as of make_multigrid_cycle, where wanted.
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how = nullptr);
 
 }  // namespace perikit

@@ -9,6 +9,7 @@ class ForwardingProblem : public Problem {
  public:
   explicit ForwardingProblem(Problem& of) : Problem(of), of_(of) {}
 
+  void share(FieldView field) override { of_.share(field); }
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
     return of_.evaluate_forces(u, force, energy, time_step);
   }

@@ -24,6 +24,18 @@ def need(library):
             skip("no %s on this machine" % program)
 
 
+def hide_petsc(library, work):
+    """The environment of a perikit that was built without PETSc: the loader finds the framework in a folder in which that library is not."""
+    folder = os.path.join(work, "without_petsc")
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    beside = os.path.dirname(library)
+    for name in os.listdir(beside):
+        if name.startswith("libperikit.so") or name == os.path.basename(library):
+            os.symlink(os.path.join(beside, name), os.path.join(folder, name))
+    return {"LD_LIBRARY_PATH": folder}
+
+
 def vector(values):
     return "[" + ", ".join(str(value) for value in values) + "]"
 
@@ -84,6 +96,19 @@ history = [ {{ name = "end", set = "high", quantity = "displacement", component 
 def without_velocity(text):
     """The scene for statics."""
     return text.replace('quantity = "velocity"', 'quantity = "displacement"').replace('"velocity", ', "")
+
+
+# A corner that no bond leads to.
+LOOSE = "[[crack]]\nsegment = [[12.0, 27.0], [33.0, 12.0]]\n"
+
+
+def torn_slowly(kinematics, integrator, damage, cloud):
+    """Pulled in equilibrium until it is in two, around a corner that hangs on weak springs."""
+    text = without_velocity(scene(kinematics, 2, cloud, integrator))
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    text = text[:begin] + '[[boundary]]\nset = "end"\ndisplacement = [1.5, 0]\n' + text[end:]
+    text = text.replace("[sets]\n", '[sets]\nend = "x > 29 && y < 13"\n').replace("[integrator]", "[run]\nweak_springs = 1e-5\n[integrator]")
+    return text.replace('"reaction"]', '"reaction", "damage"]') + LOOSE + damage
 
 
 def run(program, text, folder, ranks=1, threads=1, options=(), limit=300, environment=None):

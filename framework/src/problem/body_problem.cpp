@@ -104,6 +104,10 @@ void BodyProblem::describe(EvaluationStatus& status) const {
                                    status.description, parts_.kinematics, parts_.materials[status.material]);
 }
 
+void BodyProblem::share(FieldView field) {
+  if (ghosts_) ghosts_->forward(field);
+}
+
 EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);

@@ -53,6 +53,8 @@ class Communicator {
   virtual std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) = 0;
   /// bytes <- those of rank 0. All ranks must call it.
   virtual void broadcast(std::vector<std::byte>& bytes) = 0;
+  /// The MPI_Comm behind it, for libraries that speak MPI themselves; null where there is none.
+  virtual void* mpi() noexcept { return nullptr; }
   /// Ends all ranks with this status, at once and whatever they are doing.
   [[noreturn]] virtual void abort(int status) noexcept = 0;
 };

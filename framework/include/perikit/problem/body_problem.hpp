@@ -47,6 +47,7 @@ class BodyProblem final : public Problem {
   BodyProblem(ProblemParts parts, ProblemValues values);
   ~BodyProblem() override;
 
+  void share(FieldView field) override;
   EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
   EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override;
   EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override;

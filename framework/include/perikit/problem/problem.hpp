@@ -46,6 +46,10 @@ class Problem {
   /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
   Field make_field() const { return body().make_field(dimension()); }
 
+  /// Values of the owners of points -> ghosts of a field that has at most `dimension` components and is nobody else's: in fields of the problem
+  /// ghosts are zero. All ranks must call it.
+  virtual void share(FieldView field) = 0;
+
   /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and
   /// laws with history put theirs aside for `advance`; 0: nothing is kept.
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
