@@ -8,7 +8,7 @@ import os
 import re
 import sys
 
-from scenes import differences, hide_petsc, need, run, scene, skip, torn_slowly, without_velocity
+from scenes import check, differences, failed, hide_petsc, need, run, scene, skip, torn_slowly, without_velocity
 
 try:
     import h5py
@@ -20,13 +20,6 @@ PROGRAM, LIBRARY, WORK = sys.argv[1:]
 DISTRIBUTED, GATHERED = "aggregation of PETSc on all ranks", "solved by the first rank"
 BAQP = 'type = "baqp"'
 STIFF = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 1.0, shear_modulus = 20.0, bulk_modulus = 30.0 }\n'
-failed = []
-
-
-def check(condition, what):
-    print(("ok      " if condition else "FAILED  ") + what, flush=True)
-    if not condition:
-        failed.append(what)
 
 
 def integrator(name, steps):

@@ -12,17 +12,10 @@ import subprocess
 import sys
 import time
 
-from scenes import ENVIRONMENT, command, differences, need, run, scene, without_velocity
+from scenes import ENVIRONMENT, check, command, differences, failed, need, run, scene, without_velocity
 
 PROGRAM, LIBRARY, WORK, FAILING = sys.argv[1:]
 LIMIT = 10.0   # seconds
-failed = []
-
-
-def check(condition, what):
-    print(("ok      " if condition else "FAILED  ") + what, flush=True)
-    if not condition:
-        failed.append(what)
 
 
 def perikit_lines(text, message):

@@ -9,6 +9,14 @@ SKIPPED = 77
 
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMP_WAIT_POLICY="passive")
 
+failed = []   # what `check` has not found
+
+
+def check(condition, what):
+    print(("ok      " if condition else "FAILED  ") + what, flush=True)
+    if not condition:
+        failed.append(what)
+
 
 def skip(why):
     print("skipped: " + why)

@@ -172,13 +172,18 @@ void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body
     void (*body)(void*, std::size_t);
   } ordered{order, context, body};
   order.begin(threads);
-  parallel_for(n, late, &ordered, [](void* of, std::size_t k) {
+  const auto alone = [](void* of, std::size_t k) {
+    const auto& [order, context, body] = *static_cast<Ordered*>(of);
+    body(context, order.turn(k));
+  };
+  const auto waiting = [](void* of, std::size_t k) {
     const auto& [order, context, body] = *static_cast<Ordered*>(of);
     const std::size_t i = order.turn(k);
     order.wait(i);
     body(context, i);
     order.end(i);
-  });
+  };
+  threads == 1 ? parallel_for(n, late, &ordered, alone) : parallel_for(n, late, &ordered, waiting);
 }
 }  // namespace detail
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <set>
 #include <utility>
 
 #include "families/lattice_slots.hpp"
@@ -114,8 +113,6 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
   sequence = BlockSequence(reach);
   // Cells of the colouring: groups of eight along rows; whole rows where a tile is as long.
   const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;
-  std::set<std::array<int, 2>> to_rows{{0, 0}};
-  for (const auto& d : slots.offsets) to_rows.insert({d[1], d[2]});
   const auto all_rows = static_cast<std::size_t>(lattice.extent[1] * lattice.extent[2]);
   std::vector<std::size_t> found(all_rows);  // one more than the block that has listed a row last
   const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
@@ -124,12 +121,16 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
       const std::int64_t chunk = row.first / chunk_points - lattice.index(0, row.k1, row.k2) / chunk_points;
       const std::int64_t first = along == 1 ? 0 : std::max<std::int64_t>(0, chunk - grow[0]),
                          last = along == 1 ? 0 : std::min(along - 1, chunk + row.chunks - 1 + grow[0]);
-      for (const auto& [d1, d2] : to_rows) {
-        const std::int64_t k1 = row.k1 + d1, k2 = row.k2 + d2;
-        if (k1 < 0 || k1 >= lattice.extent[1] || k2 < 0 || k2 >= lattice.extent[2]) continue;
+      const auto reach_row = [&](std::int64_t k1, std::int64_t k2) {
+        if (k1 < 0 || k1 >= lattice.extent[1] || k2 < 0 || k2 >= lattice.extent[2]) return;
         const std::int64_t to = k1 + lattice.extent[1] * k2;
-        if (std::exchange(found[static_cast<std::size_t>(to)], b + 1) == b + 1) continue;
+        if (std::exchange(found[static_cast<std::size_t>(to)], b + 1) == b + 1) return;
         for (std::int64_t k0 = first; k0 <= last; ++k0) touched.push_back(static_cast<std::int32_t>(k0 + along * to));
+      };
+      reach_row(row.k1, row.k2);
+      for (const RowPair& pair : slots.row_pairs) {
+        reach_row(row.k1 - pair.d1, row.k2 - pair.d2);
+        reach_row(row.k1 + pair.d1, row.k2 + pair.d2);
       }
     }
   };
