@@ -43,7 +43,7 @@ struct MooneyRivlin {
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
     const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root;
     const T s = scale * (1.0 + trace(e) * (1.0 / 3.0));
-    const T p = -0.5 * inner(d, d) * (scale * scale), q = determinant(d) * (scale * scale * scale);
+    const T p = second_invariant(d) * (scale * scale), q = determinant(d) * (scale * scale * scale);
     const T first = -3.0 * (p * s + q), second = p * (1.0 - 2.0 * s * (1.0 + s)) - 3.0 * q * (1.0 + s);
     return (C1 * first + C2 * second) / (1.0 + s * (1.0 + s)) + volumetric_energy(volumetric, kappa, j);
   }

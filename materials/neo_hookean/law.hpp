@@ -35,7 +35,7 @@ struct NeoHookean {
     // w = I2(d)/(1 + m)^2 + det(d)/(1 + m)^3. So 3 s - 3 = -3 w s^3 / (1 + s + s^2) keeps its digits.
     const T m = mean_strain(H), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root, s = scale * (1.0 + m);
     const Tensor<T, S> d = deviator(right_cauchy_green_minus_identity(H));
-    const T second = -0.5 * inner(d, d) * (scale * scale), third = determinant(d) * (scale * scale * scale);
+    const T second = second_invariant(d) * (scale * scale), third = determinant(d) * (scale * scale * scale);
     return -1.5 * mu * ((second * s + third) / (1.0 + s * (1.0 + s))) + volumetric_energy(volumetric, kappa, j);
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "perikit/problem/motion.hpp"
 
@@ -26,9 +27,9 @@ const std::vector<PointField>& point_fields() {
       {"von_mises", 1, true, Sampling::von_mises, "von Mises stress", "Pa", [](From f) { return f.scalar(f.samples_->von_mises); }},
       {"jacobian", 1, true, Sampling::H, "jacobian", "", [](From f) { return f.jacobian(); }},
       {"damage", 1, false, Sampling::nothing, "damage", "",
-       [](From f) { return f.scalar(f.once("damage", [&] { return f.problem_.terms().damage(); })); }},
+       [](From f) { return f.scalar(f.once("damage", [&](Field) { return f.problem_.terms().damage(); })); }},
       {"shape_tensor_condition", 1, true, Sampling::nothing, "shape tensor condition", "",
-       [](From f) { return f.scalar(f.once("shape_tensor_condition", [&] { return f.problem_.terms().shape_tensor_condition(); })); }},
+       [](From f) { return f.scalar(f.once("shape_tensor_condition", [&](Field) { return f.problem_.terms().shape_tensor_condition(); })); }},
       {"material_id", 1, false, Sampling::nothing, "material id", "", [](From f) { return f.material_id(); }}};
   return all;
 }
@@ -121,11 +122,11 @@ OutputField PointFields::at(const std::string& name, std::span<const std::int32_
 }
 
 std::vector<double> PointFields::acceleration() {
-  return vector(once("acceleration", [&] { return dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field(); }));
+  return vector(once("acceleration", [&](Field) { return dynamic_ ? accelerations(problem_, problem_.state().time) : problem_.make_field(); }));
 }
 
 std::vector<double> PointFields::reaction() {
-  return vector(once("reaction", [&] { return reactions(problem_, dynamic_, problem_.state().time); }));
+  return vector(once("reaction", [&](Field before) { return reactions(problem_, dynamic_, problem_.state().time, std::move(before)); }));
 }
 
 std::vector<double> PointFields::external_force() const {

@@ -285,12 +285,12 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnerg
   return bad;
 }
 
-void Pass::add_samples(int n, const BatchScratch& s) {
+void Pass::add_samples(int n, const BatchScratch& s, bool both_ends) {
   if (work.finds()) return;
   if (bonds)
     bonds->add(n, s, work.selective());
   else
-    work.add_samples(n, s, *sums);
+    work.add_samples(n, s, *sums, both_ends);
 }
 
 void BatchWork::screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept {
@@ -358,9 +358,27 @@ void add_run(std::span<const Sampled> all, int first, int end, std::size_t p, co
   for (; q < all.size(); ++q) add(std::integral_constant<int, 1>(), &all[q]);
 }
 
+/// Lane l belongs to points[l].
+void add_lanes(std::span<const Sampled> all, int n, const std::int32_t* points, const double* weight) noexcept {
+  for (int l = 0; l < n;) {
+    const std::int32_t p = points[l];
+    int next = 1;
+    while (next < 8 && l + next < n && points[l + next] == p + next) ++next;
+    if (next == 8) {
+      add_eight(all, l, static_cast<std::size_t>(p), weight);
+      l += 8;
+      continue;
+    }
+    int end = l + 1;
+    while (end < n && points[end] == p) ++end;
+    add_run(all, l, end, static_cast<std::size_t>(p), weight);
+    l = end;
+  }
+}
+
 }  // namespace
 
-void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept {
+void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept {
   static constexpr auto ones = [] {
     std::array<double, batch_points> all{};
     all.fill(1.0);
@@ -380,20 +398,8 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
   for (int c = 0; c < 9 && sums.cauchy; ++c) to(stresses->sigma[c], sums.cauchy, c);
   for (int c = 0; c < components && sums.H; ++c) to(stress_space && c >= d * d ? s.lateral : s.H + c * batch_points, sums.H, c);
   for (int c = 0; c < components && sums.P; ++c) to(s.P + c * batch_points, sums.P, c);
-  for (int l = 0; l < n;) {
-    const std::int32_t p = s.owner[l];
-    int next = 1;
-    while (next < 8 && l + next < n && s.owner[l + next] == p + next) ++next;
-    if (next == 8) {
-      add_eight({all, count}, l, static_cast<std::size_t>(p), s.weight);
-      l += 8;
-      continue;
-    }
-    int end = l + 1;
-    while (end < n && s.owner[end] == p) ++end;
-    add_run({all, count}, l, end, static_cast<std::size_t>(p), s.weight);
-    l = end;
-  }
+  add_lanes({all, count}, n, s.owner, s.weight);
+  if (both_ends) add_lanes({all, count}, n, s.far, s.far_weight);
 }
 
 }  // namespace perikit

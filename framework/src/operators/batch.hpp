@@ -146,8 +146,8 @@ class BatchWork {
   /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept;
-  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l].
-  void add_samples(int n, const BatchScratch& s, const SampleSums& sums) const noexcept;
+  /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l], and of both_ends with far_weight to those of s.far[l].
+  void add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept;
 
  private:
   /// The lanes of a batch that are laminates.
@@ -207,8 +207,8 @@ struct Pass {
       nullptr;  ///< of u at the points of other ranks; null: it is there. For spaces that say so (EvaluationSpace::overlaps)
 
   /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
-  /// points.
-  void add_samples(int n, const BatchScratch& s);
+  /// points. both_ends: sums of far ends, too.
+  void add_samples(int n, const BatchScratch& s, bool both_ends = false);
   /// Evaluation points are taken one by one and nothing is scattered.
   bool alone() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.

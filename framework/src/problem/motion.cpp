@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/exact_sum.hpp"
@@ -48,15 +49,20 @@ Field accelerations(Problem& problem, double t) {
   return a;
 }
 
-Field reactions(Problem& problem, bool dynamic, double t) {
-  Field r = problem.make_field();
+Field reactions(Problem& problem, bool dynamic, double t, Field memory) {
+  Field r = std::move(memory);
+  if (r.size() == 0)
+    r = problem.make_field();
+  else
+    r.fill(0.0);
   if (!problem.constraints().any() && !problem.images()) return r;
   const ConstFieldView internal = problem.state().internal_force();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
-  const Field a = dynamic ? accelerations(problem, t) : Field();
+  const std::span<const double> masses = problem.masses().by_point();
+  if (dynamic) problem.constraints().prescribe_acceleration(t, r);
   for (const std::int64_t dof : problem.constraints().dofs()) {
-    r.data()[dof] = -internal.data[dof] - (external.data ? external.data[dof] : 0.0);
-    if (dynamic) r.data()[dof] += problem.masses().by_point()[static_cast<std::size_t>(dof) % r.stride()] * a.data()[dof];
+    const double inertia = dynamic ? masses[static_cast<std::size_t>(dof) % r.stride()] * r.data()[dof] : 0.0;
+    r.data()[dof] = -internal.data[dof] - (external.data ? external.data[dof] : 0.0) + inertia;
   }
   if (problem.images()) problem.images()->gather(r);
   return r;

@@ -222,8 +222,9 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   if (bad >= 0) return bad;
   pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
   if (sample) {
-    pass.add_samples(lanes, s);
-    return sampled_pairs ? sample_far_ends(lanes, s, pass) : -1;
+    const bool one_law = laws_.single() || s.one_law >= 0;
+    pass.add_samples(lanes, s, sampled_pairs && one_law);
+    return sampled_pairs && !one_law ? sample_far_ends(lanes, s, pass) : -1;
   }
   if (pass.alone()) return -1;
   choose(adjoint);
@@ -273,12 +274,12 @@ bool LatticeBonds<D>::samples_pairs(const Pass& pass) const noexcept {
   return pairs_ && pass.sums && !selective_ && !pass.work.numbered();
 }
 
-/// After the samples of their owners; laws that may differ are evaluated again. Returns the first bad lane or -1.
+/// After the samples of their owners, whose laws may be others. Returns the first bad lane or -1.
 template <int D>
 int LatticeBonds<D>::sample_far_ends(int lanes, BatchScratch& s, Pass& pass) {
   std::swap_ranges(s.owner, s.owner + lanes, s.far);
   std::swap_ranges(s.weight, s.weight + lanes, s.far_weight);
-  const int bad = laws_.single() || s.one_law >= 0 ? -1 : pass.work.evaluate(lanes, s, false, nullptr);
+  const int bad = pass.work.evaluate(lanes, s, false, nullptr);
   if (bad < 0) pass.add_samples(lanes, s);
   return bad;
 }

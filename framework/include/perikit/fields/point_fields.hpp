@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "perikit/fields/point_field.hpp"
@@ -21,7 +22,10 @@ class PointFields {
   static int column(const std::string& name, const std::string& component);
 
   /// Forget what was computed: the state has changed.
-  void renew() { cache_.clear(), made_.clear(), samples_.reset(); }
+  void renew() {
+    cache_.clear(), samples_.reset();
+    for (auto& [name, made] : made_) made.now = false;
+  }
   const OutputField& get(const std::string& name);
   /// The rows of these points of this rank alone, internal indices, in their order.
   OutputField at(const std::string& name, std::span<const std::int32_t> points);
@@ -33,11 +37,18 @@ class PointFields {
  private:
   friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
 
-  /// The field of the whole body that rows of `name` are read from, made when it is asked for first.
+  /// Of the whole body. Its memory stays when the state changes, for rows of history ask for it at every step.
+  struct Made {
+    Field field;
+    bool now = false;   ///< of the present state
+  };
+  /// The field that rows of `name` are read from: make(before), with what an earlier state had, when it is asked for first.
   template <class Make>
   const Field& once(const std::string& name, Make&& make) {
-    const auto known = made_.find(name);
-    return known != made_.end() ? known->second : made_.emplace(name, make()).first->second;
+    Made& made = made_[name];
+    if (!made.now) made.field = make(std::move(made.field));
+    made.now = true;
+    return made.field;
   }
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
@@ -52,7 +63,7 @@ class PointFields {
   bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
-  std::map<std::string, Field> made_;    ///< by `once`
+  std::map<std::string, Made> made_;     ///< by `once`
   std::span<const std::int32_t> rows_;   ///< the points that are computed for
 };
 

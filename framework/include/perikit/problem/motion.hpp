@@ -11,8 +11,9 @@ namespace perikit {
 double kinetic_energy(const Problem& problem, ConstFieldView velocity);
 /// (internal + external)/mass at time t, prescribed components as prescribed [m/s^2].
 Field accelerations(Problem& problem, double t);
-/// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs.
-Field reactions(Problem& problem, bool dynamic, double t);
+/// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs. memory: of
+/// an earlier call, to be used again.
+Field reactions(Problem& problem, bool dynamic, double t, Field memory = {});
 /// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its
 /// middle.
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u);
