@@ -127,6 +127,13 @@ TEST_CASE("roots and rational powers") {
         "reciprocal_sqrt", [](Pack a) { return reciprocal_sqrt(a); }, [](long double a) { return 1 / std::sqrt(a); }, positive, 1.5);
     compare(
         "reciprocal", [](Pack a) { return reciprocal(a); }, [](long double a) { return 1 / a; }, positive, 1.5);
+    compare(
+        "1/sqrt(a) beside another", [](Pack a) { return ReciprocalRootAndSum(a, Pack(1.0)).root; }, [](long double a) { return 1 / std::sqrt(a); },
+        positive, 1.5);
+    for (const double b : {0.0, 1e-3, 1.0, 1e3})
+      compare(
+          "1/(sqrt(a) + b)", [b](Pack a) { return ReciprocalRootAndSum(a, Pack(b)).sum; }, [b](long double a) { return 1 / (std::sqrt(a) + b); },
+              positive, 4.0);
   }
   for (const double a : {0.0, std::numeric_limits<double>::infinity()}) CHECK(!std::isfinite(reciprocal_sqrt(Pack(a))[0]));
   compare(

@@ -15,9 +15,9 @@ struct Stretch {
       y[c] = xi[c] + du[c];
       difference += du[c] * (xi[c] + y[c]);
     }
-    const Pack square = length * length + difference;
-    inverse_length = reciprocal_sqrt(square);
-    e = difference * reciprocal(square * inverse_length + length);
+    const ReciprocalRootAndSum reciprocal(length * length + difference, length);
+    inverse_length = reciprocal.root;
+    e = difference * reciprocal.sum;
     for (int c = 0; c < D; ++c) n[c] = y[c] * inverse_length;
   }
   Pack along(const Pack (&dw)[D]) const noexcept {

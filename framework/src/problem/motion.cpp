@@ -58,10 +58,10 @@ Field reactions(Problem& problem, bool dynamic, double t, Field memory) {
   if (!problem.constraints().any() && !problem.images()) return r;
   const ConstFieldView internal = problem.state().internal_force();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
-  const std::span<const double> masses = problem.masses().by_point();
+  const double* const masses = dynamic ? problem.masses().by_point().data() : nullptr;  // statics may have none
   if (dynamic) problem.constraints().prescribe_acceleration(t, r);
   for (const std::int64_t dof : problem.constraints().dofs()) {
-    const double inertia = dynamic ? masses[static_cast<std::size_t>(dof) % r.stride()] * r.data()[dof] : 0.0;
+    const double inertia = masses ? masses[static_cast<std::size_t>(dof) % r.stride()] * r.data()[dof] : 0.0;
     r.data()[dof] = -internal.data[dof] - (external.data ? external.data[dof] : 0.0) + inertia;
   }
   if (problem.images()) problem.images()->gather(r);

@@ -227,6 +227,26 @@ inline Pack reciprocal(Pack a) noexcept {
   return Pack(1.0) / a;
 #endif
 }
+/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b >= 0, to one and four units in the last place. The second begins from a first
+/// guess of the root, so that a loop waits less for each.
+struct ReciprocalRootAndSum {
+  Pack root, sum;
+  ReciprocalRootAndSum(Pack a, Pack b) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+    root = {reinterpret_cast<detail::Lanes>(_mm512_rsqrt14_pd(reinterpret_cast<__m512d>(a.v)))};
+    const Pack half = Pack(0.5) * a;
+    root = root * (Pack(1.5) - half * root * root);
+    const Pack guess = a * root + b;  // to 27 bits
+    sum = {reinterpret_cast<detail::Lanes>(_mm512_rcp14_pd(reinterpret_cast<__m512d>(guess.v)))};
+    sum = sum + sum * (Pack(1.0) - guess * sum);
+    root = root + root * (Pack(0.5) - half * root * root);
+    sum = sum + sum * (Pack(1.0) - (a * root + b) * sum);
+#else
+    root = reciprocal_sqrt(a);
+    sum = reciprocal(a * root + b);
+#endif
+  }
+};
 /// a in the lanes whose bit is set, zero elsewhere (bits: of a group of eight, shifted so that lane 0 is bit 0).
 inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
