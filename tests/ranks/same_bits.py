@@ -88,6 +88,13 @@ def pressed(text, where, follower):
     return text[:begin] + '[[load]]\n%s\npressure = "0.02 + 0.01*t"\nfollower = %s\n' % (where, "true" if follower else "false") + text[end:]
 
 
+def drawn(text, dimension, where, *faces):
+    """Tractions in place of the force."""
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    values = ", ".join(['"0.1*t"', "0.02", "0"][:dimension])
+    return text[:begin] + "".join('[[load]]\nset = "%s"\ntraction = [%s]\nface = "%s"\n' % (where, values, face) for face in faces) + text[end:]
+
+
 def beyond(everything):
     """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
     if not everything:
@@ -179,7 +186,7 @@ def cases(everything, work):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
-    for name, text in itertools.chain(own_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
+    for name, text in itertools.chain(own_parts(everything), loads_on_surfaces(everything), other_clouds(everything, work), long_interfaces(everything)):
         yield name, text, (2, 3, 4) if everything else (2, 4), threads
 
 
@@ -215,10 +222,26 @@ def own_parts(everything):
         pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
         if cloud:  # before points are turned inside out
             pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
-        if cloud:
-            pushed = text[:text.index("[[load]]")] + '[[load]]\nset = "high"\ntraction = [%s]\nface = "+x"\n' % ", ".join(['"0.1*t"', "0.02", "0"][:dimension])
-            yield kind + "traction", pushed + text[text.index("[integrator]"):]
+        yield kind + "traction", drawn(text, dimension, "high", "+x")
         yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
+
+
+def loads_on_surfaces(everything):
+    """Tractions and pressures, on bodies with holes, and on some so thin that both sides are near; most ranks have no point of the face across x."""
+    brief, hole = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', 'inside = "(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6"\n[sets]'
+    for name in ("conventional", "baqp", "ordinary", "projection") if everything else ("baqp", "ordinary"):
+        for cells in ([40, 3], [40, 4, 2]) if everything or name == "baqp" else ([40, 3],):
+            text = scene(KINEMATICS[name], len(cells), False, brief, cells=cells)
+            yield OWN_PART + "%s, tractions on a thin body, %dD" % (name, len(cells)), drawn(text, len(cells), "all", "+x", "-y")
+            if everything or name == "ordinary":
+                yield OWN_PART + "%s, pressure on a thin body, %dD" % (name, len(cells)), pressed(text, 'set = "high"', False)
+        holed = scene(KINEMATICS[name], 2, False, brief).replace("[sets]", hole)
+        yield OWN_PART + "%s, tractions beside a hole" % name, drawn(holed, 2, "all", "+y", "-x")
+        if name not in PAIRS:
+            yield OWN_PART + "%s, pressure in a hole" % name, pressed(holed.replace("[sets]\n", '[sets]\nrim = "x < 21 && y < 19"\n'), 'set = "rim"', True)
+            for where in ('set = "all"', 'set = "high"\nface = "+x"') if everything else ('set = "high"',):
+                text = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
+                yield OWN_PART + "%s, pressure, %s, cloud" % (name, where.replace("\n", " ")), pressed(text, where, False)
 
 
 def points_file(work, dimension, binary):

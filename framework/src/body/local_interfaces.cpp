@@ -5,6 +5,7 @@
 
 #include "body/crossings.hpp"
 #include "body/interfaces.hpp"
+#include "body/near_ranks.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/rank_values.hpp"
 
@@ -42,28 +43,6 @@ std::vector<Meeting> meetings_of_all(std::span<const Crossing> own) {
   return told_to_all(all);
 }
 
-/// A box around points.
-struct Bounds {
-  Point low{}, high{};
-  bool near(const Point& x, double distance) const noexcept {
-    for (std::size_t a = 0; a < 3; ++a)
-      if (x[a] < low[a] - distance || x[a] > high[a] + distance) return false;
-    return true;
-  }
-};
-
-Bounds bounds_of(const Body& body) {
-  const Point first = body.position(static_cast<std::size_t>(body.internal().front()));
-  Bounds bounds{first, first};
-  for (const std::int32_t p : body.internal())
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double x = body.position(static_cast<std::size_t>(p))[a];
-      bounds.low[a] = std::min(bounds.low[a], x);
-      bounds.high[a] = std::max(bounds.high[a], x);
-    }
-  return bounds;
-}
-
 /// What distances up to `reach` depend on: crossings a bond farther, and of each the midpoints in the window of its plane.
 double reach_of_midpoints(const Body& part, double reach) {
   return reach + 4.1 * part.horizon();
@@ -93,20 +72,11 @@ std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const s
 }
 
 /// Those of all ranks that matter to this one, in input order.
-std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, const Bounds& bounds,
-                                         double reach) {
+std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, double reach) {
   std::vector<Point> places;
   for (const std::int32_t p : part.internal()) places.push_back(part.position(static_cast<std::size_t>(p)));
   const std::vector<MeetingPoint> own = own_meeting_points(part, material, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
-  const double far = surroundings(part, reach);
-  std::vector<Bounds> of_ranks = told_to_all(gathered<Bounds>({&bounds, 1}));
-  of_ranks.resize(static_cast<std::size_t>(communicator().size()), bounds);
-  std::vector<std::vector<MeetingPoint>> to(of_ranks.size());
-  for (std::size_t r = 0; r < to.size(); ++r)
-    std::ranges::copy_if(own, std::back_inserter(to[r]),
-                         [&](const MeetingPoint& point) { return of_ranks[r].near(point.x, far); });
-  std::vector<MeetingPoint> all;
-  for (const std::vector<MeetingPoint>& of_rank : exchanged(to)) all.insert(all.end(), of_rank.begin(), of_rank.end());
+  std::vector<MeetingPoint> all = of_ranks_near(part, own, surroundings(part, reach));
   std::ranges::sort(all, {}, &MeetingPoint::number);
   return all;
 }
@@ -115,7 +85,7 @@ std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::
 
 Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach) {
   const Bounds bounds = bounds_of(part);
-  const std::vector<MeetingPoint> meeting = meeting_points(part, material, bounds, reach);
+  const std::vector<MeetingPoint> meeting = meeting_points(part, material, reach);
   std::vector<Point> places;
   std::vector<std::uint16_t> of_meeting;
   for (const MeetingPoint& point : meeting) {

@@ -278,7 +278,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
-  Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), beyond.images, quasi_static);
+  Loads loads = build_loads(scene, of_terms, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   if (partition && !parts.whole) parts.partition->forget_whole();
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
