@@ -186,7 +186,7 @@ def cases(everything, work):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
-    for name, text in itertools.chain(own_parts(everything), loads_on_surfaces(everything), other_clouds(everything, work), long_interfaces(everything)):
+    for name, text in itertools.chain(own_parts(everything), loads_on_surfaces(everything), planes_of_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
         yield name, text, (2, 3, 4) if everything else (2, 4), threads
 
 
@@ -242,6 +242,45 @@ def loads_on_surfaces(everything):
             for where in ('set = "all"', 'set = "high"\nface = "+x"') if everything else ('set = "high"',):
                 text = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
                 yield OWN_PART + "%s, pressure, %s, cloud" % (name, where.replace("\n", " ")), pressed(text, where, False)
+
+
+def planes_of_parts(everything):
+    """Bodies of which each rank places its own part, with what lies beyond its planes: corners of two planes, sides that other ranks have the
+    points beyond, bodies so thin that images have images, holes at planes, faces of a part of the body."""
+    brief, hole = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', 'inside = "(x - 14)^2 + (y - 2)^2 > 40 && x + y > 6"\n[sets]'
+    both = '[[periodic]]\naxis = "x"\n[[periodic]]\naxis = "y"\n'
+    for name in ("conventional", "silling", "wan", "baqp", "bond_based", "ordinary", "projection", "sub_horizon") if everything else ("baqp",):
+        text = scene(KINEMATICS[name], 2, False, brief)
+        for plane in BEYOND if everything else ("face and symmetry",):
+            yield OWN_PART + "%s, %s" % (name, plane), BEYOND[plane](text)
+        loose = text[:text.index("[[boundary]]")] + text[text.index("[[load]]"):]
+        yield OWN_PART + "%s, periodic along both axes" % name, loose + both
+        thin = scene(KINEMATICS[name], 2, False, brief, cells=[300, 3])
+        yield OWN_PART + "%s, thin between planes" % name, thin + SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+        yield OWN_PART + "%s, thin and periodic" % name, BEYOND["periodic"](thin)
+        yield OWN_PART + "%s, hole at a plane, traction" % name, drawn(text.replace("[sets]", hole), 2, "high", "+x") + SYMMETRY
+        part = with_face(text).replace('set = "all"\nface = "-x"', 'set = "lower"\nface = "-x"', 1).replace("[sets]\n", '[sets]\nlower = "y < 13"\n')
+        yield OWN_PART + "%s, face of a part" % name, part
+        cloud = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
+        for plane in BEYOND if everything else ("face and symmetry",):
+            yield OWN_PART + "%s, %s, cloud" % (name, plane), BEYOND[plane](cloud)
+        loose = cloud[:cloud.index("[[boundary]]")] + cloud[cloud.index("[[load]]"):]
+        yield OWN_PART + "%s, periodic along both axes, cloud" % name, loose + both
+        thin = scene(KINEMATICS[name], 2, True, brief, cells=[400, 3])
+        yield OWN_PART + "%s, thin between planes, cloud" % name, thin + SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+    for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
+        for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):
+            if everything or plane == "periodic":
+                yield OWN_PART + "%s, torn, %s" % (name, plane), BEYOND[plane](torn(KINEMATICS[name], DAMAGE["critical_stretch"], False))
+            yield OWN_PART + "%s, 3D, %s" % (name, plane), BEYOND[plane](scene(KINEMATICS[name], 3, False, brief))
+    for name, cloud in itertools.product(("ordinary", "projection"), (False, True)) if everything else (("ordinary", True), ("projection", False)):
+        text = with_regions(scene(KINEMATICS[name], 2, cloud, brief, cells=[32, 38]), "x > 11 + 0.3*y && x < 21", "x - y > 17") + CRACK
+        for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):
+            yield OWN_PART + "%s, regions, %s, %s" % (name, plane, "cloud" if cloud else "lattice"), BEYOND[plane](text)
+    for name in ("conventional", "ordinary") if everything else ("conventional",):
+        text = pressed(scene(KINEMATICS[name], 2, False, brief), 'set = "all"', name == "conventional")
+        yield OWN_PART + "%s, pressure and symmetry" % name, text + SYMMETRY
+        yield OWN_PART + "%s, pressure and periodic" % name, BEYOND["periodic"](text)
 
 
 def points_file(work, dimension, binary):

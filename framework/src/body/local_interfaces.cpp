@@ -56,26 +56,30 @@ double surroundings(const Body& part, double reach) {
 /// A point near which materials meet: one that has a point of another material in its family, or nearly so.
 struct MeetingPoint {
   Point x;
-  std::int64_t place, number;  ///< in the whole body
+  std::int64_t place, source, number;  ///< in the whole body; source: the place of what an image is of, else its own
   std::int64_t material;
 };
 
-/// Those of the rank.
-std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const std::uint16_t> material, const Boxes& boxes) {
+/// Those of the rank. source: by internal index.
+std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> source,
+                                             const Boxes& boxes) {
   std::vector<MeetingPoint> meeting;
+  const auto place = part.places().place;
   const std::vector<std::uint8_t> differing = boxes.differing(material);
   for (std::size_t n = 0; n < differing.size(); ++n) {
     const auto p = static_cast<std::size_t>(part.internal()[n]);
-    if (differing[n] && part.owns(p)) meeting.push_back({boxes.place(n), part.places().place[p], part.number(p), material[n]});
+    if (differing[n] && part.owns(p))
+      meeting.push_back({boxes.place(n), place[p], place[static_cast<std::size_t>(source[p])], part.number(p), material[n]});
   }
   return meeting;
 }
 
 /// Those of all ranks that matter to this one, in input order.
-std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, double reach) {
+std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> source,
+                                         double reach) {
   std::vector<Point> places;
   for (const std::int32_t p : part.internal()) places.push_back(part.position(static_cast<std::size_t>(p)));
-  const std::vector<MeetingPoint> own = own_meeting_points(part, material, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
+  const std::vector<MeetingPoint> own = own_meeting_points(part, material, source, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
   std::vector<MeetingPoint> all = of_ranks_near(part, own, surroundings(part, reach));
   std::ranges::sort(all, {}, &MeetingPoint::number);
   return all;
@@ -83,9 +87,16 @@ std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::
 
 }  // namespace
 
-Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach) {
+Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
+                                 double reach) {
   const Bounds bounds = bounds_of(part);
-  const std::vector<MeetingPoint> meeting = meeting_points(part, material, reach);
+  const auto internal = part.internal();
+  const std::size_t real = internal.size() - sources.size();
+  const auto source = [&](std::size_t n) { return n < real ? n : static_cast<std::size_t>(sources[n - real]); };
+  Interfaces found;
+  found.source.assign(part.stride(), -1);
+  for (std::size_t n = 0; n < internal.size(); ++n) found.source[static_cast<std::size_t>(internal[n])] = internal[source(n)];
+  const std::vector<MeetingPoint> meeting = meeting_points(part, material, found.source, reach);
   std::vector<Point> places;
   std::vector<std::uint16_t> of_meeting;
   for (const MeetingPoint& point : meeting) {
@@ -96,24 +107,17 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
       find_crossings(part.horizon(), Boxes(std::move(places), part.horizon() * (1 + 1e-9)), of_meeting);
   // Farther ones may not be what they are in the whole body.
   std::erase_if(crossings, [&](const Crossing& c) { return !bounds.near(c.middle, reach_of_midpoints(part, reach)); });
-  const auto here = [&](std::int32_t point) { return part.at_place(meeting[static_cast<std::size_t>(point)].place); };
   std::vector<Crossing> own;
   std::ranges::copy_if(crossings, std::back_inserter(own), [&](const Crossing& c) {
-    const std::int32_t p = here(c.of_first);
+    const std::int32_t p = part.at_place(meeting[static_cast<std::size_t>(c.of_first)].place);
     return p >= 0 && part.owns(static_cast<std::size_t>(p));
   });
-  Interfaces found;
   const std::vector<Meeting> all = meetings_of_all(own);
-  if (all.empty()) return found;
+  if (all.empty()) return {};
   for (const Meeting& pair : all) found.pairs.emplace_back(pair.first, pair.second);
   found.length = part.horizon();
   found.material.assign(part.stride(), 0);
-  found.source.assign(part.stride(), -1);
-  const auto internal = part.internal();
-  for (std::size_t n = 0; n < internal.size(); ++n) {
-    found.material[static_cast<std::size_t>(internal[n])] = material[n];
-    found.source[static_cast<std::size_t>(internal[n])] = internal[n];
-  }
+  for (std::size_t n = 0; n < internal.size(); ++n) found.material[static_cast<std::size_t>(internal[n])] = material[n];
   for (auto begin = crossings.begin(); begin != crossings.end();) {
     const auto end = end_of_pair(begin, crossings.end());
     const auto pair = std::ranges::find(all, std::pair(begin->first, begin->second),
@@ -121,9 +125,11 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
     const MaterialSurface surface(part, {begin, end}, pair->lower, reach);
     begin = end;
     std::vector<Distance> distance(internal.size());
-    parallel_for(internal.size(), [&](std::size_t n) {
+    // What lies beyond a plane of symmetry is the image of what lies before it.
+    parallel_for(real, [&](std::size_t n) {
       distance[n] = surface.distance(part.position(static_cast<std::size_t>(internal[n])), material[n]);
     });
+    for (std::size_t n = real; n < internal.size(); ++n) distance[n] = distance[source(n)];
     std::vector<std::pair<std::int32_t, std::size_t>> near;
     for (std::size_t n = 0; n < internal.size(); ++n)
       if (distance[n].counterpart >= 0) near.emplace_back(internal[n], n);
@@ -135,7 +141,7 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
     for (const auto& [p, n] : near) {
       interface.point.push_back(p);
       interface.distance.push_back(distance[n].value);
-      interface.counterpart.push_back(here(distance[n].counterpart));
+      interface.counterpart.push_back(part.at_place(meeting[static_cast<std::size_t>(distance[n].counterpart)].source));
     }
   }
   return found;

@@ -18,10 +18,6 @@ double length(const Point& a) {
   return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
 }
 
-bool is_image(const Body& body, std::int32_t p) {
-  return body.number(static_cast<std::size_t>(p)) >= static_cast<std::int64_t>(body.points_of_all_ranks());
-}
-
 SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const auto axis = static_cast<std::size_t>(load.face[1] - 'x');
   SurfaceAreas areas;
@@ -39,7 +35,7 @@ std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
   std::vector<Point> areas(body.stride(), Point{});
   for (const std::int32_t p : body.internal()) {
     const auto i = static_cast<std::size_t>(p);
-    if (is_image(body, p)) continue;
+    if (body.image(i)) continue;
     for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k) {
       const auto c = static_cast<std::size_t>(lattice.axis[k]);
       const double area = faces.area[i][c];
@@ -116,9 +112,11 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
   const double felt = 3 * body.horizon();  // a surface is felt no deeper
   const NearestPoint nearest(of_ranks_near(body, surface, felt * (1 + 1e-9)), 2 * body.spacing());
   SurfaceAreas found;
-  for (const std::int32_t p : images ? body.internal() : std::span(body.owned()))
-    if (const SurfacePoint* at = is_image(body, p) ? nullptr : nearest.to(body.position(static_cast<std::size_t>(p)), felt); at && at->chosen)
-      found.points.push_back(p);
+  for (const std::int32_t p : images ? body.internal() : std::span(body.owned())) {
+    const auto i = static_cast<std::size_t>(p);
+    if (body.image(i)) continue;
+    if (const SurfacePoint* at = nearest.to(body.position(i), felt); at && at->chosen) found.points.push_back(p);
+  }
   if (images) {  // what the evaluation points of the set have of the surface beyond planes
     images->append_images(found.points);
     std::vector<std::uint8_t> complete(body.stride(), 0);
