@@ -244,30 +244,36 @@ def loads_on_surfaces(everything):
                 yield OWN_PART + "%s, pressure, %s, cloud" % (name, where.replace("\n", " ")), pressed(text, where, False)
 
 
+BETWEEN = SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+
+
+def periodic_all_around(text):
+    """Nothing holds it any more."""
+    return text[:text.index("[[boundary]]")] + text[text.index("[[load]]"):] + '[[periodic]]\naxis = "x"\n[[periodic]]\naxis = "y"\n'
+
+
 def planes_of_parts(everything):
     """Bodies of which each rank places its own part, with what lies beyond its planes: corners of two planes, sides that other ranks have the
     points beyond, bodies so thin that images have images, holes at planes, faces of a part of the body."""
     brief, hole = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', 'inside = "(x - 14)^2 + (y - 2)^2 > 40 && x + y > 6"\n[sets]'
-    both = '[[periodic]]\naxis = "x"\n[[periodic]]\naxis = "y"\n'
     for name in ("conventional", "silling", "wan", "baqp", "bond_based", "ordinary", "projection", "sub_horizon") if everything else ("baqp",):
         text = scene(KINEMATICS[name], 2, False, brief)
         for plane in BEYOND if everything else ("face and symmetry",):
             yield OWN_PART + "%s, %s" % (name, plane), BEYOND[plane](text)
-        loose = text[:text.index("[[boundary]]")] + text[text.index("[[load]]"):]
-        yield OWN_PART + "%s, periodic along both axes" % name, loose + both
+        yield OWN_PART + "%s, periodic along both axes" % name, periodic_all_around(text)
         thin = scene(KINEMATICS[name], 2, False, brief, cells=[300, 3])
-        yield OWN_PART + "%s, thin between planes" % name, thin + SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+        yield OWN_PART + "%s, thin between planes" % name, thin + BETWEEN
         yield OWN_PART + "%s, thin and periodic" % name, BEYOND["periodic"](thin)
         yield OWN_PART + "%s, hole at a plane, traction" % name, drawn(text.replace("[sets]", hole), 2, "high", "+x") + SYMMETRY
         part = with_face(text).replace('set = "all"\nface = "-x"', 'set = "lower"\nface = "-x"', 1).replace("[sets]\n", '[sets]\nlower = "y < 13"\n')
         yield OWN_PART + "%s, face of a part" % name, part
+    for name in ("conventional", "silling", "baqp", "bond_based", "projection") if everything else ("bond_based",):
         cloud = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
         for plane in BEYOND if everything else ("face and symmetry",):
             yield OWN_PART + "%s, %s, cloud" % (name, plane), BEYOND[plane](cloud)
-        loose = cloud[:cloud.index("[[boundary]]")] + cloud[cloud.index("[[load]]"):]
-        yield OWN_PART + "%s, periodic along both axes, cloud" % name, loose + both
+        yield OWN_PART + "%s, periodic along both axes, cloud" % name, periodic_all_around(cloud)
         thin = scene(KINEMATICS[name], 2, True, brief, cells=[400, 3])
-        yield OWN_PART + "%s, thin between planes, cloud" % name, thin + SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+        yield OWN_PART + "%s, thin between planes, cloud" % name, thin + BETWEEN
     for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
         for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):
             if everything or plane == "periodic":
