@@ -88,6 +88,13 @@ def pressed(text, where, follower):
     return text[:begin] + '[[load]]\n%s\npressure = "0.02 + 0.01*t"\nfollower = %s\n' % (where, "true" if follower else "false") + text[end:]
 
 
+def drawn(text, dimension, where, *faces):
+    """Tractions in place of the force."""
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    values = ", ".join(['"0.1*t"', "0.02", "0"][:dimension])
+    return text[:begin] + "".join('[[load]]\nset = "%s"\ntraction = [%s]\nface = "%s"\n' % (where, values, face) for face in faces) + text[end:]
+
+
 def beyond(everything):
     """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
     if not everything:
@@ -179,7 +186,7 @@ def cases(everything, work):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
-    for name, text in itertools.chain(own_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
+    for name, text in itertools.chain(own_parts(everything), loads_on_surfaces(everything), planes_of_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
         yield name, text, (2, 3, 4) if everything else (2, 4), threads
 
 
@@ -215,10 +222,71 @@ def own_parts(everything):
         pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
         if cloud:  # before points are turned inside out
             pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
-        if cloud:
-            pushed = text[:text.index("[[load]]")] + '[[load]]\nset = "high"\ntraction = [%s]\nface = "+x"\n' % ", ".join(['"0.1*t"', "0.02", "0"][:dimension])
-            yield kind + "traction", pushed + text[text.index("[integrator]"):]
+        yield kind + "traction", drawn(text, dimension, "high", "+x")
         yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
+
+
+def loads_on_surfaces(everything):
+    """Tractions and pressures, on bodies with holes, and on some so thin that both sides are near; most ranks have no point of the face across x."""
+    brief, hole = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', 'inside = "(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6"\n[sets]'
+    for name in ("conventional", "baqp", "ordinary", "projection") if everything else ("baqp", "ordinary"):
+        for cells in ([40, 3], [40, 4, 2]) if everything or name == "baqp" else ([40, 3],):
+            text = scene(KINEMATICS[name], len(cells), False, brief, cells=cells)
+            yield OWN_PART + "%s, tractions on a thin body, %dD" % (name, len(cells)), drawn(text, len(cells), "all", "+x", "-y")
+            if everything or name == "ordinary":
+                yield OWN_PART + "%s, pressure on a thin body, %dD" % (name, len(cells)), pressed(text, 'set = "high"', False)
+        holed = scene(KINEMATICS[name], 2, False, brief).replace("[sets]", hole)
+        yield OWN_PART + "%s, tractions beside a hole" % name, drawn(holed, 2, "all", "+y", "-x")
+        if name not in PAIRS:
+            yield OWN_PART + "%s, pressure in a hole" % name, pressed(holed.replace("[sets]\n", '[sets]\nrim = "x < 21 && y < 19"\n'), 'set = "rim"', True)
+            for where in ('set = "all"', 'set = "high"\nface = "+x"') if everything else ('set = "high"',):
+                text = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
+                yield OWN_PART + "%s, pressure, %s, cloud" % (name, where.replace("\n", " ")), pressed(text, where, False)
+
+
+BETWEEN = SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
+
+
+def periodic_all_around(text):
+    """Nothing holds it any more."""
+    return text[:text.index("[[boundary]]")] + text[text.index("[[load]]"):] + '[[periodic]]\naxis = "x"\n[[periodic]]\naxis = "y"\n'
+
+
+def planes_of_parts(everything):
+    """Bodies of which each rank places its own part, with what lies beyond its planes: corners of two planes, sides that other ranks have the
+    points beyond, bodies so thin that images have images, holes at planes, faces of a part of the body."""
+    brief, hole = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', 'inside = "(x - 14)^2 + (y - 2)^2 > 40 && x + y > 6"\n[sets]'
+    for name in ("conventional", "silling", "wan", "baqp", "bond_based", "ordinary", "projection", "sub_horizon") if everything else ("baqp",):
+        text = scene(KINEMATICS[name], 2, False, brief)
+        for plane in BEYOND if everything else ("face and symmetry",):
+            yield OWN_PART + "%s, %s" % (name, plane), BEYOND[plane](text)
+        yield OWN_PART + "%s, periodic along both axes" % name, periodic_all_around(text)
+        thin = scene(KINEMATICS[name], 2, False, brief, cells=[300, 3])
+        yield OWN_PART + "%s, thin between planes" % name, thin + BETWEEN
+        yield OWN_PART + "%s, thin and periodic" % name, BEYOND["periodic"](thin)
+        yield OWN_PART + "%s, hole at a plane, traction" % name, drawn(text.replace("[sets]", hole), 2, "high", "+x") + SYMMETRY
+        part = with_face(text).replace('set = "all"\nface = "-x"', 'set = "lower"\nface = "-x"', 1).replace("[sets]\n", '[sets]\nlower = "y < 13"\n')
+        yield OWN_PART + "%s, face of a part" % name, part
+    for name in ("conventional", "silling", "baqp", "bond_based", "projection") if everything else ("bond_based",):
+        cloud = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
+        for plane in BEYOND if everything else ("face and symmetry",):
+            yield OWN_PART + "%s, %s, cloud" % (name, plane), BEYOND[plane](cloud)
+        yield OWN_PART + "%s, periodic along both axes, cloud" % name, periodic_all_around(cloud)
+        thin = scene(KINEMATICS[name], 2, True, brief, cells=[400, 3])
+        yield OWN_PART + "%s, thin between planes, cloud" % name, thin + BETWEEN
+    for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
+        for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):
+            if everything or plane == "periodic":
+                yield OWN_PART + "%s, torn, %s" % (name, plane), BEYOND[plane](torn(KINEMATICS[name], DAMAGE["critical_stretch"], False))
+            yield OWN_PART + "%s, 3D, %s" % (name, plane), BEYOND[plane](scene(KINEMATICS[name], 3, False, brief))
+    for name, cloud in itertools.product(("ordinary", "projection"), (False, True)) if everything else (("ordinary", True), ("projection", False)):
+        text = with_regions(scene(KINEMATICS[name], 2, cloud, brief, cells=[32, 38]), "x > 11 + 0.3*y && x < 21", "x - y > 17") + CRACK
+        for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):
+            yield OWN_PART + "%s, regions, %s, %s" % (name, plane, "cloud" if cloud else "lattice"), BEYOND[plane](text)
+    for name in ("conventional", "ordinary") if everything else ("conventional",):
+        text = pressed(scene(KINEMATICS[name], 2, False, brief), 'set = "all"', name == "conventional")
+        yield OWN_PART + "%s, pressure and symmetry" % name, text + SYMMETRY
+        yield OWN_PART + "%s, pressure and periodic" % name, BEYOND["periodic"](text)
 
 
 def points_file(work, dimension, binary):

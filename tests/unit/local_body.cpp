@@ -15,7 +15,9 @@
 #include "body/input_numbers.hpp"
 #include "body/point_share.hpp"
 #include "build/cloud_points.hpp"
+#include "build/image_planes.hpp"
 #include "build/scene_lattice.hpp"
+#include "build/several_ranks.hpp"
 #include "files/hdf5_file.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/memory.hpp"
@@ -101,17 +103,43 @@ void compare_colours(const Body& part, const Body& whole) {
   CHECK(right);
 }
 
+bool same_terms(const Images& a, const Images& b) {
+  return std::ranges::equal(a.terms, b.terms, [](const ImageTerm& one, const ImageTerm& other) {
+    return one.image == other.image && one.component == other.component && one.motion == other.motion && one.factor == other.factor &&
+           one.at == other.at && one.surface == other.surface;
+  });
+}
+
+void compare_images(const Images& found, const Images& expected) {
+  CHECK(found.source == expected.source);
+  CHECK(found.sign == expected.sign);
+  CHECK(found.volume == expected.volume);
+  CHECK(same_terms(found, expected));
+  CHECK(found.cracks.size() == expected.cracks.size());
+}
+
 void compare(const std::string& text, int ranks, const Partition::Reach& reach) {
   INFO(ranks, " ranks, ", reach.bonds, " bonds", std::string(reach.blocks ? ", whole blocks" : ""));
   std::mutex one;
   std::int64_t points = 0, all = 0;
+  std::size_t images_of_all = 0;
   on_ranks(ranks, [&](ThreadRank&) {
-    constexpr std::uint16_t far = 7;
+    constexpr std::uint16_t image_material = 3, far = 7;
     const Scene scene = parsed(text);
-    Partition whole(build_body(scene), reach);
+    Body whole_body = build_body(scene);
+    Images images;
+    if (has_images(scene)) {
+      images = make_images(whole_body, build_planes(scene, placed_points(whole_body), false).planes);
+      whole_body = Body(whole_body, images, image_material);
+    }
+    Partition whole(std::move(whole_body), reach, images.source);
     const Body expected = whole.make_part(far);
-    const LocalBody local = build_local_body(scene, reach, far);
+    const LocalBody local = build_local_body(scene, reach, far, image_material);
     const std::lock_guard lock(one);
+    CHECK(local.images.has_value() == has_images(scene));
+    CHECK(local.partition->images() == images.size());
+    if (local.images) compare_images(*local.images, images_of_part(images, expected));
+    images_of_all = images.size();
     const Body& found = local.body;
     CHECK(local.partition->whole() == nullptr);
     CHECK(same(found.internal(), expected.internal()));
@@ -132,7 +160,8 @@ void compare(const std::string& text, int ranks, const Partition::Reach& reach) 
     if (!found.lattice()) compare_colours(found, *whole.whole());
     const bool same_points = std::ranges::all_of(found.internal(), [&](std::int32_t index) {
       const auto p = static_cast<std::size_t>(index);
-      return found.number(p) == expected.number(p) && found.find(found.number(p)) == index &&
+      // Numbers of images ascend as they do in the whole body, and leave some out.
+      return (found.number(p) == expected.number(p) || (found.image(p) && expected.image(p))) && found.find(found.number(p)) == index &&
              found.at_place(found.places().place[p]) == index && found.position(p) == expected.position(p) &&
              found.volume(p) == expected.volume(p) && found.owns(p) == expected.owns(p);
     });
@@ -141,6 +170,7 @@ void compare(const std::string& text, int ranks, const Partition::Reach& reach) 
     all = static_cast<std::int64_t>(found.points_of_all_ranks());
   });
   CHECK(points == all);
+  if (text.find("axis =") != std::string::npos) CHECK(images_of_all > 0);
 }
 
 }  // namespace
@@ -168,6 +198,80 @@ TEST_CASE("local bodies: each rank's own part is that of the whole body") {
             place));
     for (const int ranks : {2, 3, 5})
       for (const Partition::Reach& reach : {Partition::Reach{2, false}, {3, false}, {2, true}}) compare(text, ranks, reach);
+  }
+}
+
+TEST_CASE("local bodies: parts of lattices with images are those of the whole body") {
+  struct Shape {
+    int dimension;
+    const char *upper, *inside, *beyond;
+  };
+  const char *symmetry = "[[symmetry]]\naxis = \"x\"\n", *corner = "[[symmetry]]\naxis = \"x\"\n[[symmetry]]\naxis = \"y\"\n",
+             *periodic = "[[periodic]]\naxis = \"y\"\n", *around = "[[periodic]]\naxis = \"x\"\n[[periodic]]\naxis = \"y\"\n",
+             *between = "[[symmetry]]\naxis = \"y\"\n[[symmetry]]\naxis = \"y\"\nat = 3.0\n",
+             *face = "[[boundary]]\nface = \"+x\"\nset = \"all\"\ndisplacement = [0, \"free\"]\n",
+             *of_part = "[[boundary]]\nface = \"-y\"\nset = \"low\"\ndisplacement = [0, 0]\n[[symmetry]]\naxis = \"x\"\n";
+  for (const Shape& shape : {Shape{1, "[2000]", "", symmetry},
+                             {1, "[2000]", "", "[[periodic]]\naxis = \"x\"\n"},
+                             {2, "[40, 33]", "", corner},
+                             {2, "[31, 47]", "(x - 14)^2 + (y - 20)^2 > 40 && x + y > 9", corner},
+                             {2, "[31, 47]", "(x - 14)^2 + (y - 2)^2 > 40", face},
+                             {2, "[31, 47]", "(x - 14)^2 + (y - 2)^2 > 40", periodic},
+                             {2, "[31, 47]", "", around},
+                             {2, "[1200, 3]", "", between},
+                             {2, "[1200, 2]", "", periodic},
+                             {2, "[31, 47]", "x < 20 || y > 6", of_part},
+                             {3, "[16, 14, 12]", "", corner},
+                             {3, "[12, 19, 26]", "(x - 6)^2 + (y - 9)^2 + (z - 9)^2 > 20", around},
+                             {3, "[40, 5, 30]", "x > 3 || z > 12", periodic}}) {
+    INFO(shape.dimension, "D, to ", std::string(shape.upper), ", inside ", std::string(shape.inside), ", ", std::string(shape.beyond));
+    const std::string place = shape.dimension == 3 ? "[6, 7, 5]" : shape.dimension == 2 ? "[15.2, 21]" : "[115]";
+    const std::string text = scene_text(shape.dimension, lattice(shape.dimension, shape.upper, shape.inside),
+                                        fmt::format("low = \"x < 5.2\"\nsome = {{ nearest = {} }}\nlisted = {{ points = [90, 3, 250, 17] }}", place)) +
+                             shape.beyond;
+    for (const int ranks : {2, 3, 5})
+      for (const Partition::Reach& reach : {Partition::Reach{2, false}, {3, false}, {2, true}, {2, false, true}}) compare(text, ranks, reach);
+  }
+}
+
+TEST_CASE("local bodies: sides of lattices that cannot have images are refused on all ranks as on one") {
+  const auto message = [](const std::string& text, int ranks) {
+    std::mutex one;
+    std::vector<std::string> said;
+    on_ranks(ranks, [&](ThreadRank&) {
+      std::string what;
+      try {
+        const Scene scene = parsed(text);
+        if (ranks > 1) {
+          build_local_body(scene, {}, 7);
+        } else {
+          const Body body = build_body(scene);
+          const ScenePlanes planes = build_planes(scene, placed_points(body), false);
+          try {
+            Body(body, make_images(body, planes.planes), 3);
+          } catch (const OverlappingImage& error) {
+            refuse_overlap(planes, error);
+          }
+        }
+      } catch (const InputError& error) {
+        what = error.what();
+      }
+      const std::lock_guard lock(one);
+      said.push_back(what);
+    });
+    for (const std::string& what : said) CHECK(what == said.front());
+    return said.front();
+  };
+  const std::string sets = "low = \"x < 5\"\nsome = \"x > 9\"";
+  for (const char* wrong : {"[[symmetry]]\naxis = \"x\"\nat = 7.0\n", "[[symmetry]]\naxis = \"x\"\nat = -7.0\n", "[[periodic]]\naxis = \"y\"\nupper = 25.0\n",
+                            "[[boundary]]\nface = \"+x\"\nset = \"low\"\ndisplacement = [0, 0]\n",
+                            "[[boundary]]\nface = \"+x\"\nat = 9.0\nset = \"low\"\ndisplacement = [0, 0]\n"}) {
+    INFO(std::string(wrong));
+    for (const char* inside : {"", "x + y > 6"}) {
+      const std::string text = scene_text(2, lattice(2, "[40, 30]", inside), sets) + wrong, expected = message(text, 1);
+      CHECK_FALSE(expected.empty());
+      for (const int ranks : {2, 3}) CHECK(message(text, ranks) == expected);
+    }
   }
 }
 

@@ -185,6 +185,22 @@ TEST_CASE("partition: laws with history on several ranks are those on one, bit f
     }
 }
 
+TEST_CASE("partition: tractions and pressures on several ranks, beside planes of symmetry and periodic sides, are those on one") {
+  const std::string traction = "[[load]]\nset = \"high\"\nface = \"+x\"\ntraction = [0.02, 0.01]\n",
+                    pressure = "[[load]]\nset = \"all\"\npressure = 0.02\nfollower = true\n", symmetry = "[[symmetry]]\naxis = \"y\"\n",
+                    periodic = "[[periodic]]\naxis = \"y\"\n";
+  for (const std::string& load : {traction, pressure})
+    for (const std::string& beyond : {std::string(), symmetry, periodic})
+      for (const bool cloud : {false, true}) {
+        INFO(load, beyond, std::string(cloud ? "cloud" : "lattice"));
+        contract::BodyOptions body = body_of(2, cloud);
+        body.two_materials = false;
+        body.conditions = body.conditions.substr(0, body.conditions.find("[[load]]")) + load + beyond;
+        body.integrator = "type = \"verlet\"\nend_time = 0.5\ntime_step = 0.05";
+        compare(contract::scene_text(body, "type = \"baqp\""), {2, 3});
+      }
+}
+
 TEST_CASE("partition: statics without a matrix on several ranks is that on one") {
   for (const std::string integrator :
        {"type = \"jfnk\"\npreconditioner = \"none\"\nsteps = 1\ntolerance = 1e-9", "type = \"jfnk\"\npreconditioner = \"companion\"\nsteps = 2\ntolerance = 1e-9",

@@ -101,7 +101,7 @@ Body::Body(BodyFrame frame, CloudPart part, std::uint16_t far_material)
       stride_(padded(part.places.size())),
       positions_(std::move(part.rows)),
       points_of_all_ranks_(static_cast<std::size_t>(part.points_of_all_ranks)),
-      stride_of_whole_(padded(points_of_all_ranks_)) {
+      stride_of_whole_(padded(static_cast<std::size_t>(part.places_of_all_ranks))) {
   internal_.resize(part.places.size());
   std::iota(internal_.begin(), internal_.end(), 0);
   const auto by_point = [](const auto& values) { return [&](std::int32_t p) { return values[static_cast<std::size_t>(p)]; }; };
@@ -120,7 +120,7 @@ Body::Body(BodyFrame frame, CloudPart part, std::uint16_t far_material)
 void Body::keep_far_material(const std::vector<Role>& roles, std::uint16_t far_material) {
   material_ids_.assign(stride_, 0);
   for (std::size_t n = 0; n < internal_.size(); ++n) {
-    if (roles[n] == Role::own) owned_.push_back(internal_[n]);
+    if (roles[n] == Role::own && !image(static_cast<std::size_t>(internal_[n]))) owned_.push_back(internal_[n]);
     if (roles[n] == Role::far) material_ids_[static_cast<std::size_t>(internal_[n])] = far_material;
   }
 }
@@ -172,7 +172,7 @@ Body::Body(const Body& whole, const Images& images, std::uint16_t image_material
   for (const std::int32_t p : whole.internal_) positions.push_back(whole.position(static_cast<std::size_t>(p)));
   positions.insert(positions.end(), images.position.begin(), images.position.end());
   if (whole.lattice_) {
-    place_on_lattice(*whole.lattice_, whole.uniform_volume_, positions);
+    place_on_lattice(*images.lattice, whole.uniform_volume_, positions);
   } else {
     std::vector<double> volumes;
     for (const std::int32_t p : whole.internal_) volumes.push_back(whole.volume(static_cast<std::size_t>(p)));
@@ -203,34 +203,14 @@ void Body::copy_sets(const Body& whole, const std::vector<std::int32_t>& place, 
   }
 }
 
-/// The lattice of `old`, grown or shrunk to hold these positions, which are places of it.
-void Body::place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions) {
-  const double spacing = old.spacing;
-  const auto cell = [&](const Point& x, std::size_t a) { return std::llround((x[a] - old.lower[a]) / spacing - 0.5); };
-  std::array<std::int64_t, 3> low{}, high{};
-  for (std::size_t n = 0; n < positions.size(); ++n)
-    for (std::size_t a = 0; a < static_cast<std::size_t>(old.dimension); ++a) {
-      const std::int64_t k = cell(positions[n], a);
-      low[a] = n == 0 ? k : std::min(low[a], k);
-      high[a] = n == 0 ? k : std::max(high[a], k);
-    }
-  std::array<double, 3> lower = old.lower, upper = old.lower;
-  for (std::size_t a = 0; a < static_cast<std::size_t>(old.dimension); ++a) {
-    lower[a] += static_cast<double>(low[a]) * spacing;
-    upper[a] += static_cast<double>(high[a] + 1) * spacing;
-  }
-  const Lattice lattice = make_lattice(old.dimension, spacing, lower, upper, frame_.horizon);
+/// These positions are places of the lattice.
+void Body::place_on_lattice(const Lattice& lattice, double volume, const std::vector<Point>& positions) {
   std::vector<bool> taken(static_cast<std::size_t>(lattice.cells), false);
   internal_.clear();
   for (const Point& x : positions) {
-    std::array<std::int64_t, 3> k{};
-    for (int a = 0; a < old.dimension; ++a) {
-      const auto axis = static_cast<std::size_t>(lattice.axis[static_cast<std::size_t>(a)]);
-      k[static_cast<std::size_t>(a)] = cell(x, axis) - low[axis];
-    }
+    const std::array<std::int64_t, 3> k = lattice.around(x);
     const std::int64_t index = lattice.index(k[0], k[1], k[2]);
-    if (taken[static_cast<std::size_t>(index)])
-      throw std::domain_error(fmt::format("found an image of a point on another point at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]));
+    if (taken[static_cast<std::size_t>(index)]) throw OverlappingImage(x);
     taken[static_cast<std::size_t>(index)] = true;
     internal_.push_back(static_cast<std::int32_t>(index));
   }

@@ -6,8 +6,10 @@
 
 namespace perikit {
 
-CellMask::CellMask(const Cells& extent)
-    : extent_(extent), chosen_(static_cast<std::size_t>(extent[0] * extent[1] * extent[2]), 0) {}
+CellMask::CellMask(const Cells& low, const Cells& high) : low_(low), extent_(high) {
+  for (std::size_t a = 0; a < 3; ++a) extent_[a] -= low[a];
+  chosen_.assign(static_cast<std::size_t>(extent_[0] * extent_[1] * extent_[2]), 0);
+}
 
 void CellMask::add(const Cells& low, const Cells& high) {
   for (std::int64_t k2 = low[2]; k2 < high[2]; ++k2)
@@ -20,8 +22,8 @@ void CellMask::grow(std::size_t axis, std::int64_t by) {
   const std::size_t across = axis == 0 ? 1 : 0, beyond = axis == 2 ? 1 : 2;
   parallel_for(static_cast<std::size_t>(extent_[across] * extent_[beyond]), [&](std::size_t line) {
     Cells k{};
-    k[across] = static_cast<std::int64_t>(line) % extent_[across];
-    k[beyond] = static_cast<std::int64_t>(line) / extent_[across];
+    k[across] = low_[across] + static_cast<std::int64_t>(line) % extent_[across];
+    k[beyond] = low_[beyond] + static_cast<std::int64_t>(line) / extent_[across];
     std::int64_t left = 0;  // cells that are still near the last chosen one
     const auto visit = [&](std::int64_t along) {
       k[axis] = along;
@@ -31,36 +33,39 @@ void CellMask::grow(std::size_t axis, std::int64_t by) {
       else if (left-- > 0)
         cell = added;
     };
-    for (std::int64_t along = 0; along < extent_[axis]; ++along) visit(along);
+    const std::int64_t first = low_[axis], last = first + extent_[axis];
+    for (std::int64_t along = first; along < last; ++along) visit(along);
     left = 0;
-    for (std::int64_t along = extent_[axis]; along-- > 0;) visit(along);
-    for (k[axis] = 0; k[axis] < extent_[axis]; ++k[axis])
+    for (std::int64_t along = last; along-- > first;) visit(along);
+    for (k[axis] = first; k[axis] < last; ++k[axis])
       if (std::uint8_t& cell = chosen_[at(k)]; cell == added) cell = 1;
   });
 }
 
 void CellMask::fill(const Cells& block) {
-  Cells low{};
-  const auto end = [&](std::size_t a) { return std::min(extent_[a], low[a] + block[a]); };
+  Cells low = low_;
+  const auto last = [&](std::size_t a) { return low_[a] + extent_[a]; };
+  const auto end = [&](std::size_t a) { return std::min(last(a), low[a] + block[a]); };
   const auto any = [&] {
     for (std::int64_t k2 = low[2]; k2 < end(2); ++k2)
       for (std::int64_t k1 = low[1]; k1 < end(1); ++k1) {
-        const auto row = chosen_.begin() + static_cast<std::ptrdiff_t>(at({0, k1, k2}));
-        if (std::find(row + low[0], row + end(0), 1) != row + end(0)) return true;
+        const auto row = chosen_.begin() + static_cast<std::ptrdiff_t>(at({low[0], k1, k2}));
+        if (std::find(row, row + end(0) - low[0], 1) != row + end(0) - low[0]) return true;
       }
     return false;
   };
-  for (low[2] = 0; low[2] < extent_[2]; low[2] += block[2])
-    for (low[1] = 0; low[1] < extent_[1]; low[1] += block[1])
-      for (low[0] = 0; low[0] < extent_[0]; low[0] += block[0])
+  for (low[2] = low_[2]; low[2] < last(2); low[2] += block[2])
+    for (low[1] = low_[1]; low[1] < last(1); low[1] += block[1])
+      for (low[0] = low_[0]; low[0] < last(0); low[0] += block[0])
         if (any()) add(low, {end(0), end(1), end(2)});
 }
 
 std::pair<CellMask::Cells, CellMask::Cells> CellMask::bounds() const {
-  Cells low = extent_, high{}, k{};
-  for (k[2] = 0; k[2] < extent_[2]; ++k[2])
-    for (k[1] = 0; k[1] < extent_[1]; ++k[1])
-      for (k[0] = 0; k[0] < extent_[0]; ++k[0]) {
+  Cells low, high = low_, k{};
+  for (std::size_t a = 0; a < 3; ++a) low[a] = low_[a] + extent_[a];
+  for (k[2] = low_[2]; k[2] < low_[2] + extent_[2]; ++k[2])
+    for (k[1] = low_[1]; k[1] < low_[1] + extent_[1]; ++k[1])
+      for (k[0] = low_[0]; k[0] < low_[0] + extent_[0]; ++k[0]) {
         if (!holds(k)) continue;
         for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], k[a]), high[a] = std::max(high[a], k[a] + 1);
       }

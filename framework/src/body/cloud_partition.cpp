@@ -3,8 +3,9 @@
 #include <algorithm>
 
 #include "body/block_colours.hpp"
-#include "body/cloud_shares.hpp"
+#include "body/cloud_images.hpp"
 #include "perikit/body/partition.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -33,6 +34,18 @@ class KeptBlocks {
     over_points([&](std::size_t p, std::int64_t, const CloudShares::OnePoint& point) {
       if (marks[p]) points.push_back(point);
     });
+    fetch_around(points, radius, marks);
+  }
+  /// The same of other points. Marks points with these numbers, which ascend.
+  void fetch(const CloudShares::Points& points, std::vector<std::int64_t> numbers, Marks& marks) {
+    // Cubes around a place may begin a rounding away.
+    fetch_around(points, 1e-6 * frame_.horizon, marks);
+    std::ranges::sort(numbers);
+    over_points([&](std::size_t p, std::int64_t, const CloudShares::OnePoint& point) {
+      if (std::ranges::binary_search(numbers, point.number)) marks[p] = 1;
+    });
+  }
+  void fetch_around(const CloudShares::Points& points, double radius, Marks& marks) {
     std::vector<std::int64_t> missing = shares_.blocks_around(points, radius);
     std::erase_if(missing, [&](std::int64_t block) { return blocks_.contains(block); });
     std::map<std::int64_t, Marks> of_block;
@@ -97,16 +110,49 @@ class KeptBlocks {
 
 }  // namespace
 
-Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach) : frame_(frame) {
+Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach, const CloudImages* images) : frame_(frame) {
   const CurveShares& pieces = shares.pieces();
   for (int r = 0; r < communicator().size(); ++r) points_.push_back(pieces.first(r + 1) - pieces.first(r));
-  refuse_idle(static_cast<std::size_t>(pieces.points()));
+  const auto image = [&](const CloudShares::OnePoint& point) { return images && images->image(point.number); };
+  const std::int64_t own_images = std::ranges::count_if(shares.own(), image);
+  if (images && communicator().complete()) {
+    std::ranges::fill(points_, 0);
+    points_[static_cast<std::size_t>(communicator().rank())] = std::ssize(shares.own()) - own_images;
+    communicator().sum(points_);
+  }
+  refuse_idle(static_cast<std::size_t>(images ? images->points() : pieces.points()));
+  images_ = static_cast<std::size_t>(counted(own_images).all);
   KeptBlocks blocks(frame, shares);
   KeptBlocks::Marks reached(blocks.points(), 1);
+  std::vector<std::int64_t> of_own;  // numbers of the images of own points
+  if (images) {
+    CloudShares::Points places;
+    for (const CloudShares::OnePoint& point : shares.own())
+      if (!image(point)) images->add(point, places);
+    for (const CloudShares::OnePoint& place : places) of_own.push_back(place.number);
+    std::ranges::sort(of_own);
+    blocks.fetch(places, of_own, reached);
+  }
   const double bond = frame.horizon * (1 + 1e-9);
+  // Of images that are there, the sources are, too. Whether any rank had to fetch some.
+  const auto add_sources = [&] {
+    if (!images) return false;
+    std::vector<std::int64_t> here, sources, missing;
+    blocks.over_points([&](std::size_t p, std::int64_t, const CloudShares::OnePoint& point) {
+      if (reached[p]) image(point) ? sources.push_back(images->source(point.number)) : here.push_back(point.number);
+    });
+    std::ranges::sort(here);
+    std::ranges::sort(sources);
+    sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
+    std::ranges::set_difference(sources, here, std::back_inserter(missing));
+    blocks.fetch(images->sources(missing), missing, reached);
+    return communicator().largest(missing.empty() ? 0 : 1) > 0;
+  };
+  const auto size = static_cast<std::size_t>(pieces.block());
   blocks.fetch_around((reach.bonds - 1) * bond, reached);
   for (int k = 1; k < reach.bonds; ++k) reached = blocks.with_families(std::move(reached));
-  if (reach.blocks) fill_blocks(static_cast<std::size_t>(pieces.block()), reached);
+  if (reach.blocks) fill_blocks(size, reached);
+  if (reach.sources) add_sources();
   blocks.fetch_around(bond, reached);
   CloudPart& part = cloud_part_;
   std::vector<std::int64_t> near;  // places, ascending
@@ -114,14 +160,18 @@ Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Re
     if (reached[p]) near.push_back(place);
   });
   reached = blocks.with_families(std::move(reached));
+  do fill_blocks(size, reached);
+  while (add_sources());
   blocks.keep(reached);
-  part.points_of_all_ranks = pieces.points();
+  part.places_of_all_ranks = pieces.points();
+  part.points_of_all_ranks = images ? images->points() : pieces.points();
   blocks.over_points([&](std::size_t, std::int64_t place, const CloudShares::OnePoint& point) {
     part.places.push_back(place);
     part.numbers.push_back(point.number);
-    part.roles.push_back(pieces.owner(place) == communicator().rank() ? Role::own
-                         : std::ranges::binary_search(near, place)    ? Role::near
-                                                                      : Role::far);
+    part.roles.push_back(pieces.owner(place) == communicator().rank()             ? Role::own
+                         : std::ranges::binary_search(of_own, point.number)       ? Role::image
+                         : std::ranges::binary_search(near, place)                ? Role::near
+                                                                                  : Role::far);
   });
   part.rows = blocks.rows();
 }

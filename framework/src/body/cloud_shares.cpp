@@ -63,27 +63,35 @@ std::vector<std::int64_t> CloudShares::blocks_around(std::span<const OnePoint> p
 
 /// Points of the rank's run of the input along the curve.
 struct SharedCloud::Sorted {
-  std::vector<std::pair<std::uint64_t, std::int64_t>> order;  ///< key and number of the input
+  std::vector<std::pair<std::uint64_t, std::int64_t>> order;  ///< key, and which of the points: as they come by number
+  std::int64_t first, real;                                   ///< number of the first point; how many are no images
+  const std::vector<std::int64_t>& images;
 
-  Sorted(const Curve& curve, const std::vector<Point>& positions, std::int64_t first) {
+  Sorted(const Curve& curve, const std::vector<Point>& positions, const std::vector<std::int64_t>& of_images)
+      : first(counted(std::ssize(positions) - std::ssize(of_images)).before),
+        real(std::ssize(positions) - std::ssize(of_images)),
+        images(of_images) {
     order.reserve(positions.size());
-    for (const Point& x : positions) order.emplace_back(curve.key(x), first + std::ssize(order));
+    for (const Point& x : positions) order.emplace_back(curve.key(x), std::ssize(order));
     std::ranges::sort(order);
   }
+  std::int64_t number(std::int64_t n) const { return n < real ? first + n : images[static_cast<std::size_t>(n - real)]; }
   /// How many come before a place of the curve.
   std::int64_t before(const Start& at) const {
-    return std::ranges::lower_bound(order, std::pair(at.key, at.number)) - order.begin();
+    return std::ranges::lower_bound(order, std::pair(at.key, at.number), {},
+                                    [&](const auto& entry) { return std::pair(entry.first, number(entry.second)); }) -
+           order.begin();
   }
 };
 
-SharedCloud::SharedCloud(PointCloud mine, double cube)
+SharedCloud::SharedCloud(PointCloud mine, double cube, std::vector<std::int64_t> images)
     : CloudShares({counted(std::ssize(mine.position)).all, communicator().size()}, {lowest(mine.position), cube}) {
-  const std::int64_t first = counted(std::ssize(mine.position)).before;
-  const Sorted sorted(curve_, mine.position, first);
+  const Sorted sorted(curve_, mine.position, images);
   starts_ = find_starts(sorted);
   std::vector<Points> to(rank_count());
-  for (const auto& [key, number] : sorted.order) {
-    const auto n = static_cast<std::size_t>(number - first);
+  for (const auto& [key, at] : sorted.order) {
+    const auto n = static_cast<std::size_t>(at);
+    const std::int64_t number = sorted.number(at);
     to[holder({key, number})].push_back({mine.position[n], mine.volume[n], number});
   }
   mine = {};

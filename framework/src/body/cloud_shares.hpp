@@ -44,9 +44,9 @@ class CloudShares {
 /// Ranks bring points in the order of the input, and get those of their pieces of the curve.
 class SharedCloud final : public CloudShares {
  public:
-  /// mine: this rank's run of the points in the order of the input, after those of lower ranks. A rank without others brings all
-  /// of them.
-  SharedCloud(PointCloud mine, double cube);
+  /// mine: this rank's run of the points in the order of the input, after those of lower ranks, and then images with these numbers,
+  /// which ascend. A rank without others brings all of them.
+  SharedCloud(PointCloud mine, double cube, std::vector<std::int64_t> images = {});
 
   std::span<const OnePoint> own() const noexcept override;
   std::map<std::int64_t, Points> fetch(const std::vector<std::int64_t>& blocks) const override;

@@ -37,14 +37,19 @@ Point image_of(const ImagePlane& plane, Point x) {
   return x;
 }
 
-ImageList::ImageList(const Body& body) : dimension_(body.dimension()), real_(body.points()), first_(real_ + 1, 0) {
-  for (const std::int32_t p : body.internal()) position_.push_back(body.position(static_cast<std::size_t>(p)));
-  images_.cracks = body.cracks();
-}
+ImageList::ImageList(int dimension, const Point& x, std::int64_t number, std::int32_t source, Images& images)
+    : dimension_(dimension),
+      number_(number),
+      source_(source),
+      before_(images.size()),
+      position_{x},
+      first_(2, images.terms.size()),
+      images_(images) {}
 
 void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
   const auto number = static_cast<std::int32_t>(images_.size());
-  const std::array<std::int8_t, 3> of = real(n) ? std::array<std::int8_t, 3>{1, 1, 1} : images_.sign[n - real_];
+  const bool real = n == 0;
+  const std::array<std::int8_t, 3> of = real ? std::array<std::int8_t, 3>{1, 1, 1} : images_.sign[before_ + n - 1];
   std::array<std::int8_t, 3> sign = of;
   for (int c = 0; c < dimension_; ++c) {
     const auto i = static_cast<std::size_t>(c);
@@ -60,28 +65,37 @@ void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<boo
       images_.terms.push_back(term);
     }
   }
-  const double volume = real(n) ? 1.0 : images_.volume[n - real_];
-  images_.source.push_back(source(n));
+  const double volume = real ? 1.0 : images_.volume[before_ + n - 1];
+  images_.position.push_back(image.at);
+  images_.source.push_back(source_);
   images_.sign.push_back(sign);
   images_.volume.push_back(image.volume * volume);
   position_.push_back(image.at);
   first_.push_back(images_.terms.size());
 }
 
-void ImageList::mirror_cracks(const ImagePlane& plane) {
-  const std::size_t n = images_.cracks.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    std::vector<Point> part = in_front(plane, images_.cracks[k].vertices());
-    if (part.size() < std::min<std::size_t>(images_.cracks[k].vertices().size(), 3)) continue;
-    if (part.size() > 1 && part.size() < 3 && part[0] == part[1]) continue;
-    for (Point& x : part) x = image_of(plane, x);
-    images_.cracks.emplace_back(std::move(part));
+void append_image(const Images& made, std::size_t k, std::int32_t source, Images& images) {
+  const auto number = static_cast<std::int32_t>(images.size());
+  images.position.push_back(made.position[k]);
+  images.source.push_back(source);
+  images.volume.push_back(made.volume[k]);
+  images.sign.push_back(made.sign[k]);
+  for (ImageTerm term : made.terms) {
+    if (term.image != static_cast<std::int32_t>(k)) continue;
+    term.image = number;
+    images.terms.push_back(term);
   }
 }
 
-Images ImageList::take() {
-  images_.position.assign(position_.begin() + static_cast<std::ptrdiff_t>(real_), position_.end());
-  return std::move(images_);
+void mirror_cracks(const ImagePlane& plane, std::vector<Crack>& cracks) {
+  const std::size_t n = cracks.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    std::vector<Point> part = in_front(plane, cracks[k].vertices());
+    if (part.size() < std::min<std::size_t>(cracks[k].vertices().size(), 3)) continue;
+    if (part.size() > 1 && part.size() < 3 && part[0] == part[1]) continue;
+    for (Point& x : part) x = image_of(plane, x);
+    cracks.emplace_back(std::move(part));
+  }
 }
 
 }  // namespace perikit

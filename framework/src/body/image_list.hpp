@@ -1,5 +1,5 @@
 #pragma once
-/// Images as they are made: mirrored places, and what their displacements are made of.
+/// The images of a point as they are made: mirrored places, and what their displacements are made of.
 
 #include "perikit/body/images.hpp"
 
@@ -10,40 +10,57 @@ struct ImagePlace {
   Point at{};                ///< of the image
   Point foot{};              ///< where the mirror's motion is taken
   double volume = 1;         ///< over that of the place
-  std::int32_t surface = 0;  ///< input number of the point that what the image exerts counts for
+  std::int64_t surface = 0;  ///< number of the point that what the image exerts counts for
 };
 
-/// The points of a body, and their images after them.
+/// A point, and its images after it.
 class ImageList {
  public:
-  explicit ImageList(const Body& body);
+  /// The images are appended to `images`, as those of the point with the input number `source`.
+  ImageList(int dimension, const Point& x, std::int64_t number, std::int32_t source, Images& images);
 
   std::size_t size() const noexcept { return position_.size(); }
   const Point& position(std::size_t n) const { return position_[n]; }
-  /// Input number of the point that place n is, or is an image of.
-  std::int32_t source(std::size_t n) const { return n < real_ ? static_cast<std::int32_t>(n) : images_.source[n - real_]; }
-  bool real(std::size_t n) const noexcept { return n < real_; }
+  /// Of the point, which planes are asked for; its input number.
+  const Point& point() const { return position_.front(); }
+  std::int64_t number() const noexcept { return number_; }
+  std::int32_t source() const noexcept { return source_; }
 
-  /// odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
+  /// The image of place n. odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
   void add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
-  /// Images of what of the cracks lies in front of the plane.
-  void mirror_cracks(const ImagePlane& plane);
-  Images take();
 
  private:
   int dimension_;
-  std::size_t real_;
-  std::vector<Point> position_;     ///< points of the body, then images
+  std::int64_t number_;
+  std::int32_t source_;
+  std::size_t before_;              ///< images of other points
+  std::vector<Point> position_;     ///< the point, then its images
   std::vector<std::size_t> first_;  ///< first term of each of them, and the end
-  Images images_;
+  Images& images_;
 };
+
+/// Appends one of the images of a point, the k-th of `made`, as that of the point with the input number `source`.
+void append_image(const Images& made, std::size_t k, std::int32_t source, Images& images);
 
 /// Distance of a place in front of the plane whose points it takes: itself, or the opposite side.
 double depth(const ImagePlane& plane, const Point& x);
 Point image_of(const ImagePlane& plane, Point x);
+/// Appends images of what of the cracks lies in front of the plane.
+void mirror_cracks(const ImagePlane& plane, std::vector<Crack>& cracks);
 
-/// Images by mirrors, planes among them, that meet at any angle. Periodic planes are left out.
-void mirror_in_turn(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces,
-                    ImageList& list);
+class Mirror;
+
+/// Mirrors, planes among them, that meet at any angle.
+class TurningMirrors {
+ public:
+  /// Periodic planes are left out.
+  TurningMirrors(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces);
+  ~TurningMirrors();
+  void add_images(ImageList& list) const;
+
+ private:
+  double even_;
+  std::vector<std::unique_ptr<const Mirror>> mirrors_;
+};
 
 }  // namespace perikit

@@ -41,9 +41,10 @@ struct Interfaces {
 Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
                            double reach);
 
-/// The same of a body that no rank has as a whole. material: of the points of the part, also of far ones, by its input numbers.
-/// All ranks must call it; each of them knows which materials meet anywhere.
-Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach);
+/// The same of a body that no rank has as a whole: all by the input numbers of the part, also of far points. All ranks must call it;
+/// each of them knows which materials meet anywhere.
+Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
+                                 double reach);
 
 /// The same on a rank's part of a body that it has as a whole.
 Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known);

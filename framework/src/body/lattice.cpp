@@ -20,9 +20,35 @@ std::array<double, 3> Lattice::centre(const std::array<std::int64_t, 3>& k) cons
   std::array<double, 3> x{};
   for (int a = 0; a < dimension; ++a) {
     x[static_cast<std::size_t>(axis[a])] =
-        lower[static_cast<std::size_t>(axis[a])] + (static_cast<double>(k[a] + first[a]) + 0.5) * spacing;
+        lower[static_cast<std::size_t>(axis[a])] + (static_cast<double>(k[a] + first[a] + origin[a]) + 0.5) * spacing;
   }
   return x;
+}
+
+std::int64_t Lattice::input_number(const std::array<std::int64_t, 3>& cell) const noexcept {
+  std::array<std::int64_t, 3> k{}, n{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    k[static_cast<std::size_t>(axis[a])] = cell[a];
+    n[static_cast<std::size_t>(axis[a])] = extent[a];
+  }
+  return k[0] + n[0] * (k[1] + n[1] * k[2]);
+}
+
+std::array<std::int64_t, 3> Lattice::cell_of_input(std::int64_t number) const noexcept {
+  std::array<std::int64_t, 3> n{}, cell{};
+  for (std::size_t a = 0; a < 3; ++a) n[static_cast<std::size_t>(axis[a])] = extent[a];
+  const std::array<std::int64_t, 3> k{number % n[0], number / n[0] % n[1], number / n[0] / n[1]};
+  for (std::size_t a = 0; a < 3; ++a) cell[a] = k[static_cast<std::size_t>(axis[a])];
+  return cell;
+}
+
+std::array<std::int64_t, 3> Lattice::around(const std::array<double, 3>& x) const noexcept {
+  std::array<std::int64_t, 3> k{};
+  for (std::size_t a = 0; a < static_cast<std::size_t>(dimension); ++a) {
+    const auto along = static_cast<std::size_t>(axis[a]);
+    k[a] = std::llround((x[along] - lower[along]) / spacing - 0.5) - origin[a] - first[a];
+  }
+  return k;
 }
 
 std::int64_t lattice_cells(double lower, double upper, double spacing) {
@@ -31,6 +57,17 @@ std::int64_t lattice_cells(double lower, double upper, double spacing) {
 }
 
 namespace {
+
+/// The longest axis first.
+void set_cells(Lattice& lattice, const std::array<std::int64_t, 3>& cells) {
+  lattice.axis = {0, 1, 2};
+  std::stable_sort(lattice.axis.begin(), lattice.axis.begin() + lattice.dimension, [&](int a, int b) {
+    return cells[static_cast<std::size_t>(a)] > cells[static_cast<std::size_t>(b)];
+  });
+  lattice.extent = {1, 1, 1};
+  for (int k = 0; k < lattice.dimension; ++k) lattice.extent[k] = cells[static_cast<std::size_t>(lattice.axis[k])];
+  lattice.whole = lattice.extent;
+}
 
 /// Pitches and sizes, from the extent.
 void lay_out(Lattice& lattice, double horizon) {
@@ -56,12 +93,24 @@ Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>&
   lattice.lower = lower;
   std::array<std::int64_t, 3> cells{1, 1, 1};
   for (int a = 0; a < dimension; ++a) cells[static_cast<std::size_t>(a)] = lattice_cells(lower[a], upper[a], spacing);
-  std::stable_sort(lattice.axis.begin(), lattice.axis.begin() + dimension,
-                   [&](int a, int b) { return cells[static_cast<std::size_t>(a)] > cells[static_cast<std::size_t>(b)]; });
-  for (int k = 0; k < dimension; ++k) lattice.extent[k] = cells[static_cast<std::size_t>(lattice.axis[k])];
-  lattice.whole = lattice.extent;
+  set_cells(lattice, cells);
   lay_out(lattice, horizon);
   return lattice;
+}
+
+Lattice regrown(const Lattice& lattice, const std::array<std::int64_t, 3>& low, const std::array<std::int64_t, 3>& high,
+                double horizon) {
+  std::array<std::int64_t, 3> before{}, cells{1, 1, 1};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(lattice.dimension); ++k) {
+    const auto along = static_cast<std::size_t>(lattice.axis[k]);
+    before[along] = lattice.origin[k] + low[along];
+    cells[along] = high[along] - low[along];
+  }
+  Lattice grown = lattice;
+  set_cells(grown, cells);
+  for (std::size_t k = 0; k < 3; ++k) grown.origin[k] = before[static_cast<std::size_t>(grown.axis[k])];
+  lay_out(grown, horizon);
+  return grown;
 }
 
 Lattice box_of(const Lattice& lattice, const std::array<std::int64_t, 3>& first, const std::array<std::int64_t, 3>& last,

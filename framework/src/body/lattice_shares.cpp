@@ -34,7 +34,7 @@ CellBox cells_of(const LatticeTiling& tiling, const std::array<std::int64_t, 3>&
 
 }  // namespace
 
-std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const Inside& inside) {
+std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const CellBox& box, const Inside& inside) {
   const LatticeTiling tiling(lattice);
   std::vector<std::int64_t> points(static_cast<std::size_t>(tiling.tiles()), 0);
   // A rank without others counts for them.
@@ -45,7 +45,7 @@ std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const Inside& 
   over_cells({{}, tiling.count}, [&](const std::array<std::int64_t, 3>& tile) {
     const std::size_t own = number++;
     if (inside && own % step != first) return;
-    const CellBox cells = cells_of(tiling, lattice.extent, {tile, {tile[0] + 1, tile[1] + 1, tile[2] + 1}});
+    const CellBox cells = common(box, cells_of(tiling, lattice.extent, {tile, {tile[0] + 1, tile[1] + 1, tile[2] + 1}}));
     if (!inside) {
       points[own] = cells.cells();
       return;

@@ -1,6 +1,7 @@
 #pragma once
 /// Which rank owns which cells of a lattice: boxes of tiles with about equal numbers of points.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -21,6 +22,13 @@ struct CellBox {
   std::int64_t cells() const noexcept { return length(0) * length(1) * length(2); }
 };
 
+/// The cells that both have.
+inline CellBox common(const CellBox& a, const CellBox& b) {
+  CellBox box;
+  for (std::size_t c = 0; c < 3; ++c) box.low[c] = std::max(a.low[c], b.low[c]), box.high[c] = std::min(a.high[c], b.high[c]);
+  return box;
+}
+
 /// visit(k) for the cells of a box in the order of the input: x fastest.
 template <class Visit>
 void in_input_order(const Lattice& lattice, const CellBox& box, Visit&& visit) {
@@ -36,8 +44,12 @@ void in_input_order(const Lattice& lattice, const CellBox& box, Visit&& visit) {
 /// Whether a body has a point here; empty: everywhere.
 using Inside = std::function<bool(const std::array<double, 3>&)>;
 
-/// Points in each tile of a lattice, which is no box itself. Each rank counts some tiles; all ranks must call it.
-std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const Inside& inside);
+/// Points in each tile of a lattice, which is no box itself; only cells of `box` have any. Each rank counts some tiles; all ranks must
+/// call it.
+std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const CellBox& box, const Inside& inside);
+inline std::vector<std::int64_t> points_in_tiles(const Lattice& lattice, const Inside& inside) {
+  return points_in_tiles(lattice, {{}, lattice.extent}, inside);
+}
 
 class LatticeShares {
  public:

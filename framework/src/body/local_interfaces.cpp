@@ -5,6 +5,7 @@
 
 #include "body/crossings.hpp"
 #include "body/interfaces.hpp"
+#include "body/near_ranks.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/rank_values.hpp"
 
@@ -42,28 +43,6 @@ std::vector<Meeting> meetings_of_all(std::span<const Crossing> own) {
   return told_to_all(all);
 }
 
-/// A box around points.
-struct Bounds {
-  Point low{}, high{};
-  bool near(const Point& x, double distance) const noexcept {
-    for (std::size_t a = 0; a < 3; ++a)
-      if (x[a] < low[a] - distance || x[a] > high[a] + distance) return false;
-    return true;
-  }
-};
-
-Bounds bounds_of(const Body& body) {
-  const Point first = body.position(static_cast<std::size_t>(body.internal().front()));
-  Bounds bounds{first, first};
-  for (const std::int32_t p : body.internal())
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double x = body.position(static_cast<std::size_t>(p))[a];
-      bounds.low[a] = std::min(bounds.low[a], x);
-      bounds.high[a] = std::max(bounds.high[a], x);
-    }
-  return bounds;
-}
-
 /// What distances up to `reach` depend on: crossings a bond farther, and of each the midpoints in the window of its plane.
 double reach_of_midpoints(const Body& part, double reach) {
   return reach + 4.1 * part.horizon();
@@ -77,45 +56,47 @@ double surroundings(const Body& part, double reach) {
 /// A point near which materials meet: one that has a point of another material in its family, or nearly so.
 struct MeetingPoint {
   Point x;
-  std::int64_t place, number;  ///< in the whole body
+  std::int64_t place, source, number;  ///< in the whole body; source: the place of what an image is of, else its own
   std::int64_t material;
 };
 
-/// Those of the rank.
-std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const std::uint16_t> material, const Boxes& boxes) {
+/// Those of the rank. source: by internal index.
+std::vector<MeetingPoint> own_meeting_points(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> source,
+                                             const Boxes& boxes) {
   std::vector<MeetingPoint> meeting;
+  const auto place = part.places().place;
   const std::vector<std::uint8_t> differing = boxes.differing(material);
   for (std::size_t n = 0; n < differing.size(); ++n) {
     const auto p = static_cast<std::size_t>(part.internal()[n]);
-    if (differing[n] && part.owns(p)) meeting.push_back({boxes.place(n), part.places().place[p], part.number(p), material[n]});
+    if (differing[n] && part.owns(p))
+      meeting.push_back({boxes.place(n), place[p], place[static_cast<std::size_t>(source[p])], part.number(p), material[n]});
   }
   return meeting;
 }
 
 /// Those of all ranks that matter to this one, in input order.
-std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, const Bounds& bounds,
+std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> source,
                                          double reach) {
   std::vector<Point> places;
   for (const std::int32_t p : part.internal()) places.push_back(part.position(static_cast<std::size_t>(p)));
-  const std::vector<MeetingPoint> own = own_meeting_points(part, material, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
-  const double far = surroundings(part, reach);
-  std::vector<Bounds> of_ranks = told_to_all(gathered<Bounds>({&bounds, 1}));
-  of_ranks.resize(static_cast<std::size_t>(communicator().size()), bounds);
-  std::vector<std::vector<MeetingPoint>> to(of_ranks.size());
-  for (std::size_t r = 0; r < to.size(); ++r)
-    std::ranges::copy_if(own, std::back_inserter(to[r]),
-                         [&](const MeetingPoint& point) { return of_ranks[r].near(point.x, far); });
-  std::vector<MeetingPoint> all;
-  for (const std::vector<MeetingPoint>& of_rank : exchanged(to)) all.insert(all.end(), of_rank.begin(), of_rank.end());
+  const std::vector<MeetingPoint> own = own_meeting_points(part, material, source, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
+  std::vector<MeetingPoint> all = of_ranks_near(part, own, surroundings(part, reach));
   std::ranges::sort(all, {}, &MeetingPoint::number);
   return all;
 }
 
 }  // namespace
 
-Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> material, double reach) {
+Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
+                                 double reach) {
   const Bounds bounds = bounds_of(part);
-  const std::vector<MeetingPoint> meeting = meeting_points(part, material, bounds, reach);
+  const auto internal = part.internal();
+  const std::size_t real = internal.size() - sources.size();
+  const auto source = [&](std::size_t n) { return n < real ? n : static_cast<std::size_t>(sources[n - real]); };
+  Interfaces found;
+  found.source.assign(part.stride(), -1);
+  for (std::size_t n = 0; n < internal.size(); ++n) found.source[static_cast<std::size_t>(internal[n])] = internal[source(n)];
+  const std::vector<MeetingPoint> meeting = meeting_points(part, material, found.source, reach);
   std::vector<Point> places;
   std::vector<std::uint16_t> of_meeting;
   for (const MeetingPoint& point : meeting) {
@@ -126,24 +107,17 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
       find_crossings(part.horizon(), Boxes(std::move(places), part.horizon() * (1 + 1e-9)), of_meeting);
   // Farther ones may not be what they are in the whole body.
   std::erase_if(crossings, [&](const Crossing& c) { return !bounds.near(c.middle, reach_of_midpoints(part, reach)); });
-  const auto here = [&](std::int32_t point) { return part.at_place(meeting[static_cast<std::size_t>(point)].place); };
   std::vector<Crossing> own;
   std::ranges::copy_if(crossings, std::back_inserter(own), [&](const Crossing& c) {
-    const std::int32_t p = here(c.of_first);
+    const std::int32_t p = part.at_place(meeting[static_cast<std::size_t>(c.of_first)].place);
     return p >= 0 && part.owns(static_cast<std::size_t>(p));
   });
-  Interfaces found;
   const std::vector<Meeting> all = meetings_of_all(own);
-  if (all.empty()) return found;
+  if (all.empty()) return {};
   for (const Meeting& pair : all) found.pairs.emplace_back(pair.first, pair.second);
   found.length = part.horizon();
   found.material.assign(part.stride(), 0);
-  found.source.assign(part.stride(), -1);
-  const auto internal = part.internal();
-  for (std::size_t n = 0; n < internal.size(); ++n) {
-    found.material[static_cast<std::size_t>(internal[n])] = material[n];
-    found.source[static_cast<std::size_t>(internal[n])] = internal[n];
-  }
+  for (std::size_t n = 0; n < internal.size(); ++n) found.material[static_cast<std::size_t>(internal[n])] = material[n];
   for (auto begin = crossings.begin(); begin != crossings.end();) {
     const auto end = end_of_pair(begin, crossings.end());
     const auto pair = std::ranges::find(all, std::pair(begin->first, begin->second),
@@ -151,9 +125,11 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
     const MaterialSurface surface(part, {begin, end}, pair->lower, reach);
     begin = end;
     std::vector<Distance> distance(internal.size());
-    parallel_for(internal.size(), [&](std::size_t n) {
+    // What lies beyond a plane of symmetry is the image of what lies before it.
+    parallel_for(real, [&](std::size_t n) {
       distance[n] = surface.distance(part.position(static_cast<std::size_t>(internal[n])), material[n]);
     });
+    for (std::size_t n = real; n < internal.size(); ++n) distance[n] = distance[source(n)];
     std::vector<std::pair<std::int32_t, std::size_t>> near;
     for (std::size_t n = 0; n < internal.size(); ++n)
       if (distance[n].counterpart >= 0) near.emplace_back(internal[n], n);
@@ -165,7 +141,7 @@ Interfaces find_interfaces(const Body& part, std::span<const std::uint16_t> mate
     for (const auto& [p, n] : near) {
       interface.point.push_back(p);
       interface.distance.push_back(distance[n].value);
-      interface.counterpart.push_back(here(distance[n].counterpart));
+      interface.counterpart.push_back(part.at_place(meeting[static_cast<std::size_t>(distance[n].counterpart)].source));
     }
   }
   return found;

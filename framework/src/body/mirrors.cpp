@@ -13,8 +13,6 @@
 
 namespace perikit {
 
-namespace {
-
 class Mirror {
  public:
   struct Reflected {
@@ -35,6 +33,8 @@ class Mirror {
   std::array<int, 3> motion_;
 };
 
+namespace {
+
 class PlaneMirror final : public Mirror {
  public:
   PlaneMirror(const ImagePlane& plane, double reach) : Mirror(plane.odd, plane.motion), plane_(plane), reach_(reach) {}
@@ -42,8 +42,9 @@ class PlaneMirror final : public Mirror {
   std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
     const Point& x = list.position(n);
     const double d = depth(plane_, x);
-    const std::int32_t surface = plane_.surface[static_cast<std::size_t>(list.source(n))];
-    if (!(d >= 0) || d > reach_ || surface < 0) return std::nullopt;
+    if (!(d >= 0) || d > reach_) return std::nullopt;
+    const std::int64_t surface = plane_.surface(list.point(), list.number());
+    if (surface < 0) return std::nullopt;
     Point foot = x;
     foot[static_cast<std::size_t>(plane_.axis)] = plane_.at;
     return Reflected{{image_of(plane_, x), foot, 1.0, surface}, d};
@@ -51,7 +52,7 @@ class PlaneMirror final : public Mirror {
   double behind(const Point& x) const override { return std::max(0.0, -depth(plane_, x)); }
 
  private:
-  const ImagePlane& plane_;
+  ImagePlane plane_;
   double reach_;
 };
 
@@ -79,7 +80,7 @@ class SurfaceMirror final : public Mirror {
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) square += (back->at[c] - foot->at[c]) * (back->at[c] - foot->at[c]);
     if (square > same * same * spacing_ * spacing_) return std::nullopt;
-    return Reflected{{image, foot->at, foot->stretch, points_.nearest(foot->at, list.source(n))}, foot->depth};
+    return Reflected{{image, foot->at, foot->stretch, points_.nearest(foot->at, list.source())}, foot->depth};
   }
   double behind(const Point& x) const override {
     if (!(surface_.level(x) > 0)) return 0;
@@ -100,33 +101,34 @@ class SurfaceMirror final : public Mirror {
 
 }  // namespace
 
-void mirror_in_turn(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces,
-                    ImageList& list) {
-  const double reach = halo(body), even = 1e-6 * body.spacing();
-  std::vector<std::unique_ptr<Mirror>> mirrors;
-  for (const ImageSurface& surface : surfaces) mirrors.push_back(std::make_unique<SurfaceMirror>(body, surface, reach));
-  for (const ImagePlane& plane : planes) {
-    if (plane.period > 0) continue;
-    list.mirror_cracks(plane);
-    mirrors.push_back(std::make_unique<PlaneMirror>(plane, reach));
-  }
+TurningMirrors::TurningMirrors(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces)
+    : even_(1e-6 * body.spacing()) {
+  const double reach = halo(body.horizon());
+  for (const ImageSurface& surface : surfaces) mirrors_.push_back(std::make_unique<SurfaceMirror>(body, surface, reach));
+  for (const ImagePlane& plane : planes)
+    if (plane.period == 0) mirrors_.push_back(std::make_unique<PlaneMirror>(plane, reach));
+}
+
+TurningMirrors::~TurningMirrors() = default;
+
+void TurningMirrors::add_images(ImageList& list) const {
   const auto deepest = [&](std::size_t own, const Point& x, double depth) {
-    for (std::size_t k = 0; k < mirrors.size(); ++k) {
+    for (std::size_t k = 0; k < mirrors_.size(); ++k) {
       if (k == own) continue;
-      const double other = mirrors[k]->behind(x);
-      if (other > 0 && (other > depth + even || (k < own && other >= depth - even))) return false;
+      const double other = mirrors_[k]->behind(x);
+      if (other > 0 && (other > depth + even_ || (k < own && other >= depth - even_))) return false;
     }
     return true;
   };
-  std::vector<std::size_t> done(mirrors.size(), 0);
+  std::vector<std::size_t> done(mirrors_.size(), 0);
   for (bool more = true; more;) {
     more = false;
-    for (std::size_t k = 0; k < mirrors.size(); ++k) {
+    for (std::size_t k = 0; k < mirrors_.size(); ++k) {
       const std::size_t end = list.size();
       for (std::size_t n = done[k]; n < end; ++n) {
-        const auto reflected = mirrors[k]->reflect(list, n);
+        const auto reflected = mirrors_[k]->reflect(list, n);
         if (!reflected || !deepest(k, reflected->place.at, reflected->depth)) continue;
-        list.add(n, reflected->place, mirrors[k]->odd(), mirrors[k]->motion());
+        list.add(n, reflected->place, mirrors_[k]->odd(), mirrors_[k]->motion());
         more = true;
       }
       done[k] = end;

@@ -115,7 +115,7 @@ void Partition::keep_cells(const Reach& reach) {
   const LatticeTiling tiling(lattice);
   const auto group = static_cast<std::int64_t>(padding);
   const auto cell = [&](std::size_t n) { return lattice.cell(whole_->internal()[n]); };
-  CellMask mask(lattice.extent);
+  CellMask mask({}, lattice.extent);
   Cells low = lattice.extent, high{};
   for (std::size_t n = 0; n < owner_.size(); ++n) {
     if (part_.roles[n] != Role::own) continue;

@@ -79,14 +79,13 @@ CloudExtent extent_of(const PointStream& all) {
   extent.lower.fill(infinity);
   extent.upper.fill(-infinity);
   ExactSum volume;
-  all([&](const PointCloud& piece) {
-    extent.points += std::ssize(piece.position);
-    for (const Point& x : piece.position)
-      for (std::size_t c = 0; c < 3; ++c) {
-        extent.lower[c] = std::min(extent.lower[c], x[c]);
-        extent.upper[c] = std::max(extent.upper[c], x[c]);
-      }
-    for (const double of_point : piece.volume) volume.add(of_point);
+  all([&](const CloudShares::OnePoint& point) {
+    ++extent.points;
+    for (std::size_t c = 0; c < 3; ++c) {
+      extent.lower[c] = std::min(extent.lower[c], point.x[c]);
+      extent.upper[c] = std::max(extent.upper[c], point.x[c]);
+    }
+    volume.add(point.volume);
   });
   extent.volume = volume.value();
   return extent;
@@ -94,11 +93,7 @@ CloudExtent extent_of(const PointStream& all) {
 
 template <class Visit>
 void StreamedCloud::over_points(Visit&& visit) const {
-  std::int64_t number = 0;
-  all_([&](const PointCloud& piece) {
-    for (std::size_t n = 0; n < piece.position.size(); ++n)
-      visit(curve_.key(piece.position[n]), OnePoint{piece.position[n], piece.volume[n], number++});
-  });
+  all_([&](const OnePoint& point) { visit(curve_.key(point.x), point); });
 }
 
 /// By the leading bits of the keys, then by further ones.

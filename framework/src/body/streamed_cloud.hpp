@@ -8,8 +8,8 @@
 
 namespace perikit {
 
-/// All points of a cloud in the order of the input, a piece at a time; as often as it is called.
-using PointStream = std::function<void(const std::function<void(const PointCloud&)>& use)>;
+/// All points of a cloud, or those of a rank, in the order of the input; as often as it is called. Images come after their sources.
+using PointStream = std::function<void(const std::function<void(const CloudShares::OnePoint&)>& visit)>;
 
 struct CloudExtent {
   std::int64_t points = 0;

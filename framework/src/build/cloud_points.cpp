@@ -197,8 +197,11 @@ CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
   return {std::move(cloud), spacing};
 }
 
+/// All points of a cloud in the order of the input, a piece at a time; as often as it is called.
+using PieceStream = std::function<void(const std::function<void(const PointCloud&)>& use)>;
+
 /// The scene must outlive it.
-PointStream point_stream(const Scene& scene) {
+PieceStream piece_stream(const Scene& scene) {
   if (!scene.body.lattice)
     return [&scene](const auto& use) { over_points_of_file(*scene.body.points_file, scene.body.dimension, use); };
   return [&scene, lattice = scene_lattice(scene)](const auto& use) {
@@ -221,6 +224,15 @@ PointStream point_stream(const Scene& scene) {
       cloud.volume.assign(kept.size(), cell_volume(scene) * scene.body.section);
       use(cloud);
     }
+  };
+}
+
+PointStream point_stream(const Scene& scene) {
+  return [pieces = piece_stream(scene)](const auto& visit) {
+    std::int64_t number = 0;
+    pieces([&](const PointCloud& piece) {
+      for (std::size_t n = 0; n < piece.position.size(); ++n) visit({piece.position[n], piece.volume[n], number++});
+    });
   };
 }
 

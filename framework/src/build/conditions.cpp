@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "perikit/core/rank_values.hpp"
 #include "perikit/output/recorder.hpp"
 
 namespace perikit {
@@ -23,16 +24,28 @@ void refuse_ramp(const RampDescription& ramp, const std::string& key, bool quasi
 
 namespace {
 
-/// A point at a held face that a layer holds too would be held at two places.
+/// A point at a held face that a layer holds too would be held at two places. Of a part of a body all ranks must call it.
 void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
                   const std::vector<std::size_t>& boundary_of) {
-  if (std::ranges::none_of(images.terms, [](const ImageTerm& term) { return term.motion >= 0; })) return;
-  std::vector<std::uint8_t> held(body.points_of_all_ranks(), 0);   // by point of the whole body, a bit a component
+  if (prescriptions.empty() || std::ranges::none_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
+    return;
+  struct Held {
+    std::int64_t number, component;
+    auto operator<=>(const Held&) const = default;
+  };
+  std::vector<Held> held;
+  const auto keep_each_once = [&] {
+    std::ranges::sort(held);
+    held.erase(std::unique(held.begin(), held.end()), held.end());
+  };
   for (const ImageTerm& term : images.terms)
-    if (term.motion >= 0) held[static_cast<std::size_t>(term.surface)] |= static_cast<std::uint8_t>(1 << term.component);
+    if (term.motion >= 0) held.push_back({term.surface, term.component});
+  keep_each_once();
+  if (body.part()) held = told_to_all(gathered<Held>(held));
+  keep_each_once();
   for (std::size_t k = 0; k < prescriptions.size(); ++k)
     for (const std::int32_t p : prescriptions[k].points) {
-      if (!(held[static_cast<std::size_t>(body.number(static_cast<std::size_t>(p)))] >> prescriptions[k].component & 1)) continue;
+      if (!std::ranges::binary_search(held, Held{body.number(static_cast<std::size_t>(p)), prescriptions[k].component})) continue;
       const Point x = body.position(static_cast<std::size_t>(p));
       throw InputError(scene.boundaries[boundary_of[k]].position, fmt::format("boundary.{}", boundary_of[k]),
                        fmt::format("found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "perikit/body/partition.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/problem/loads.hpp"
 #include "perikit/problem/state.hpp"
@@ -23,11 +22,10 @@ void refuse_ramp(const RampDescription& ramp, const std::string& key, bool quasi
 /// face that are held themselves.
 Constraints build_constraints(const Scene& scene, const Body& body, const Images& images, std::vector<FaceMotion> motions, bool quasi_static);
 
-/// On the owned points of the body, which is a part of partition->whole() where there are several ranks: totals are those of
-/// all ranks. parts: of the terms, whose kinematics say what area a point has of a face. images: of the body (null: none); of_whole:
-/// of the whole body. Throws InputError for faces without points.
-Loads build_loads(const Scene& scene, const TermParts& parts, const Partition* partition, const ImageMap* images, const Images& of_whole,
-                  bool quasi_static);
+/// On the owned points of the body; of a part of a body totals are those of all ranks, which must all call it. parts: of the terms,
+/// whose kinematics say what area a point has of a face. images: of the body (null: none). Throws InputError for faces without
+/// points.
+Loads build_loads(const Scene& scene, const TermParts& parts, const ImageMap* images, bool quasi_static);
 
 /// Displacements and velocities at the start, of images as the constraints have them. Throws InputError where an earlier run does
 /// not hold them.

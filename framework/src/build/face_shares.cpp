@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "body/near_ranks.hpp"
 #include "families/families.hpp"
 #include "perikit/core/exact_sum.hpp"
-#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -24,73 +24,136 @@ struct Face {
   explicit Face(const LoadDescription& load) : axis(load.face[1] - 'x'), outward(load.face[0] == '+' ? 1.0 : -1.0) {}
 };
 
-/// Steps along the outward normal of a face of a lattice.
+/// An end of a column of cells along the axis of a face: a point with none before it, or none behind it.
+struct End {
+  Point x;
+  std::array<std::int64_t, 3> cell;  ///< of the whole lattice
+  std::int64_t kind;                 ///< bits below
+  static constexpr std::int64_t outer = 1, inner = 2, chosen = 4, image = 8;
+};
+
+/// The columns of a lattice along the outward normal of a face.
 class Columns {
  public:
-  Columns(const Body& body, const Face& face) : body_(body), lattice_(*body.lattice()) {
-    for (std::size_t k = 0; k < 3; ++k) step_[k] = lattice_.axis[k] == face.axis ? static_cast<int>(face.outward) : 0;
-    shift_ = lattice_.shift(step_);
+  /// points: of the load, with images where these carry something, too. Finds their ends on all ranks, which must call it; no
+  /// column is followed farther than `most` cells.
+  Columns(const Body& body, const Face& face, const std::vector<std::int32_t>& points, const ImageMap* images, std::int64_t most)
+      : lattice_(*body.lattice()), body_(body), most_(most) {
+    while (lattice_.axis[axis_] != face.axis) ++axis_;
+    sign_ = face.outward > 0 ? 1 : -1;
+    std::vector<std::uint8_t> chosen(body.stride(), 0);
+    for (const std::int32_t p : points) chosen[static_cast<std::size_t>(p)] = 1;
+    complete_.assign(body.stride(), 0);
+    for (const std::int32_t p : body.complete()) complete_[static_cast<std::size_t>(p)] = 1;
+    std::vector<End> mine;
+    const auto add = [&](std::span<const std::int32_t> of, std::int64_t kind) {
+      for (const std::int32_t p : of) {
+        const std::int64_t ends = (lives(p, sign_) ? 0 : End::outer) | (lives(p, -sign_) ? 0 : End::inner);
+        if (ends == 0) continue;
+        std::array<std::int64_t, 3> cell = lattice_.cell(p);
+        for (std::size_t a = 0; a < 3; ++a) cell[a] += lattice_.first[a];
+        mine.push_back({lattice_.position(p), cell, ends | kind | (chosen[static_cast<std::size_t>(p)] ? End::chosen : 0)});
+      }
+    };
+    add(body.owned(), 0);
+    if (images) {
+      std::vector<std::int32_t> all = body.owned();
+      images->append_images(all);
+      add(std::span(all).subspan(body.owned().size()), End::image);
+    }
+    for (const End& end : of_ranks_near(body, mine, static_cast<double>(most) * lattice_.spacing)) {
+      if (end.kind & End::inner) inner_.push_back({column(end.cell), sign_ * end.cell[axis_]});
+      if ((end.kind & End::outer) && (end.kind & End::chosen)) faces_.push_back(end);
+    }
+    std::ranges::sort(inner_);
+    own_faces_ = std::ranges::count_if(mine, [](const End& end) {
+      return (end.kind & End::outer) && (end.kind & End::chosen) && !(end.kind & End::image);
+    });
   }
-  /// The point k steps further in than p.
-  std::int32_t below(std::int32_t p, std::int64_t k) const noexcept { return static_cast<std::int32_t>(p - k * shift_); }
-  bool at_face(std::int32_t p) const { return !neighbour_alive(p, 1); }
-  /// Points from p on inwards, counted as far as `most`.
-  std::int64_t depth(std::int32_t p, std::int64_t most) const {
-    std::int64_t depth = 1;
-    while (depth < most && neighbour_alive(below(p, depth - 1), -1)) ++depth;
-    return depth;
+  /// The ends at the face.
+  const std::vector<End>& faces() const noexcept { return faces_; }
+  /// How many of them are points of this rank.
+  std::int64_t own_faces() const noexcept { return own_faces_; }
+  /// Points from an end on inwards, counted as far as `most`.
+  std::int64_t depth(const End& end) const {
+    const std::pair place(column(end.cell), sign_ * end.cell[axis_]);
+    const auto after = std::ranges::upper_bound(inner_, place);
+    if (after == inner_.begin() || std::prev(after)->first != place.first) return most_;
+    return std::min(most_, place.second - std::prev(after)->second + 1);
+  }
+  /// The point k steps further in than an end; -1: one whose forces are not complete here.
+  std::int32_t below(const End& end, std::int64_t k) const noexcept {
+    std::array<std::int64_t, 3> cell = end.cell;
+    cell[axis_] -= sign_ * k;
+    for (std::size_t a = 0; a < 3; ++a) {
+      cell[a] -= lattice_.first[a];
+      if (cell[a] < 0 || cell[a] >= lattice_.extent[a]) return -1;
+    }
+    const std::int64_t index = lattice_.index(cell[0], cell[1], cell[2]);
+    return complete_[static_cast<std::size_t>(index)] ? static_cast<std::int32_t>(index) : -1;
   }
 
  private:
-  /// A dead cell beyond the last row may be outside of the padding where the family has no reach along this axis.
-  bool neighbour_alive(std::int64_t p, int sign) const {
-    std::array<std::int64_t, 3> k = lattice_.cell(p);
-    for (std::size_t a = 0; a < 3; ++a) {
-      k[a] += sign * step_[a];
-      if (k[a] < 0 || k[a] >= lattice_.extent[a]) return false;
-    }
-    return body_.alive(static_cast<std::size_t>(p + sign * shift_));
+  /// Whether there is a point behind p. A dead cell beyond the last row may be outside of the padding where the family has no reach
+  /// along this axis.
+  bool lives(std::int32_t p, int sign) const {
+    std::array<std::int64_t, 3> cell = lattice_.cell(p);
+    std::array<int, 3> step{};
+    step[axis_] = sign;
+    cell[axis_] += sign;
+    if (cell[axis_] < 0 || cell[axis_] >= lattice_.extent[axis_]) return false;
+    return body_.alive(static_cast<std::size_t>(p + lattice_.shift(step)));
+  }
+  /// A number of the column of a cell of the whole lattice.
+  std::int64_t column(std::array<std::int64_t, 3> cell) const noexcept {
+    cell[axis_] = 0;
+    return cell[0] + lattice_.whole[0] * (cell[1] + lattice_.whole[1] * cell[2]);
   }
 
-  const Body& body_;
   const Lattice& lattice_;
-  std::array<int, 3> step_{};
-  std::int64_t shift_ = 0;
+  const Body& body_;
+  std::int64_t most_;
+  std::size_t axis_ = 0;
+  int sign_ = 1;
+  std::vector<End> faces_;
+  std::vector<std::pair<std::int64_t, std::int64_t>> inner_;  ///< column, and how far out it begins
+  std::vector<std::uint8_t> complete_;                        ///< by internal index
+  std::int64_t own_faces_ = 0;
 };
 
 /// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
 /// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
 /// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
+/// Of a part of a body with all ranks, which must all call it.
 Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
-  const Columns columns(body, face);
   const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis) : Field();
   const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));  // that a face is felt in
   const double area = body.uniform_volume() / body.spacing();
-  const std::size_t own_points = points.size();
   if (exact && images) images->append_images(points);   // what the evaluation points of the set have of the face beyond its edges
+  const Columns columns(body, face, points, images, 2 * layers);
   Shares shares;
-  double total = 0, wanted = 0;
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    const std::int32_t p = points[n];
-    if (!columns.at_face(p)) continue;
-    if (n < own_points) wanted += area;
-    const std::int64_t depth = columns.depth(p, 2 * layers);
-    if (!exact || (depth == 1 && n < own_points)) {
-      shares[p] += depth > 1 ? 1.5 * area : area;
-      if (depth > 1) shares[columns.below(p, 1)] -= 0.5 * area;
-      total += area;
+  ExactSum total;
+  const auto add = [&](std::int32_t p, double share) {
+    if (p < 0) return;
+    shares[p] += share;
+    if (body.owns(static_cast<std::size_t>(p))) total.add(share);
+  };
+  for (const End& end : columns.faces()) {
+    const std::int64_t depth = columns.depth(end);
+    if (!exact || (depth == 1 && !(end.kind & End::image))) {
+      add(columns.below(end, 0), depth > 1 ? 1.5 * area : area);
+      if (depth > 1) add(columns.below(end, 1), -0.5 * area);
       continue;
     }
     // What is nearer to the opposite face belongs to that one.
-    for (std::int64_t k = 0; k < std::min(layers, depth / 2); ++k) {
-      const double own = face.outward * areas.data()[columns.below(p, k)];
-      shares[columns.below(p, k)] += own;
-      total += own;
-    }
+    for (std::int64_t k = 0; k < std::min(layers, depth / 2); ++k)
+      if (const std::int32_t p = columns.below(end, k); p >= 0) add(p, face.outward * areas.data()[p]);
   }
-  for (auto& [p, value] : shares) value *= wanted / total;
+  const double wanted = static_cast<double>(counted(columns.own_faces()).all) * area, found = total_of(body, total);
+  if (exact)
+    for (auto& [p, value] : shares) value *= wanted / found;
   return shares;
 }
 
@@ -103,7 +166,6 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
     return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)];
   };
   const auto largest = [&](double value) { return body.part() ? communicator().largest(value) : value; };
-  const auto value_of = [&](ExactSum& sum) { return body.part() ? total_over_ranks(sum) : sum.value(); };
   double extreme = -std::numeric_limits<double>::infinity();
   for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
   extreme = largest(extreme);
@@ -121,7 +183,7 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
     squares.add(v * depth * depth);
   }
   second = largest(second ? 1 : 0) > 0;
-  const double total = value_of(areas), m0 = value_of(volumes), m1 = value_of(moments), m2 = value_of(squares);
+  const double total = total_of(body, areas), m0 = total_of(body, volumes), m1 = total_of(body, moments), m2 = total_of(body, squares);
   Shares shares;
   for (const std::int32_t p : points) {
     const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));

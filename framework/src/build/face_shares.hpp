@@ -11,7 +11,8 @@
 namespace perikit {
 
 /// The area [m^2] of the face of `load` that each point of its set, or below it, carries: exact in total, by point of the body of parts.families.
-/// Images (null: none) of these points beside the face carry their part of it. Throws InputError where no point of the set lies on the face.
+/// Images (null: none) of these points beside the face carry their part of it. Of a part of a body it finds what points
+/// carry whose forces are complete, with all ranks, which must all call it. Throws InputError where no point of the set lies on the face.
 std::map<std::int32_t, double> face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
 
 /// The area [m^2] that each point has of faces across `axis` in the eyes of the kinematics: its force along the axis where a

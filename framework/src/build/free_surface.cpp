@@ -25,7 +25,8 @@ double dot(const Point& a, const Point& b) {
 }
 
 std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
-  const double reach = 2 * body.spacing();
+  // Of a part no more than families are there.
+  const double reach = std::min(2 * body.spacing(), body.horizon());
   const FamilyLists near = find_families(body.rows(), body.points(), body.dimension(), reach);
   std::vector<std::int32_t> found;
   for (const std::int32_t p : body.owned()) {
@@ -59,7 +60,7 @@ std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
 CellFaces::CellFaces(const Body& body) : area(body.stride(), Point{}), count(body.stride(), 0) {
   const Lattice& lattice = *body.lattice();
   const double face = body.uniform_volume() / body.spacing();
-  for (const std::int32_t p : body.owned())
+  for (const std::int32_t p : body.internal())
     for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k)
       for (const int sign : {-1, 1}) {
         if (occupied(body, p, k, sign)) continue;
@@ -77,19 +78,18 @@ std::vector<std::int32_t> free_surface(const Body& body) {
   return found;
 }
 
-NearestPoint::NearestPoint(const Body& body, const std::vector<std::int32_t>& points, double cell) : body_(body), cell_(cell) {
+NearestPoint::NearestPoint(std::vector<SurfacePoint> points, double cell) : points_(std::move(points)), cell_(cell) {
   Point upper{};
   for (std::size_t c = 0; c < 3; ++c) {
     lower_[c] = std::numeric_limits<double>::infinity();
     upper[c] = -lower_[c];
-    for (const std::int32_t p : points) {
-      const double x = body.position(static_cast<std::size_t>(p))[c];
-      lower_[c] = std::min(lower_[c], x);
-      upper[c] = std::max(upper[c], x);
+    for (const SurfacePoint& point : points_) {
+      lower_[c] = std::min(lower_[c], point.x[c]);
+      upper[c] = std::max(upper[c], point.x[c]);
     }
-    if (!points.empty()) cells_[c] = 1 + static_cast<std::int64_t>((upper[c] - lower_[c]) / cell_);
+    if (!points_.empty()) cells_[c] = 1 + static_cast<std::int64_t>((upper[c] - lower_[c]) / cell_);
   }
-  for (const std::int32_t p : points) entries_.emplace_back(key(cell_of(body.position(static_cast<std::size_t>(p)))), p);
+  for (std::size_t n = 0; n < points_.size(); ++n) entries_.emplace_back(key(cell_of(points_[n].x)), n);
   std::ranges::sort(entries_);
 }
 
@@ -103,7 +103,8 @@ std::int64_t NearestPoint::key(const std::array<std::int64_t, 3>& cell) const no
   return cell[0] + cells_[0] * (cell[1] + cells_[1] * cell[2]);
 }
 
-std::optional<std::int32_t> NearestPoint::to(const Point& x, double most) const {
+const SurfacePoint* NearestPoint::to(const Point& x, double most) const {
+  if (points_.empty()) return nullptr;
   const std::array<std::int64_t, 3> centre = cell_of(x);
   const auto reach = static_cast<std::int64_t>(std::ceil(most / cell_));
   std::array<std::int64_t, 3> first{}, last{};
@@ -111,19 +112,20 @@ std::optional<std::int32_t> NearestPoint::to(const Point& x, double most) const 
     first[c] = std::max<std::int64_t>(0, centre[c] - reach);
     last[c] = std::min(cells_[c] - 1, centre[c] + reach);
   }
-  std::optional<std::int32_t> best;
+  const SurfacePoint* best = nullptr;
   double least = most * most * (1 + 1e-12);
   for (std::int64_t k2 = first[2]; k2 <= last[2]; ++k2)
     for (std::int64_t k1 = first[1]; k1 <= last[1]; ++k1)
       for (std::int64_t k0 = first[0]; k0 <= last[0]; ++k0) {
         const std::int64_t wanted = key({k0, k1, k2});
-        for (auto entry = std::lower_bound(entries_.begin(), entries_.end(), std::pair{wanted, std::int32_t{0}});
+        for (auto entry = std::lower_bound(entries_.begin(), entries_.end(), std::pair{wanted, std::size_t{0}});
              entry != entries_.end() && entry->first == wanted; ++entry) {
-          const Point y = body_.position(static_cast<std::size_t>(entry->second)), way{y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+          const SurfacePoint& point = points_[entry->second];
+          const Point way{point.x[0] - x[0], point.x[1] - x[1], point.x[2] - x[2]};
           const double squared = dot(way, way);
-          if (squared > least || (squared == least && best && *best < entry->second)) continue;
+          if (squared > least || (squared == least && best && best->place < point.place)) continue;
           least = squared;
-          best = entry->second;
+          best = &point;
         }
       }
   return best;

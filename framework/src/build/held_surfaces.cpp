@@ -86,14 +86,14 @@ class SurfaceBuilder {
                        : fmt::format("found a surface {:.2g} spacings from the point at {}", depth / body_.spacing(), place(x)),
              fmt::format("an expression that is negative at all points, and zero {:.3g} or more in front of them",
                          least * body_.spacing()));
-    if (depth < halo(body_) && !surface_.foot(x))
+    if (depth < halo(body_.horizon()) && !surface_.foot(x))
       refuse(fmt::format("found no place on the surface that is nearest to the point at {}", place(x)),
              "expressions whose gradient is smooth within two horizons of the surface");
   }
 
   /// Up to two horizons below the surface it must be nearest, or there would be places behind it without images.
   void check_thickness(const Point& x) const {
-    const double reach = halo(body_);
+    const double reach = halo(body_.horizon());
     const std::optional<Foot> foot = surface_.foot(x);
     if (!foot || foot->depth <= 0) return;
     Point below{};
@@ -110,7 +110,7 @@ class SurfaceBuilder {
   /// Mirror images of cracks would not be plane.
   void check_cracks(const Point& x) const {
     for (std::size_t k = 0; k < body_.cracks().size(); ++k)
-      if (body_.cracks()[k].near(x, halo(body_)))
+      if (body_.cracks()[k].near(x, halo(body_.horizon())))
         refuse(fmt::format("found crack.{} within two horizons of the surface, near {}, which has no image there", k, place(x)),
                "cracks that end farther away, or a face across an axis");
   }

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "build/conditions.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -20,12 +21,71 @@ struct Side {
   double depth(const Point& x) const noexcept { return outward * (at - x[static_cast<std::size_t>(axis)]); }
 };
 
-/// Cells of one spacing, beside the axis.
-using Cell = std::array<std::int64_t, 2>;
+/// How far from a side its outermost points lie at most, in spacings.
+double layer_at(const PlacedPoints& points) {
+  return (points.lattice() ? 0.75 : 1.2) * points.frame().spacing;
+}
+
+/// The points of a cloud at a side: which of them lies nearest beside the axis.
+class PointsAtSide {
+ public:
+  struct Outermost {
+    Point x;
+    std::int64_t number, chosen;
+  };
+  /// All ranks must call it.
+  PointsAtSide(const PlacedPoints& points, const Side& side, const std::string& set) : side_(side), spacing_(points.frame().spacing) {
+    const auto over = [&](const std::string& name, auto&& visit) {
+      points.over(name, [&](const Point& x, std::int64_t number) {
+        if (const double d = side_.depth(x); d >= 0 && d < layer_at(points)) visit(x, number);
+      });
+    };
+    std::vector<Outermost> found;
+    over("all", [&](const Point& x, std::int64_t number) { found.push_back({x, number, set == "all"}); });
+    if (set != "all")
+      over(set, [&](const Point&, std::int64_t number) { std::ranges::lower_bound(found, number, {}, &Outermost::number)->chosen = 1; });
+    if (points.shared()) found = told_to_all(gathered<Outermost>(found));
+    for (const Outermost& point : found) cells_[beside(point.x)].push_back(point);
+  }
+  /// No farther than two cells away; null: there is none.
+  const Outermost* nearest(const Point& x) const {
+    const Cell centre = beside(x);
+    constexpr std::int64_t ring = 2;
+    const Outermost* nearest = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::int64_t i = -ring; i <= ring; ++i)
+      for (std::int64_t j = -ring; j <= ring; ++j) {
+        const auto found = cells_.find({centre[0] + i, centre[1] + j});
+        if (found == cells_.end()) continue;
+        for (const Outermost& point : found->second) {
+          double square = 0;
+          for (std::size_t a = 0; a < 3; ++a)
+            if (a != static_cast<std::size_t>(side_.axis)) square += (x[a] - point.x[a]) * (x[a] - point.x[a]);
+          if (square < least) least = square, nearest = &point;
+        }
+      }
+    return nearest;
+  }
+
+ private:
+  /// Cells of one spacing, beside the axis.
+  using Cell = std::array<std::int64_t, 2>;
+  Cell beside(const Point& x) const {
+    Cell cell{};
+    for (std::size_t a = 0, k = 0; a < 3; ++a)
+      if (a != static_cast<std::size_t>(side_.axis)) cell[k++] = static_cast<std::int64_t>(std::floor(x[a] / spacing_));
+    return cell;
+  }
+
+  Side side_;
+  double spacing_;
+  std::map<Cell, std::vector<Outermost>> cells_;
+};
 
 class PlaneBuilder {
  public:
-  PlaneBuilder(const Scene& scene, const Body& body, bool quasi_static) : scene_(scene), body_(body), quasi_static_(quasi_static) {}
+  PlaneBuilder(const Scene& scene, const std::shared_ptr<const PlacedPoints>& points, bool quasi_static)
+      : scene_(scene), points_(points), lattice_(points->lattice()), spacing_(points->frame().spacing), quasi_static_(quasi_static) {}
 
   ScenePlanes build() {
     for (std::size_t k = 0; k < scene_.boundaries.size(); ++k)
@@ -36,101 +96,94 @@ class PlaneBuilder {
   }
 
  private:
-  Cell beside(const Side& side, const Point& x) const {
-    Cell cell{};
-    for (std::size_t a = 0, k = 0; a < 3; ++a) {
-      if (a == static_cast<std::size_t>(side.axis)) continue;
-      const double lower = body_.lattice() ? body_.lattice()->lower[a] : 0.0;   // lattice points lie in the middle of cells
-      cell[k++] = static_cast<std::int64_t>(std::floor((x[a] - lower) / body_.spacing()));
-    }
-    return cell;
+  /// The coordinate of the outermost of these points, on all ranks.
+  double outermost(const std::string& set, int axis, double outward) const {
+    double extreme = -std::numeric_limits<double>::infinity();
+    points_->over(set, [&](const Point& x, std::int64_t) { extreme = std::max(extreme, outward * x[static_cast<std::size_t>(axis)]); });
+    return outward * communicator().largest(extreme);
   }
-  Point position(std::int32_t p) const { return body_.position(static_cast<std::size_t>(p)); }
 
   /// Where the side of these points lies: half a spacing beyond a lattice point; cells of points that were moved at random keep theirs.
-  double end_of(const std::vector<std::int32_t>& points, int axis, double outward, const SourcePosition& position, const std::string& key) const {
-    const auto a = static_cast<std::size_t>(axis);
-    double extreme = -std::numeric_limits<double>::infinity();
-    for (const std::int32_t p : points) extreme = std::max(extreme, outward * this->position(p)[a]);
-    extreme *= outward;
-    if (body_.lattice()) return extreme + 0.5 * outward * body_.spacing();
+  double end_of(const std::string& set, int axis, double outward, const SourcePosition& position, const std::string& key) const {
+    const double extreme = outermost(set, axis, outward);
+    if (lattice_) return extreme + 0.5 * outward * spacing_;
     if (!scene_.body.lattice) {
       throw InputError(position, key,
                        fmt::format("found nothing for points from a file, whose outermost lies at {:.6g}; allowed: the coordinate of the side", extreme));
     }
-    const double lower = scene_.body.lattice->lower[a], cells = std::floor((extreme - lower) / body_.spacing());
-    return lower + (cells + (outward > 0 ? 1 : 0)) * body_.spacing();
+    const double lower = scene_.body.lattice->lower[static_cast<std::size_t>(axis)], cells = std::floor((extreme - lower) / spacing_);
+    return lower + (cells + (outward > 0 ? 1 : 0)) * spacing_;
   }
 
   /// A given coordinate, which on lattices lies between two points.
   double given(double at, int axis, const SourcePosition& position, const std::string& key) const {
-    if (!body_.lattice()) return at;
-    const double cells = (at - body_.lattice()->lower[static_cast<std::size_t>(axis)]) / body_.spacing();
+    if (!lattice_) return at;
+    const double cells = (at - lattice_->lower[static_cast<std::size_t>(axis)]) / spacing_;
     if (std::abs(cells - std::round(cells)) < 1e-6) return at;
     throw InputError(position, key,
                      fmt::format("found {:.6g}, which does not lie half-way between points of the lattice; allowed: its lower corner and "
                                  "multiples of the spacing from there, {:.6g} for one",
-                                 at, at + (std::round(cells) - cells) * body_.spacing()));
+                                 at, at + (std::round(cells) - cells) * spacing_));
   }
 
-  /// By input number: the point at the side below which each point lies; -1: below none of `points`. whole: the side is that of the body, and
-  /// no point is left out.
-  std::vector<std::int32_t> surface(const Side& side, const std::vector<std::int32_t>& points, bool whole) const {
-    const double h = body_.spacing(), layer = (body_.lattice() ? 0.75 : 1.2) * h;
-    std::map<Cell, std::vector<std::int32_t>> cells;   // of points at the side
-    for (const std::int32_t p : body_.owned())
-      if (const double d = side.depth(position(p)); d >= 0 && d < layer) cells[beside(side, position(p))].push_back(p);
-    std::vector<bool> chosen(body_.stride(), false);
-    for (const std::int32_t p : points) chosen[static_cast<std::size_t>(p)] = true;
-    std::vector<std::int32_t> surface(body_.points(), -1);
-    if (cells.empty()) return surface;
-    const double reach = halo(body_);
-    for (const std::int32_t p : body_.owned()) {
-      const double d = side.depth(position(p));
-      if (d < 0 || d > reach) continue;
-      const std::int32_t nearest = nearest_of(cells, side, position(p));
-      const auto input = [&](std::int32_t q) { return body_.input_of(static_cast<std::size_t>(q)); };
-      if (nearest >= 0 && (whole || chosen[static_cast<std::size_t>(nearest)])) surface[static_cast<std::size_t>(input(p))] = input(nearest);
-      else if (nearest < 0 && whole) surface[static_cast<std::size_t>(input(p))] = input(p);   // behind a notch
-    }
-    return surface;
+  /// Whether one of the points of a set, on whatever rank, lies at a side.
+  bool touched(const Side& side, const std::string& set) const {
+    double found = 0;
+    points_->over(set, [&](const Point& x, std::int64_t) {
+      if (const double d = side.depth(x); d >= 0 && d < layer_at(*points_)) found = 1;
+    });
+    return communicator().largest(found) > 0;
   }
 
-  /// The nearest beside the axis: on lattices the one of the same column, on clouds one at most two cells away.
-  std::int32_t nearest_of(const std::map<Cell, std::vector<std::int32_t>>& cells, const Side& side, const Point& x) const {
-    const Cell centre = beside(side, x);
-    const std::int64_t ring = body_.lattice() ? 0 : 2;
-    std::int32_t nearest = -1;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::int64_t i = -ring; i <= ring; ++i)
-      for (std::int64_t j = -ring; j <= ring; ++j) {
-        const auto found = cells.find({centre[0] + i, centre[1] + j});
-        if (found == cells.end()) continue;
-        for (const std::int32_t q : found->second) {
-          const Point y = position(q);
-          double square = 0;
-          for (std::size_t a = 0; a < 3; ++a)
-            if (a != static_cast<std::size_t>(side.axis)) square += (x[a] - y[a]) * (x[a] - y[a]);
-          if (square < least) least = square, nearest = q;
-        }
-      }
-    return nearest;
+  /// The point at the side below which a point lies: on lattices that of the same column, on clouds the nearest. Where the side is that of
+  /// the whole body no point is left out.
+  std::function<std::int64_t(const Point&, std::int64_t)> surface(const Side& side, const std::string& set) const {
+    const bool whole = set == "all";
+    const auto far = [side, reach = halo(points_->frame().horizon)](const Point& x) {
+      const double d = side.depth(x);
+      return d < 0 || d > reach;
+    };
+    if (!lattice_)
+      return [at_side = std::make_shared<const PointsAtSide>(*points_, side, set), whole, far](const Point& x, std::int64_t number) {
+        const PointsAtSide::Outermost* const nearest = far(x) ? nullptr : at_side->nearest(x);
+        if (nearest && nearest->chosen) return nearest->number;
+        return whole && !nearest && !far(x) ? number : std::int64_t{-1};   // behind a notch
+      };
+    std::size_t axis = 0;
+    while (lattice_->axis[axis] != side.axis) ++axis;
+    Point inner{};
+    inner[static_cast<std::size_t>(side.axis)] = side.at - 0.5 * side.outward * spacing_;
+    return [points = points_, lattice = *lattice_, set, whole, far, axis, last = lattice_->around(inner)[axis]](const Point& x, std::int64_t number) {
+      if (far(x)) return std::int64_t{-1};
+      std::array<std::int64_t, 3> cell = lattice.around(x);
+      cell[axis] = last;
+      const std::int64_t found = points->at(cell, set);
+      return found < 0 && whole ? number : found;   // behind a notch
+    };
   }
 
   void refuse_points_beyond(const Side& side, const SourcePosition& where, const std::string& key) const {
-    for (const std::int32_t p : body_.owned()) {
-      const Point x = position(p);
-      if (side.depth(x) < 0)
-        throw InputError(where, key, fmt::format("found a plane through the body, at {:.6g}: a point at ({:.6g}, {:.6g}, {:.6g}) lies behind it; "
-                                                 "allowed: a plane with all points on one side", side.at, x[0], x[1], x[2]));
-    }
+    struct Beyond {
+      double depth;
+      Point x;
+      std::int64_t number;
+    };
+    std::vector<Beyond> mine;   // the one farthest behind, the first of several
+    points_->over("all", [&](const Point& x, std::int64_t number) {
+      if (const double d = side.depth(x); d < 0 && (mine.empty() || d < mine.front().depth)) mine.assign(1, {d, x, number});
+    });
+    const std::vector<Beyond> all = told_to_all(gathered<Beyond>(mine));
+    if (all.empty()) return;
+    const Beyond& first = *std::ranges::min_element(all, {}, [](const Beyond& beyond) { return std::pair(beyond.depth, beyond.number); });
+    throw InputError(where, key, fmt::format("found a plane through the body, at {:.6g}: a point at ({:.6g}, {:.6g}, {:.6g}) lies behind it; "
+                                             "allowed: a plane with all points on one side", side.at, first.x[0], first.x[1], first.x[2]));
   }
 
   /// may_exist: several [[boundary]] may prescribe components of one face, and sets may share a plane.
   ImagePlane& plane_at(const Side& side, const std::string& set, const std::string& key, const SourcePosition& where, bool may_exist) {
     for (std::size_t k = 0; k < found_.planes.size(); ++k) {
       ImagePlane& plane = found_.planes[k];
-      if (plane.axis != side.axis || std::abs(plane.at - side.at) > 1e-6 * body_.spacing() || plane.outward != side.outward) continue;
+      if (plane.axis != side.axis || std::abs(plane.at - side.at) > 1e-6 * spacing_ || plane.outward != side.outward) continue;
       if (may_exist && found_.origins[k].set == set) return plane;
       if (plane.period == 0 && may_exist) continue;   // of another set
       throw InputError(where, key, fmt::format("found a side, at {:.6g}, that {} has too; allowed: one of the two", side.at, found_.origins[k].key));
@@ -146,17 +199,16 @@ class PlaneBuilder {
   void add_face(std::size_t k) {
     const BoundaryDescription& boundary = scene_.boundaries[k];
     const std::string key = fmt::format("boundary.{}.face", k);
-    const std::vector<std::int32_t>& points = body_.set(boundary.set);
     Side side{boundary.face[1] - 'x', boundary.face[0] == '+' ? 1.0 : -1.0, 0};
     side.at = boundary.at ? given(*boundary.at, side.axis, boundary.face_position, fmt::format("boundary.{}.at", k))
-                          : end_of(points, side.axis, side.outward, boundary.face_position, fmt::format("boundary.{}.at", k));
+                          : end_of(boundary.set, side.axis, side.outward, boundary.face_position, fmt::format("boundary.{}.at", k));
     ImagePlane& plane = plane_at(side, boundary.set, key, boundary.face_position, true);
     const bool whole = boundary.set == "all";
     if (whole) refuse_points_beyond(side, boundary.face_position, key);
-    if (plane.surface.empty()) {
-      plane.surface = surface(side, points, whole);
-      if (std::ranges::all_of(plane.surface, [](std::int32_t p) { return p < 0; }))
+    if (!plane.surface) {
+      if (!touched(side, boundary.set))
         throw InputError(boundary.face_position, key, fmt::format("found \"{}\" at {:.6g}, which no point of the set \"{}\" touches; allowed: a face of the set", boundary.face, side.at, boundary.set));
+      plane.surface = surface(side, boundary.set);
     }
     for (std::size_t c = 0; c < boundary.components.size(); ++c) {
       if (!boundary.components[c]) continue;
@@ -175,15 +227,15 @@ class PlaneBuilder {
     const auto a = static_cast<std::size_t>(symmetry.axis);
     if (symmetry.at) {
       side.at = given(*symmetry.at, symmetry.axis, symmetry.position, key);
-      side.outward = position(body_.owned().front())[a] > side.at ? -1.0 : 1.0;
+      side.outward = outermost("all", symmetry.axis, 1) > side.at ? -1.0 : 1.0;
     } else {
-      side.at = end_of(body_.owned(), symmetry.axis, side.outward, symmetry.position, key);
+      side.at = end_of("all", symmetry.axis, side.outward, symmetry.position, key);
     }
     refuse_points_beyond(side, symmetry.position, key);
     ImagePlane& plane = plane_at(side, "all", fmt::format("symmetry.{}.axis", k), symmetry.position, false);
     plane.odd[a] = true;
-    plane.surface = surface(side, body_.owned(), true);
-    if (std::ranges::all_of(plane.surface, [](std::int32_t p) { return p < 0; }))
+    plane.surface = surface(side, "all");
+    if (!touched(side, "all"))
       throw InputError(symmetry.position, key, fmt::format("found {:.6g}, which no point comes near; allowed: a side of the body", side.at));
   }
 
@@ -195,26 +247,35 @@ class PlaneBuilder {
       const std::string key = path + (s == 0 ? ".lower" : ".upper");
       const std::optional<double>& at = s == 0 ? periodic.lower : periodic.upper;
       sides[s].at = at ? given(*at, periodic.axis, periodic.position, key)
-                       : end_of(body_.owned(), periodic.axis, sides[s].outward, periodic.position, key);
+                       : end_of("all", periodic.axis, sides[s].outward, periodic.position, key);
       refuse_points_beyond(sides[s], periodic.position, key);
     }
     for (const Side& side : sides) {
       ImagePlane& plane = plane_at(side, "all", path + ".axis", periodic.position, false);
       plane.period = sides[1].at - sides[0].at;
-      plane.surface.assign(body_.points(), 0);
+      plane.surface = [](const Point&, std::int64_t number) { return number; };
     }
   }
 
   const Scene& scene_;
-  const Body& body_;
+  std::shared_ptr<const PlacedPoints> points_;
+  const Lattice* lattice_;
+  double spacing_;
   bool quasi_static_;
   ScenePlanes found_;
 };
 
 }  // namespace
 
-ScenePlanes build_planes(const Scene& scene, const Body& body, bool quasi_static) {
-  return PlaneBuilder(scene, body, quasi_static).build();
+ScenePlanes build_planes(const Scene& scene, const std::shared_ptr<const PlacedPoints>& points, bool quasi_static) {
+  return PlaneBuilder(scene, points, quasi_static).build();
+}
+
+void refuse_overlap(const ScenePlanes& planes, const OverlappingImage& error) {
+  // Only sides of parts of a lattice can have something beyond them.
+  const auto of_part = std::ranges::find_if(planes.origins, [](const auto& origin) { return origin.set != "all"; });
+  const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? planes.origins.front() : *of_part;
+  throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
 }
 
 }  // namespace perikit

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "build/placed_points.hpp"
 #include "perikit/body/images.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/scene/scene.hpp"
@@ -21,7 +22,10 @@ struct ScenePlanes {
   std::vector<FaceMotion> motions;       ///< what ImagePlane::motion and ImageSurface::motion number
 };
 
-/// Throws InputError for faces without points, planes through the body, faces held twice.
-ScenePlanes build_planes(const Scene& scene, const Body& body, bool quasi_static);
+/// Throws InputError for faces without points, planes through the body, faces held twice. All ranks must call it.
+ScenePlanes build_planes(const Scene& scene, const std::shared_ptr<const PlacedPoints>& points, bool quasi_static);
+
+/// Says which side has something beyond it that is in the way of images.
+[[noreturn]] void refuse_overlap(const ScenePlanes& planes, const OverlappingImage& error);
 
 }  // namespace perikit

@@ -77,6 +77,14 @@ std::vector<std::uint16_t> first_alike(const Scene& scene) {
   return same;
 }
 
+/// By input number: equal ones where laws and constants are equal, images as their sources.
+void prepare_materials(const Scene& scene, std::span<const std::int32_t> sources, std::vector<std::uint16_t>& material, const Body& body) {
+  const std::vector<std::uint16_t> same = first_alike(scene);
+  material.resize(body.points() - sources.size());
+  for (std::uint16_t& m : material) m = same[m];
+  for (const std::int32_t source : sources) material.push_back(material[static_cast<std::size_t>(source)]);
+}
+
 /// How far interfaces are known [m]: stencils of bond gradients reach two families from their owner, which lies no farther from
 /// the interface.
 double reach_of_interfaces(const Body& body) {
@@ -103,21 +111,18 @@ Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, cons
                             std::vector<std::uint16_t> material, std::span<const std::int32_t> sources) {
   Interfaces out;
   if (!interfaces_wanted(scene)) return out;
-  const std::vector<std::uint16_t> same = first_alike(scene);
-  for (std::uint16_t& m : material) m = same[m];
-  for (const std::int32_t source : sources) material.push_back(material[static_cast<std::size_t>(source)]);
+  prepare_materials(scene, sources, material, body);
   out = find_interfaces(body, material, sources, reach_of_interfaces(body));
   keep_laminates(scene, factory, formulation, body.space(), out);
   return out;
 }
 
 Interfaces build_local_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation,
-                                  const Body& part, std::vector<std::uint16_t> material) {
+                                  const Body& part, std::vector<std::uint16_t> material, std::span<const std::int32_t> sources) {
   Interfaces out;
   if (!interfaces_wanted(scene)) return out;
-  const std::vector<std::uint16_t> same = first_alike(scene);
-  for (std::uint16_t& m : material) m = same[m];
-  out = find_interfaces(part, material, reach_of_interfaces(part));
+  prepare_materials(scene, sources, material, part);
+  out = find_local_interfaces(part, material, sources, reach_of_interfaces(part));
   keep_laminates(scene, factory, formulation, part.space(), out);
   return out;
 }

@@ -19,9 +19,9 @@ std::vector<std::uint16_t> materials_of_points(const Body& body);
 Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation, const Body& body,
                             std::vector<std::uint16_t> material, std::span<const std::int32_t> sources);
 
-/// The same on a rank's part of a body that no rank has as a whole. material: of its points, by its input numbers. All ranks must
-/// call it.
+/// The same on a rank's part of a body that no rank has as a whole, by its input numbers; material: of its points, and of images
+/// whatever. All ranks must call it.
 Interfaces build_local_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation,
-                                  const Body& part, std::vector<std::uint16_t> material);
+                                  const Body& part, std::vector<std::uint16_t> material, std::span<const std::int32_t> sources);
 
 }  // namespace perikit

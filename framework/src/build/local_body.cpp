@@ -1,17 +1,19 @@
 #include "build/local_body.hpp"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
-#include "body/cloud_shares.hpp"
-#include "body/lattice_shares.hpp"
-#include "body/streamed_cloud.hpp"
+#include "body/cloud_images.hpp"
+#include "body/lattice_images.hpp"
 #include "build/cloud_points.hpp"
+#include "build/image_planes.hpp"
 #include "build/scene_lattice.hpp"
 #include "build/sets.hpp"
+#include "build/several_ranks.hpp"
 #include "build/size_check.hpp"
 #include "perikit/build/body.hpp"
-#include "perikit/core/communicator.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -32,32 +34,139 @@ std::vector<std::uint16_t> materials_of_part(const Scene& scene, const SetMember
 }
 
 /// Far points keep what they have.
-void set_materials(const std::vector<std::uint16_t>& material, std::uint16_t far_material, Body& body) {
+void set_materials(const std::vector<std::uint16_t>& material, std::uint16_t far_material, std::uint16_t image_material, Body& body) {
   std::vector<std::uint16_t> ids(body.material_ids().begin(), body.material_ids().end());
   for (std::size_t n = 0; n < material.size(); ++n)
-    if (std::uint16_t& id = ids[static_cast<std::size_t>(body.internal()[n])]; id != far_material) id = material[n];
+    if (const auto p = static_cast<std::size_t>(body.internal()[n]); ids[p] != far_material) ids[p] = body.image(p) ? image_material : material[n];
   body.set_materials(std::move(ids));
 }
 
-Inside inside_of(const Scene& scene) {
-  const LatticeDescription& description = *scene.body.lattice;
-  if (!description.inside) return {};
-  return [&](const Point& x) { return (*description.inside)(x) != 0.0; };
+/// A part as it is placed, before anything is asked of its points.
+struct LocalPlaces {
+  std::unique_ptr<Partition> partition;
+  Body body;
+  std::optional<Images> images = std::nullopt;  ///< of bodies that have any, on whatever rank
+  std::vector<FaceMotion> motions{};
+};
+
+LocalPlaces placed(std::unique_ptr<Partition> partition, std::uint16_t far_material) {
+  Body body = partition->make_part(far_material);
+  return {std::move(partition), std::move(body)};
 }
 
-std::unique_ptr<Partition> part_of_cloud(const Scene& scene, const Partition::Reach& reach) {
-  if (!communicator().complete()) {
-    const CloudOutline cloud = cloud_outline(scene);
-    const BodyFrame frame = scene_frame(scene, cloud.spacing);
-    if (!lone_rank_orders(static_cast<double>(cloud.extent.points)))
-      return std::make_unique<Partition>(frame, StreamedCloud(cloud.points, cloud.extent, frame.horizon), reach);
-  }
+/// The planes of a cloud, and what makes images behind them.
+struct CloudPlanes {
+  ScenePlanes scene;
+  ImageMaker maker;
+};
+
+/// points: of this rank. The frame gets images of its cracks.
+CloudPlanes planes_of_cloud(const Scene& scene, const PointStream& points, BodyFrame& frame) {
+  ScenePlanes planes = build_planes(scene, placed_points(scene, frame, points), false);
+  ImageMaker maker(dimension(frame.space), halo(frame.horizon), planes.planes);
+  frame.cracks = maker.cracks(std::move(frame.cracks));
+  return {std::move(planes), std::move(maker)};
+}
+
+LocalPlaces placed(const BodyFrame& frame, const CloudShares& shares, const Partition::Reach& reach, std::uint16_t far_material,
+                   const CloudImages& images, CloudPlanes& planes) {
+  LocalPlaces places = placed(std::make_unique<Partition>(frame, shares, reach, &images), far_material);
+  places.images = images.of_part(places.body);
+  places.motions = std::move(planes.scene.motions);
+  return places;
+}
+
+/// A rank without others goes through the points of the cloud.
+LocalPlaces place_stream(const Scene& scene, const CloudOutline& cloud, const Partition::Reach& reach, std::uint16_t far_material) {
+  BodyFrame frame = scene_frame(scene, cloud.spacing);
+  if (!has_images(scene))
+    return placed(std::make_unique<Partition>(frame, StreamedCloud(cloud.points, cloud.extent, frame.horizon), reach), far_material);
+  CloudPlanes planes = planes_of_cloud(scene, cloud.points, frame);
+  const CloudImages images(planes.maker, cloud.extent.points, most_images(planes.maker, cloud.points), finder_of_stream(cloud.points));
+  const PointStream all = images.with_images(cloud.points);
+  return placed(frame, StreamedCloud(all, extent_of(all), frame.horizon), reach, far_material, images, planes);
+}
+
+LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
+  if (!communicator().complete())
+    if (const CloudOutline cloud = cloud_outline(scene); !lone_rank_orders(static_cast<double>(cloud.extent.points)))
+      return place_stream(scene, cloud, reach, far_material);
   CloudPoints cloud = cloud_points(scene, WhichPoints::run);
-  const BodyFrame frame = scene_frame(scene, cloud.spacing);
-  return std::make_unique<Partition>(frame, SharedCloud(std::move(cloud.points), frame.horizon), reach);
+  BodyFrame frame = scene_frame(scene, cloud.spacing);
+  if (!has_images(scene))
+    return placed(std::make_unique<Partition>(frame, SharedCloud(std::move(cloud.points), frame.horizon), reach), far_material);
+  PointCloud& mine = cloud.points;
+  const Counted points = counted(std::ssize(mine.position));
+  const PointStream run = [&](const auto& visit) {
+    for (std::size_t n = 0; n < mine.position.size(); ++n)
+      visit({mine.position[n], mine.volume[n], points.before + static_cast<std::int64_t>(n)});
+  };
+  CloudPlanes planes = planes_of_cloud(scene, run, frame);
+  CloudImages::Points with_images, made;
+  const std::int64_t most = most_images(planes.maker, run, &with_images);
+  const CloudImages images(planes.maker, points.all, most, finder_of_run(with_images, points.before));
+  for (const CloudShares::OnePoint& point : with_images) images.add(point, made);
+  std::vector<std::int64_t> numbers;
+  for (const CloudShares::OnePoint& image : made) {
+    mine.position.push_back(image.x);
+    mine.volume.push_back(image.volume);
+    numbers.push_back(image.number);
+  }
+  return placed(frame, SharedCloud(std::move(mine), frame.horizon, std::move(numbers)), reach, far_material, images, planes);
 }
 
-std::unique_ptr<Partition> part_of_lattice(const Scene& scene, const Partition::Reach& reach) {
+/// The numbers that points have in the input, in place of those of their cells; who owns them knows these.
+void number_surfaces(const LatticeImages& of, const Lattice& lattice, const LatticeShares& shares, const Body& part, Images& images) {
+  struct Surface {
+    std::int64_t cell, number;
+  };
+  std::map<std::int64_t, std::int64_t> number_of;
+  for (const ImageTerm& term : images.terms) number_of[term.surface] = -1;
+  std::vector<std::vector<Surface>> asked(shares.boxes().size());
+  for (const auto& [cell, number] : number_of)
+    asked[static_cast<std::size_t>(shares.owner(of.grown_cell(cell)))].push_back({cell, number});
+  std::vector<std::vector<Surface>> answers = exchanged(asked);
+  for (std::vector<Surface>& of_rank : answers)
+    for (Surface& surface : of_rank) {
+      const std::array<std::int64_t, 3> k = of.grown_cell(surface.cell);
+      if (const std::int32_t p = part.at_place(lattice.index(k[0], k[1], k[2])); p >= 0)
+        surface.number = part.number(static_cast<std::size_t>(p));
+    }
+  for (const std::vector<Surface>& of_rank : exchanged(answers))
+    for (const Surface& surface : of_rank) number_of[surface.cell] = surface.number;
+  for (ImageTerm& term : images.terms) term.surface = number_of[term.surface];
+}
+
+/// What the memory of this machine must hold for a part of a lattice.
+void check_part(const Scene& scene, const LatticeShares& shares) {
+  const LatticeDescription& description = *scene.body.lattice;
+  check_memory(scene, static_cast<double>(shares.points()[static_cast<std::size_t>(communicator().rank())]),
+               scene_horizon(scene, description.spacing) / description.spacing, false, true);
+}
+
+/// With what lies beyond planes: of a lattice that has places for it, too.
+LocalPlaces part_with_images(const Scene& scene, const Lattice& points, const Inside& inside, const Partition::Reach& reach,
+                             std::uint16_t far_material) {
+  ScenePlanes planes = build_planes(scene, placed_points(scene, points, inside), false);
+  BodyFrame frame = scene_frame(scene, points.spacing);
+  const Lattice lattice = with_images(points, frame.horizon, planes.planes);
+  const LatticeImages images(points, lattice, inside, ImageMaker(points.dimension, halo(frame.horizon), planes.planes));
+  frame.cracks = images.cracks(std::move(frame.cracks));
+  const LatticeShares shares(lattice, points_in_tiles(lattice, images.box(), inside), communicator().size());
+  check_part(scene, shares);
+  const Inside real = [&](const Point& x) { return images.real(lattice.around(x)); };
+  try {
+    auto partition = std::make_unique<Partition>(frame, lattice, shares, real, reach, &images);
+    Body body = partition->make_part(far_material);
+    Images of_part = images.of_part(body);
+    number_surfaces(images, lattice, shares, body, of_part);
+    return {std::move(partition), std::move(body), std::move(of_part), std::move(planes.motions)};
+  } catch (const OverlappingImage& error) {
+    refuse_overlap(planes, error);
+  }
+}
+
+LocalPlaces place_lattice(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
   const LatticeDescription& description = *scene.body.lattice;
   const double estimate = estimated_cells(scene), ratio = scene_horizon(scene, description.spacing) / description.spacing;
   const Lattice lattice = scene_lattice(scene);
@@ -66,10 +175,11 @@ std::unique_ptr<Partition> part_of_lattice(const Scene& scene, const Partition::
   std::vector<std::int64_t> points = points_in_tiles(lattice, inside);
   const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
   if (all == 0) refuse_empty_lattice(description);
-  if (sparse(static_cast<double>(all), lattice)) return part_of_cloud(scene, reach);
+  if (sparse(static_cast<double>(all), lattice)) return place_cloud(scene, reach, far_material);
+  if (has_images(scene)) return part_with_images(scene, lattice, inside, reach, far_material);
   const LatticeShares shares(lattice, std::move(points), communicator().size());
-  check_memory(scene, static_cast<double>(shares.points()[static_cast<std::size_t>(communicator().rank())]), ratio, false, true);
-  return std::make_unique<Partition>(scene_frame(scene, description.spacing), lattice, shares, inside, reach);
+  check_part(scene, shares);
+  return placed(std::make_unique<Partition>(scene_frame(scene, description.spacing), lattice, shares, inside, reach), far_material);
 }
 
 }  // namespace
@@ -108,14 +218,13 @@ int heaviest_rank(const Scene& scene, int ranks) {
   return heaviest;
 }
 
-LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
+LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, std::uint16_t image_material) {
   check_volumes(scene);
-  std::unique_ptr<Partition> partition = is_cloud(scene) ? part_of_cloud(scene, reach) : part_of_lattice(scene, reach);
-  Body body = partition->make_part(far_material);
-  const SetMembers members = add_sets(scene.sets, body);
-  std::vector<std::uint16_t> material = materials_of_part(scene, members, body);
-  set_materials(material, far_material, body);
-  return LocalBody{std::move(partition), std::move(body), std::move(material)};
+  LocalPlaces places = is_cloud(scene) ? place_cloud(scene, reach, far_material) : place_lattice(scene, reach, far_material);
+  const SetMembers members = add_sets(scene.sets, places.body);
+  std::vector<std::uint16_t> material = materials_of_part(scene, members, places.body);
+  set_materials(material, far_material, image_material, places.body);
+  return LocalBody{std::move(places.partition), std::move(places.body), std::move(material), std::move(places.images), std::move(places.motions)};
 }
 
 }  // namespace perikit

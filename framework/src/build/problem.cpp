@@ -29,6 +29,7 @@ namespace {
 
 /// The number of the material of images, after those of the scene; that of the far points of a part of a body comes after all.
 std::uint16_t image_material(const Scene& scene) { return static_cast<std::uint16_t>(scene.regions.size() + 1); }
+std::uint16_t far_material(const Scene& scene, bool images) { return static_cast<std::uint16_t>(image_material(scene) + (images ? 1 : 0)); }
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
@@ -39,17 +40,14 @@ struct Beyond {
 };
 
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
-  ScenePlanes planes = build_planes(scene, body, quasi_static);
+  ScenePlanes planes = build_planes(scene, placed_points(body), quasi_static);
   add_surfaces(scene, body, quasi_static, planes);
   if (planes.planes.empty() && planes.surfaces.empty()) return {};
   Images images = make_images(body, planes.planes, planes.surfaces);
   try {
     body = Body(body, images, image_material(scene));
-  } catch (const std::domain_error& error) {
-    // Only sides of parts of a lattice can have something beyond them.
-    const auto of_part = std::ranges::find_if(planes.origins, [](const auto& origin) { return origin.set != "all"; });
-    const ScenePlanes::Origin& origin = of_part == planes.origins.end() ? planes.origins.front() : *of_part;
-    throw InputError(origin.position, origin.key, fmt::format("{}; allowed: a side with nothing beyond it", error.what()));
+  } catch (const OverlappingImage& error) {
+    refuse_overlap(planes, error);
   }
   return {std::move(images), {}, std::move(planes.motions), nullptr};
 }
@@ -64,12 +62,17 @@ Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
 /// The body of this rank, which no rank has as a whole.
 Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts) {
   try {
-    LocalBody local = build_local_body(scene, reach_of(scene, formulation), image_material(scene));
+    LocalBody local = build_local_body(scene, reach_of(scene, formulation), far_material(scene, has_images(scene)), image_material(scene));
     parts.body = std::make_unique<const Body>(std::move(local.body));
     parts.partition = std::move(local.partition);
     Beyond beyond;
+    if (local.images) {
+      beyond.here = std::move(*local.images);
+      beyond.motions = std::move(local.motions);
+      parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);
+    }
     beyond.interfaces = std::make_shared<const Interfaces>(
-        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material)));
+        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.here.source));
     return beyond;
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
@@ -99,7 +102,7 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
     throw InputError(scene.body.position, "body", error.what());
   }
   const bool images = beyond.images.size() > 0;
-  parts.body = std::make_unique<const Body>(partition->make_part(static_cast<std::uint16_t>(image_material(scene) + (images ? 1 : 0))));
+  parts.body = std::make_unique<const Body>(partition->make_part(far_material(scene, images)));
   parts.partition = std::move(partition);
   if (images) {
     beyond.here = images_of_part(beyond.images, *parts.body);
@@ -278,7 +281,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
-  Loads loads = build_loads(scene, of_terms, partition, parts.images.get(), beyond.images, quasi_static);
+  Loads loads = build_loads(scene, of_terms, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
   if (partition && !parts.whole) parts.partition->forget_whole();
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};

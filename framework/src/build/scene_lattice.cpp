@@ -47,6 +47,12 @@ Lattice scene_lattice(const Scene& scene) {
   return make_lattice(d, description.spacing, description.lower, description.upper, reach);
 }
 
+Inside inside_of(const Scene& scene) {
+  const LatticeDescription& description = *scene.body.lattice;
+  if (!description.inside) return {};
+  return [&](const Point& x) { return (*description.inside)(x) != 0.0; };
+}
+
 double estimated_cells(const Scene& scene) {
   const LatticeDescription& description = *scene.body.lattice;
   double cells = 1;

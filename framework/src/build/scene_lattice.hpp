@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 
+#include "body/lattice_shares.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "perikit/scene/scene.hpp"
@@ -16,6 +17,9 @@ BodyFrame scene_frame(const Scene& scene, double spacing);
 /// The lattice of a scene that has one, before `inside`. Throws InputError where there is no room for a point, and for families
 /// that are too large.
 Lattice scene_lattice(const Scene& scene);
+
+/// What the scene keeps of its lattice, which must outlive it.
+Inside inside_of(const Scene& scene);
 
 /// About so many cells the lattice of a scene has, before anything of their number is made.
 double estimated_cells(const Scene& scene);

@@ -14,8 +14,8 @@ namespace {
 
 std::vector<std::int32_t> where_true(const Expression& condition, const Body& body) {
   std::vector<std::int32_t> members;
-  for (const std::int32_t p : body.internal())
-    if (condition(body.position(static_cast<std::size_t>(p))) != 0.0) members.push_back(p);
+  for (const std::int32_t index : body.internal())
+    if (const auto p = static_cast<std::size_t>(index); !body.image(p) && condition(body.position(p)) != 0.0) members.push_back(index);
   return members;
 }
 

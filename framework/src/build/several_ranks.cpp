@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "build/cloud_points.hpp"
+#include "build/sets.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -17,19 +17,29 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
                                scene.integrator->type, communicator().size()));
 }
 
+bool has_images(const Scene& scene) {
+  return !scene.symmetries.empty() || !scene.periodics.empty() ||
+         std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); });
+}
+
+namespace {
+
+/// Whether planes are asked of single points of a lattice, which only their owners know.
+bool faces_of_single_points(const Scene& scene) {
+  return std::ranges::any_of(scene.boundaries, [&](const BoundaryDescription& boundary) {
+    return !boundary.face.empty() && boundary.set != "all" && !set_expression(scene, boundary.set);
+  });
+}
+
+}  // namespace
+
 std::string needs_whole_body(const Scene& scene, bool quasi_static) {
-  using Type = LoadDescription::Type;
   if (scene.body.voronoi) return "Voronoi cells are found of all points together";
   if (quasi_static) return "pieces that nothing holds are looked for";
-  if (!scene.symmetries.empty() || !scene.periodics.empty())
-    return "there are images beyond planes of symmetry or periodic sides";
-  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
-    return "there are images beyond held faces or surfaces";
-  // On clouds a traction asks each point how deep it lies, and no neighbours.
-  if (std::ranges::any_of(scene.loads, [&](const LoadDescription& load) {
-        return load.type == Type::pressure || (load.type == Type::traction && !is_cloud(scene));
-      }))
-    return "tractions and pressures share out the surface";
+  if (!has_images(scene)) return {};
+  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); }))
+    return "there are images beyond held surfaces";
+  if (faces_of_single_points(scene)) return "a face of a set of single points is held";
   return {};
 }
 

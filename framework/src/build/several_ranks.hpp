@@ -11,7 +11,11 @@ namespace perikit {
 /// Throws InputError, naming the key, for what needs the whole body on one rank. Nothing is refused where there is one.
 void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator);
 
-/// Why every rank places the whole body of the scene, in words; empty where each of them places its own part alone.
+/// Whether anything lies beyond planes or surfaces of the body.
+bool has_images(const Scene& scene);
+
+/// Why every rank places the whole body of the scene, in words; empty where each of them places its own part alone. All
+/// ranks must call it.
 std::string needs_whole_body(const Scene& scene, bool quasi_static);
 
 }  // namespace perikit

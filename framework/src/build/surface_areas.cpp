@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/near_ranks.hpp"
 #include "build/face_shares.hpp"
 #include "build/free_surface.hpp"
 #include "families/families.hpp"
@@ -32,8 +33,9 @@ SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const 
 std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
   const Lattice& lattice = *body.lattice();
   std::vector<Point> areas(body.stride(), Point{});
-  for (const std::int32_t p : body.owned()) {
+  for (const std::int32_t p : body.internal()) {
     const auto i = static_cast<std::size_t>(p);
+    if (body.image(i)) continue;
     for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k) {
       const auto c = static_cast<std::size_t>(lattice.axis[k]);
       const double area = faces.area[i][c];
@@ -49,19 +51,14 @@ std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
   return areas;
 }
 
-/// By internal index, images among them. Of a cloud on several ranks those of this rank alone, which knows their consistent weights.
-std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts, const TermParts& of_rank) {
+/// By internal index, images among them.
+std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts) {
   const Body& body = parts.families->body();
   if (!parts.formulation.pairs) {
     std::vector<Point> areas(body.stride(), Point{});
     for (int axis = 0; axis < body.dimension(); ++axis) {
-      const TermParts& from = body.lattice() ? parts : of_rank;
-      const Field of_axis = face_areas(from, axis);
-      const auto place = from.families->body().places().place;
-      for (const std::int32_t p : from.families->body().internal()) {
-        const auto i = static_cast<std::size_t>(p);
-        areas[place.empty() ? i : static_cast<std::size_t>(place[i])][static_cast<std::size_t>(axis)] = of_axis.data()[p];
-      }
+      const Field of_axis = face_areas(parts, axis);
+      for (const std::int32_t p : body.internal()) areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = of_axis.data()[p];
     }
     return areas;
   }
@@ -72,49 +69,62 @@ std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts
 }
 
 /// What is missing of the free faces of the set's cells, in proportion to the areas that are there.
-void correct_total(const Body& body, const std::vector<bool>& in_set, SurfaceAreas& areas) {
+void correct_total(const Body& body, const std::vector<std::uint8_t>& in_set, SurfaceAreas& areas) {
   const CellFaces faces(body);
-  Point missing{};
-  double size = 0;
+  std::array<ExactSum, 3> missing;
+  ExactSum sizes;
   for (const std::int32_t p : body.owned())
     for (std::size_t c = 0; in_set[static_cast<std::size_t>(p)] && c < 3; ++c)
-      missing[c] += faces.area[static_cast<std::size_t>(p)][c];
+      missing[c].add(faces.area[static_cast<std::size_t>(p)][c]);
   for (const Point& area : areas.area) {
-    for (std::size_t c = 0; c < 3; ++c) missing[c] -= area[c];
-    size += length(area);
+    for (std::size_t c = 0; c < 3; ++c) missing[c].add(-area[c]);
+    sizes.add(length(area));
   }
+  Point total{};
+  for (std::size_t c = 0; c < 3; ++c) total[c] = total_of(body, missing[c]);
+  const double size = total_of(body, sizes);
   for (Point& area : areas.area) {
     const double share = length(area) / size;
-    for (std::size_t c = 0; c < 3; ++c) area[c] += share * missing[c];
+    for (std::size_t c = 0; c < 3; ++c) area[c] += share * total[c];
   }
 }
 
 }  // namespace
 
-SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const TermParts& of_rank, const ImageMap* images) {
+SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   if (!load.face.empty()) return of_face(load, parts, images);
   const Body& body = parts.families->body();
-  std::vector<bool> in_set(body.stride(), false);
-  for (const std::int32_t p : body.set(load.set)) in_set[static_cast<std::size_t>(p)] = true;
-  const std::vector<Point> areas = all_areas(load, parts, of_rank);
-  const std::vector<std::int32_t> surface = free_surface(body);
-  if (std::ranges::none_of(surface, [&](std::int32_t p) { return in_set[static_cast<std::size_t>(p)]; })) {
+  std::vector<std::uint8_t> in_set(body.stride(), 0);
+  for (const std::int32_t p : body.set(load.set)) in_set[static_cast<std::size_t>(p)] = 1;
+  const std::vector<Point> areas = all_areas(load, parts);
+  std::vector<SurfacePoint> surface;
+  for (const std::int32_t p : free_surface(body)) {
+    const auto i = static_cast<std::size_t>(p);
+    surface.push_back({body.position(i), body.part() ? body.places().place[i] : p, in_set[i]});
+  }
+  const auto chosen = std::ranges::count_if(surface, [](const SurfacePoint& point) { return point.chosen != 0; });
+  if (counted(chosen).all == 0 && communicator().complete()) {
     throw InputError(load.position, "load.pressure",
                      fmt::format("found on the set \"{}\", none of whose points lies at the free surface of the body; allowed: "
                                  "sets with a free surface",
                                  load.set));
   }
-  const NearestPoint nearest(body, surface, 2 * body.spacing());
+  const double felt = 3 * body.horizon();  // a surface is felt no deeper
+  const NearestPoint nearest(of_ranks_near(body, surface, felt * (1 + 1e-9)), 2 * body.spacing());
   SurfaceAreas found;
-  for (const std::int32_t p : body.owned()) {
-    const std::optional<std::int32_t> at =
-        nearest.to(body.position(static_cast<std::size_t>(p)), 3 * body.horizon());  // a surface is felt no deeper
-    if (at && in_set[static_cast<std::size_t>(*at)]) found.points.push_back(p);
+  for (const std::int32_t p : images ? body.internal() : std::span(body.owned())) {
+    const auto i = static_cast<std::size_t>(p);
+    if (body.image(i)) continue;
+    if (const SurfacePoint* at = nearest.to(body.position(i), felt); at && at->chosen) found.points.push_back(p);
   }
-  const bool whole = body.owned().size() == body.points();
-  if (images) images->append_images(found.points);  // what the evaluation points of the set have of the surface beyond planes
+  if (images) {  // what the evaluation points of the set have of the surface beyond planes
+    images->append_images(found.points);
+    std::vector<std::uint8_t> complete(body.stride(), 0);
+    for (const std::int32_t p : body.complete()) complete[static_cast<std::size_t>(p)] = 1;
+    std::erase_if(found.points, [&](std::int32_t p) { return !complete[static_cast<std::size_t>(p)]; });
+  }
   for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
-  if (body.lattice() && whole) correct_total(body, in_set, found);
+  if (body.lattice() && !images) correct_total(body, in_set, found);
   return found;
 }
 

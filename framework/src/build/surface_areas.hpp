@@ -18,9 +18,9 @@ struct SurfaceAreas {
 /// What of the free surface each point has that lies nearest to a surface point of the load's set, or (face) of that side of the
 /// set. Area vectors are A_i = sum over q of W_q g_qi, the stencils' own, so that a body under the same pressure all around is in
 /// equilibrium point by point; their sum over a closed surface is zero. On lattices the total is that of the free cell faces of
-/// the set. Pair laws have no stencils: theirs are the free cell faces, on lattices only. parts: of the body of all ranks, of_rank: of
-/// the part that this rank has; of a cloud it finds the areas of its own points and of their images, all others are 0. Throws
-/// InputError where the set has no free surface.
-SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const TermParts& of_rank, const ImageMap* images);
+/// the set. Pair laws have no stencils: theirs are the free cell faces, on lattices only. Of a part of a body it finds the areas of
+/// the points whose forces are complete, with all ranks, which must all call it. Throws InputError where the set has no free
+/// surface.
+SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
 
 }  // namespace perikit

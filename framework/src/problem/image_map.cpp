@@ -63,8 +63,7 @@ void ImageMap::append_images(std::vector<std::int32_t>& points) const {
 std::vector<ImageMap::Part> ImageMap::parts_of_all(ConstFieldView reaction) const {
   std::vector<Part> parts;
   for (const Share& share : shares_)
-    // Bodies with images are placed as a whole, whose numbers have 32 bits.
-    parts.push_back({static_cast<std::int32_t>(body_->number(static_cast<std::size_t>(share.image))), share.surface, share.component,
+    parts.push_back({body_->number(static_cast<std::size_t>(share.image)), share.surface, share.component,
                      share.factor * reaction.component(share.component)[share.image]});
   if (body_->places().place.empty()) return parts;
   parts = told_to_all(gathered<Part>(parts));
@@ -77,7 +76,7 @@ void ImageMap::gather(FieldView reaction) const {
   const auto number = [&](std::int32_t p) { return body_->number(static_cast<std::size_t>(p)); };
   for (const Part& part : parts_of_all(reaction)) {
     const auto at = std::ranges::lower_bound(own, part.surface, {}, number);
-    if (at != own.end() && number(*at) == part.surface) reaction.component(part.component)[*at] += part.value;
+    if (at != own.end() && number(*at) == part.surface) reaction.component(static_cast<int>(part.component))[*at] += part.value;
   }
   for (int c = 0; c < reaction.components; ++c)
     for (const std::int32_t p : image_) reaction.component(c)[p] = 0;

@@ -65,6 +65,7 @@ struct LatticePart : LocalPart {
 /// Of a cloud, in the order of the curve, in whole blocks.
 struct CloudPart : LocalPart {
   AlignedVector<double> rows;  ///< {x, y, z, V}, and zeros up to the stride
+  std::int64_t places_of_all_ranks = 0;  ///< along the curve: of points, and of their images
 };
 
 /// What a body is beside its points.
@@ -169,6 +170,10 @@ class Body {
 
   /// Points that belong to this body alone: all of them, but for ghosts and images.
   const std::vector<std::int32_t>& owned() const noexcept { return owned_.empty() ? internal_ : owned_; }
+  /// Whether it is an image of a point: those have the numbers after all points.
+  bool image(std::size_t internal_index) const noexcept {
+    return number(internal_index) >= static_cast<std::int64_t>(points_of_all_ranks_);
+  }
   /// Internal indices in input order. "all": those that the body owns.
   const std::vector<std::int32_t>& set(const std::string& name) const { return name == "all" ? owned() : sets_.at(name); }
   /// Of a part: the input numbers in the whole body of all members of a set, on whatever rank, in its order; empty where they
@@ -189,7 +194,7 @@ class Body {
   void number_lattice(const Lattice& lattice, double volume);
   void number_cloud();
   void copy_sets(const Body& whole, const std::vector<std::int32_t>& place, std::uint16_t others);
-  void place_on_lattice(const Lattice& old, double volume, const std::vector<Point>& positions);
+  void place_on_lattice(const Lattice& lattice, double volume, const std::vector<Point>& positions);
   void place_cloud(const std::vector<Point>& positions, const std::vector<double>& volumes);
   void keep_places(const std::vector<std::int64_t>& places, const std::vector<Role>& roles);
   void keep_far_material(const std::vector<Role>& roles, std::uint16_t far_material);

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,7 +24,8 @@ struct ImagePlane {
   double period = 0;                           ///< [m]; 0: a mirror
   std::array<bool, 3> odd{};                   ///< components whose mirrored displacement has the other sign
   std::array<int, 3> motion{-1, -1, -1};       ///< which motion an odd component has at the plane; -1: none, it is 0 there
-  std::vector<std::int32_t> surface;           ///< by input number: the point at the plane below which it lies, -1: it has no image
+  /// Of a point and its number: the number of the point at the plane below which it lies, -1: it has no image.
+  std::function<std::int64_t(const Point& x, std::int64_t number)> surface;
 };
 
 /// Points of clouds in front of a surface, where the level is negative, have images at the same distance from their feet behind it. All
@@ -39,7 +42,14 @@ struct ImageTerm {
   int component, motion;
   double factor;
   Point at;
-  std::int32_t surface;                        ///< input number, in the whole body
+  std::int64_t surface;                        ///< input number, in the whole body
+};
+
+/// An image on a point of a lattice, or on another image.
+class OverlappingImage : public std::domain_error {
+ public:
+  explicit OverlappingImage(const Point& x);
+  explicit OverlappingImage(const std::string& message) : std::domain_error(message) {}
 };
 
 struct Images {
@@ -49,17 +59,49 @@ struct Images {
   std::vector<std::array<std::int8_t, 3>> sign;
   std::vector<ImageTerm> terms;                ///< ascending by image
   std::vector<Crack> cracks;                   ///< of the body, and their images
+  std::optional<Lattice> lattice;              ///< that has places for the points of a lattice and for its images
 
   std::size_t size() const noexcept { return source.size(); }
 };
 
 /// How far what the points of a body need of others lies from them [m]: gradients of the far ends of bonds take their whole families.
-double halo(const Body& body);
+double halo(double horizon);
 
-/// Images of the points that lie no farther than the halo from planes, axis after axis, so that edges and corners have images of images.
-/// Where there are surfaces, mirrors take their turns until none adds an image, and where several could have one, that behind which it lies
-/// deepest has it; periodic sides come last.
-Images make_images(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
+class TurningMirrors;
+
+/// Images of points that lie no farther than the halo from planes, axis after axis, so that edges and corners have images of images.
+/// Where there are surfaces, mirrors take their turns until none adds an image, and where several could have one, that behind which it
+/// lies deepest has it; periodic sides come last. Each point has its images by itself.
+class ImageMaker {
+ public:
+  /// surfaces: of a cloud, the body, which must outlive the maker.
+  ImageMaker(const Body& body, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
+  /// Without surfaces; reach: the halo.
+  ImageMaker(int dimension, double reach, std::vector<ImagePlane> planes);
+  ~ImageMaker();
+  ImageMaker(ImageMaker&&) noexcept;
+
+  /// Appends the images of a point, with the input number `source`; number: what planes are asked for.
+  void add(const Point& x, std::int64_t number, std::int32_t source, Images& images) const;
+  /// With the images of cracks.
+  std::vector<Crack> cracks(std::vector<Crack> cracks) const;
+  const std::vector<ImagePlane>& planes() const noexcept { return planes_; }
+  /// How far in front of planes points have images [m].
+  double reach() const noexcept { return reach_; }
+
+ private:
+  int dimension_;
+  double reach_;
+  std::vector<ImagePlane> planes_;
+  std::unique_ptr<TurningMirrors> turning_;                   ///< null: without surfaces
+  std::vector<std::vector<std::size_t>> across_;              ///< planes across one axis after the other
+};
+
+/// The images of all points of a body, ascending by the numbers of their sources.
+Images make_images(const Body& body, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
+
+/// The lattice that has places for the cells of another one and for all images that these may have behind planes.
+Lattice with_images(const Lattice& lattice, double horizon, std::vector<ImagePlane> planes);
 
 /// Those of the images of the whole body that a part of it has, by the numbers of the part.
 Images images_of_part(const Images& images, const Body& part);

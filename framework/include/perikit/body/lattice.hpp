@@ -20,6 +20,7 @@ struct Lattice {
   std::array<std::int64_t, 3> extent{1, 1, 1};  ///< cells along the internal axes
   /// Of the lattice that this one is a box of, and where the box begins in it, along axis 0 at a multiple of `padding`.
   std::array<std::int64_t, 3> whole{1, 1, 1}, first{};
+  std::array<std::int64_t, 3> origin{};        ///< where the whole begins, in cells from `lower`: below it where there are images
   std::array<std::int64_t, 3> pitch{0, 0, 0};  ///< pitch[0]: cells from row to row; pitch[1]: rows from plane to plane
   std::int64_t base = 0;
   std::int64_t cells = 0;  ///< size of a field component: a multiple of `padding`
@@ -31,6 +32,11 @@ struct Lattice {
   std::array<std::int64_t, 3> cell(std::int64_t index) const noexcept;
   std::array<double, 3> position(std::int64_t index) const noexcept { return centre(cell(index)); }
   std::array<double, 3> centre(const std::array<std::int64_t, 3>& cell) const noexcept;
+  /// Of a lattice that is no box: the number of a cell in the order of the input, x fastest, and the cell of a number.
+  std::int64_t input_number(const std::array<std::int64_t, 3>& cell) const noexcept;
+  std::array<std::int64_t, 3> cell_of_input(std::int64_t number) const noexcept;
+  /// The cell around a place, which may lie beyond the extent.
+  std::array<std::int64_t, 3> around(const std::array<double, 3>& x) const noexcept;
   std::int64_t shift(const std::array<int, 3>& offset) const noexcept {
     return offset[0] + pitch[0] * (offset[1] + pitch[1] * offset[2]);
   }
@@ -42,6 +48,11 @@ std::int64_t lattice_cells(double lower, double upper, double spacing);
 /// `horizon` limits the padding; offsets beyond the extent of the body never occur and need none.
 Lattice make_lattice(int dimension, double spacing, const std::array<double, 3>& lower, const std::array<double, 3>& upper,
                      double horizon);
+
+/// The cells low ... high - 1 along the axes of the input, counted from the first one of a lattice that is no box: more than that
+/// has, or fewer. Cells that both have are at the same places, bit for bit.
+Lattice regrown(const Lattice& lattice, const std::array<std::int64_t, 3>& low, const std::array<std::int64_t, 3>& high,
+                double horizon);
 
 /// The cells first ... last - 1 (internal axes) of a lattice that is no box itself.
 Lattice box_of(const Lattice& lattice, const std::array<std::int64_t, 3>& first, const std::array<std::int64_t, 3>& last,

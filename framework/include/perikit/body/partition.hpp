@@ -13,7 +13,9 @@
 
 namespace perikit {
 
+class CloudImages;
 class CloudShares;
+class LatticeImages;
 class LatticeShares;
 
 class Partition {
@@ -28,13 +30,15 @@ class Partition {
   /// All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
   /// images, and whoever owns a block has them. Throws std::domain_error where the body has too few blocks for the ranks.
   Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
-  /// Of a lattice without images that no rank has as a whole: `inside` (empty: true) is asked at the cells that the rank is to
-  /// have and no others. shares: what ranks own. All ranks must call it. Throws std::domain_error as above, and where a part has
-  /// more cells than indices can tell apart.
+  /// Of a lattice that no rank has as a whole: `inside` (empty: true) is asked at the cells that the rank is to have and no others.
+  /// shares: what ranks own. images: of the points, where the lattice is one with images; it then says what is inside. All ranks
+  /// must call it. Throws std::domain_error as above, where a part has more cells than indices can tell apart, and where an image
+  /// lies on a point.
   Partition(const BodyFrame& frame, const Lattice& lattice, const LatticeShares& shares,
-            const std::function<bool(const Point&)>& inside, const Reach& reach);
-  /// Of a cloud without images that no rank has as a whole. All ranks must call it. Throws std::domain_error as above.
-  Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach);
+            const std::function<bool(const Point&)>& inside, const Reach& reach, const LatticeImages* images = nullptr);
+  /// Of a cloud that no rank has as a whole. images: of its points, which are among the shares (null: none). All ranks must call it.
+  /// Throws std::domain_error as above.
+  Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach, const CloudImages* images = nullptr);
 
   /// Null where no rank has it.
   const Body* whole() const noexcept { return whole_ ? &*whole_ : nullptr; }

@@ -35,14 +35,15 @@ class ImageMap {
 
  private:
   struct Share {
-    std::int32_t image, surface;               ///< internal index; input number in the whole body
+    std::int32_t image;                        ///< internal index
+    std::int64_t surface;                      ///< input number in the whole body
     std::int32_t component;
     double factor;
   };
   /// What goes to the points at the planes, in the order of their images.
   struct Part {
-    std::int32_t image, surface;               ///< numbers in the whole body
-    std::int32_t component;
+    std::int64_t image, surface;               ///< numbers in the whole body
+    std::int64_t component;
     double value;
   };
   std::vector<Part> parts_of_all(ConstFieldView reaction) const;
