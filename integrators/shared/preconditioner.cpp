@@ -119,20 +119,21 @@ class CompanionCycle final : public Preconditioner {
   std::unique_ptr<MultigridCycle> cycle_;
 };
 
-/// Largest ratio of bulk to shear modulus.
+/// Largest ratio of bulk to shear modulus. All ranks must call it.
 double largest_bulk_ratio(const Problem& problem) {
   double largest = 0;
   for (const std::int32_t p : problem.body().owned()) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
     if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
   }
-  return largest;
+  return communicator().largest(largest);
 }
 
 /// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing of stiffness
-/// against changes of volume, would need too many of them (measured: framework/docs/performance.md).
+/// against changes of volume, would need too many of them (measured: framework/docs/performance.md). Not on several ranks: the assembled tangent
+/// needs the whole body on one.
 bool factorisation_pays(Problem& problem) {
-  if (problem.dimension() == 3) return false;
+  if (problem.dimension() == 3 || communicator().size() > 1) return false;
   const bool few = problem.body().points() <= 4000;
   const bool resists_volume = largest_bulk_ratio(problem) > 1000 && problem.body().space() != Space::plane_stress;
   return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
@@ -184,31 +185,27 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
   const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
-  return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
+  return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
 bool needs_one_rank(const std::string& preconditioner) noexcept {
-  return preconditioner != "auto" && preconditioner != "none" && preconditioner != "companion";
+  return preconditioner == "factorisation" || preconditioner == "jacobi";
 }
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
   chosen = name;
-  // The assembled tangent needs the whole body on one rank.
-  if (name == "auto") chosen = communicator().size() == 1 && factorisation_pays(problem) ? "factorisation" : "companion";
+  if (name == "auto") chosen = factorisation_pays(problem) ? "factorisation" : "companion";
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
-  if (chosen == "companion") {
-    std::string how;
-    auto companion = make_companion_cycle(problem, std::numeric_limits<double>::infinity(), &how);
-    if (!how.empty()) chosen += ", " + how;
-    return companion;
-  }
+  if (chosen == "companion") return make_companion_cycle(problem, std::numeric_limits<double>::infinity(), chosen);
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
   return nullptr;
 }
 
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how) {
-  std::string unasked;
-  return std::make_unique<CompanionCycle>(problem, most_bulk, how ? *how : unasked);
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string& chosen) {
+  std::string how;
+  auto companion = std::make_unique<CompanionCycle>(problem, most_bulk, how);
+  if (!how.empty()) chosen += ", " + how;
+  return companion;
 }
 
 }  // namespace perikit

@@ -61,7 +61,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 
 /// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has
 /// the volumes that they need: the bulk modulus is at least 50 shear moduli somewhere (20 on lattices in 3D, 200 in 2D), and the
-/// factorisation does not pay.
+/// factorisation does not pay, as never on several ranks. All ranks must call it.
 bool mixed_pays(Problem& problem);
 
 /// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.
@@ -73,7 +73,7 @@ bool needs_one_rank(const std::string& preconditioner) noexcept;
 /// `chosen` <- what auto chose, and how the companion is solved on several ranks, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
-/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli. *how <- as of make_multigrid_cycle, where wanted.
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how = nullptr);
+/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli. `chosen` gets how it is solved on several ranks.
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string& chosen);
 
 }  // namespace perikit
