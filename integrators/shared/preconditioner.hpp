@@ -40,9 +40,16 @@ class Preconditioner {
   explicit Preconditioner(Problem& problem);
   /// How many times as many iterations a digit as at first it may take before it is made anew.
   virtual double patience() const noexcept { return 2; }
-  /// Makes it at u. kept: u is not the present state, but where the preconditioner in use was made before the run was
-  /// interrupted.
-  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, bool kept, std::string& failure) = 0;
+  /// Why it is made: it is worn out; bonds have changed, or there is none; or it is to be what it was where it was made, u, which
+  /// is not the present state: after an interruption, and where something in it was older.
+  enum class Occasion { worn, bonds, kept };
+  /// Makes it at u.
+  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) = 0;
+  /// Not -1: something in it comes from one made before, in this load step. A run that goes on from the end of the step cannot
+  /// make it so, and therefore none has it in the next one.
+  virtual std::int64_t alike_within() const noexcept { return -1; }
+  /// Iterations a digit of the first solve with it; 0: none yet.
+  double first_effort() const noexcept { return numbers_[1]; }
 
  private:
   double& made() noexcept { return numbers_[0]; }      ///< 0: not, or not to be kept

@@ -17,7 +17,7 @@ except ImportError as error:
     skip(str(error))
 
 PROGRAM, LIBRARY, WORK = sys.argv[1:]
-THOROUGH = ("2D, two materials on rollers", "mixed, 3D lattice, auto")
+THOROUGH = ("2D, two materials on rollers", "mixed, 3D lattice, auto", "mixed, bonds that fail at a slit")
 DISTRIBUTED, GATHERED = "aggregation of PETSc on all ranks", "solved by the first rank"
 BAQP = 'type = "baqp"'
 STIFF = '[[region]]\nset = "some"\nmaterial = { type = "neo_hookean", density = 1.0, shear_modulus = 20.0, bulk_modulus = 30.0 }\n'
