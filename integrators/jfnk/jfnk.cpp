@@ -5,6 +5,7 @@
 
 #include "../shared/assembled_tangent.hpp"
 #include "mixed_equations.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -97,8 +98,9 @@ void Jfnk::run(Problem& problem, Observer& observer) {
     }
     if (asked)
       throw options_.values.error("preconditioner",
-                                  "found \"mixed\", which needs the point volumes of selective kinematics; allowed here: auto, none, "
-                                  "jacobi, factorisation, companion");
+                                  std::string("found \"mixed\", which needs the point volumes of selective kinematics; allowed here: "
+                                              "auto, none, companion") +
+                                      (communicator().size() == 1 ? ", jacobi, factorisation" : ""));
   }
   auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
   observer.log("jfnk: preconditioner " + chosen);
