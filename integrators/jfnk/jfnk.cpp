@@ -5,6 +5,7 @@
 
 #include "../shared/assembled_tangent.hpp"
 #include "mixed_equations.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -86,19 +87,21 @@ bool KrylovEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double
 }
 
 void Jfnk::run(Problem& problem, Observer& observer) {
+  std::string chosen;
   const bool asked = options_.preconditioner == "mixed";
   if (asked || (options_.preconditioner == "auto" && mixed_pays(problem))) {
     if (std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part()) {
-      observer.log("jfnk: preconditioner mixed");
-      MixedEquations equations(problem, options_, std::move(volumes));
+      chosen = "mixed";
+      MixedEquations equations(problem, options_, std::move(volumes), chosen);
+      observer.log("jfnk: preconditioner " + chosen);
       return run_newton("jfnk", options_.values, problem, observer, equations);
     }
     if (asked)
       throw options_.values.error("preconditioner",
-                                  "found \"mixed\", which needs the point volumes of selective kinematics and the whole body on one "
-                                  "rank; allowed here: auto, none, jacobi, factorisation, companion");
+                                  std::string("found \"mixed\", which needs the point volumes of selective kinematics; allowed here: "
+                                              "auto, none, companion") +
+                                      (communicator().size() == 1 ? ", jacobi, factorisation" : ""));
   }
-  std::string chosen;
   auto preconditioner = make_preconditioner(options_.preconditioner, problem, chosen);
   observer.log("jfnk: preconditioner " + chosen);
   KrylovEquations equations(problem, options_, std::move(preconditioner));

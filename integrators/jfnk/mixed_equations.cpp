@@ -21,11 +21,11 @@ bool say(const std::pair<double, double>& errors, std::string& note) {
 
 }  // namespace
 
-MixedEquations::MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes)
+MixedEquations::MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen)
     : max_restarts_(options.max_restarts),
       restart_(options.restart),
       action_(problem, options.differences),
-      system_(problem, std::move(volumes)),
+      system_(problem, std::move(volumes), chosen),
       right_(system_.make_vector()),
       solution_(system_.make_vector()),
       right_vector_(wrap(problem, right_, context_)),

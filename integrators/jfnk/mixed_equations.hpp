@@ -8,7 +8,8 @@ namespace perikit {
 /// iterations make each product with the preconditioner a little different).
 class MixedEquations final : public LinearisedProblem {
  public:
-  MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes);
+  /// chosen: of MixedSystem.
+  MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen);
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
   bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
   bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,

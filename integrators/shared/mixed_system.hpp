@@ -24,16 +24,18 @@ namespace perikit {
 /// between nearest neighbours do. With S exact, the increments that it gives keep B u = W^-1 p, and only how well M stands for A
 /// counts: a third of the iterations that the upper triangle takes.
 ///
-/// Vectors have `dimension` components of u and one of p. The second row is multiplied by row_scales() of the volume equations.
+/// Vectors have `dimension` components of u and one of p. The second row is multiplied by row_scales() of the volume equations. All
+/// ranks must call everything.
 class MixedSystem {
  public:
   /// Kw <- K w on free components, 0 elsewhere; false where that fails.
   using Product = std::function<bool(ConstFieldView w, FieldView Kw)>;
 
-  MixedSystem(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
+  /// `chosen` gets how the companion is solved on several ranks.
+  MixedSystem(Problem& problem, std::unique_ptr<VolumetricPart> volumes, std::string& chosen)
       : problem_(problem),
         volumes_(problem, std::move(volumes)),
-        cycle_(make_companion_cycle(problem, VolumeEquations::ordinary)) {}
+        cycle_(make_companion_cycle(problem, VolumeEquations::ordinary, chosen)) {}
 
   Field make_vector() const { return problem_.body().make_field(problem_.dimension() + 1); }
   FieldView displacement(FieldView x) const { return {x.data, x.stride, x.components - 1}; }

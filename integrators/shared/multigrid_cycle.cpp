@@ -11,8 +11,9 @@ namespace {
 
 class OneRank final : public MultigridCycle {
  public:
-  void make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid) override {
+  bool make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool) override {
     multigrid_.make(K, free, rigid);
+    return false;
   }
   void apply(ConstFieldView r, FieldView z) override { multigrid_.apply(r, z); }
 
@@ -25,12 +26,13 @@ class Gathered final : public MultigridCycle {
  public:
   explicit Gathered(const Body& body) : first_rank_(body, body.owned()) {}
 
-  void make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid) override {
+  bool make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool) override {
     const BlockMatrix whole = first_rank_.gather(K);
     const Field free_of_all = first_rank_.gather(free);
     std::vector<Field> rigid_of_all;
     for (const Field& motion : rigid) rigid_of_all.push_back(first_rank_.gather(motion));
     if (communicator().rank() == 0) multigrid_.make(whole, free_of_all, rigid_of_all);
+    return false;
   }
 
   void apply(ConstFieldView r, FieldView z) override {

@@ -16,8 +16,9 @@ class MultigridCycle {
  public:
   virtual ~MultigridCycle() = default;
   /// K: of the problem; on several ranks its rows at owned points are complete. free: 1 on free components of these. rigid: the d
-  /// (d + 1)/2 motions of the body as a whole.
-  virtual void make(Problem& problem, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid) = 0;
+  /// (d + 1)/2 motions of the body as a whole. alike: nothing but some entries of K have changed since the last time, so that
+  /// the way to coarser levels may be that of then. Returns whether it is.
+  virtual bool make(Problem& problem, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool alike) = 0;
   /// z <- M^-1 r on free components, 0 elsewhere. r and z may be the same field.
   virtual void apply(ConstFieldView r, FieldView z) = 0;
 };

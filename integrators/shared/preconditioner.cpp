@@ -22,8 +22,8 @@ class Factorisation final : public Preconditioner {
   const AssembledTangent* tangent() const noexcept override { return &tangent_; }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, bool kept, std::string& failure) override {
-    return tangent_.make(equilibrium, u, !kept, failure);
+  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) override {
+    return tangent_.make(equilibrium, u, occasion != Occasion::kept, failure);
   }
   AssembledTangent tangent_;
 };
@@ -46,7 +46,7 @@ class BlockJacobi final : public Preconditioner {
   }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string& failure) override {
+  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion, std::string& failure) override {
     if (!tangent_.assemble(equilibrium, u, false, failure)) return false;
     const BlockMatrix& K = tangent_.matrix();
     const ConstFieldView free = equilibrium.free();
@@ -97,7 +97,8 @@ class BlockJacobi final : public Preconditioner {
   std::vector<double> inverse_;
 };
 
-/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly.
+/// A multigrid cycle on springs between nearest neighbours: time and memory grow with the points, iterations hardly. Where bonds
+/// have failed within a load step it is made like the last one, unless that one took more iterations than one of its own.
 class CompanionCycle final : public Preconditioner {
  public:
   CompanionCycle(Problem& problem, double most_bulk, std::string& how)
@@ -106,33 +107,42 @@ class CompanionCycle final : public Preconditioner {
   void apply(ConstFieldView r, FieldView z) override { cycle_->apply(r, z); }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, bool, std::string&) override {
+  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string&) override {
     Problem& problem = equilibrium.problem();
+    const std::int64_t step = problem.state().step;
+    if (!alike_) own_effort_ = first_effort();
+    const bool alike = occasion == Occasion::bonds && step == step_ && first_effort() <= 1.05 * own_effort_;
     problem.assemble_companion(u, springs_, most_bulk_);
-    cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u));
+    alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u), alike);
+    step_ = occasion == Occasion::kept ? -1 : step;
     return true;
   }
+  std::int64_t alike_within() const noexcept override { return alike_ ? step_ : -1; }
   double patience() const noexcept override { return 1.3; }  // it is cheap
 
   double most_bulk_;  ///< in shear moduli
+  std::int64_t step_ = -1;  ///< in which it was made
+  bool alike_ = false;
+  double own_effort_ = 0;  ///< iterations a digit of the last one that was not made like another
   BlockMatrix springs_;
   std::unique_ptr<MultigridCycle> cycle_;
 };
 
-/// Largest ratio of bulk to shear modulus.
+/// Largest ratio of bulk to shear modulus. All ranks must call it.
 double largest_bulk_ratio(const Problem& problem) {
   double largest = 0;
   for (const std::int32_t p : problem.body().owned()) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
     if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
   }
-  return largest;
+  return communicator().largest(largest);
 }
 
 /// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing of stiffness
-/// against changes of volume, would need too many of them (measured: framework/docs/performance.md).
+/// against changes of volume, would need too many of them (measured: framework/docs/performance.md). Not on several ranks: the assembled tangent
+/// needs the whole body on one.
 bool factorisation_pays(Problem& problem) {
-  if (problem.dimension() == 3) return false;
+  if (problem.dimension() == 3 || communicator().size() > 1) return false;
   const bool few = problem.body().points() <= 4000;
   const bool resists_volume = largest_bulk_ratio(problem) > 1000 && problem.body().space() != Space::plane_stress;
   return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
@@ -147,13 +157,15 @@ Preconditioner::Preconditioner(Problem& problem)
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;
   if (made() == 0 || worn || (wary() != 0 && far_from(equilibrium))) return renew(equilibrium, u, failure);
-  return in_hand_ || (in_hand_ = make(equilibrium, state_, true, failure));
+  if (alike_within() >= 0 && alike_within() != equilibrium.problem().state().step) in_hand_ = false;
+  return in_hand_ || (in_hand_ = make(equilibrium, state_, Occasion::kept, failure));
 }
 
 bool Preconditioner::renew(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   copy(u, state_);
+  const Occasion occasion = made() == 0 ? Occasion::bonds : Occasion::worn;
+  in_hand_ = make(equilibrium, state_, occasion, failure);
   at_first() = lately() = 0;
-  in_hand_ = make(equilibrium, state_, false, failure);
   // A convex tangent serves at its own state only.
   made() = in_hand_ && !convex() ? 1 : 0;
   if (far_from(equilibrium)) wary() = convex() ? 1 : 0;
@@ -184,31 +196,27 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
   const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
-  return problem.dimension() > 1 && communicator().size() == 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
+  return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
 }
 
 bool needs_one_rank(const std::string& preconditioner) noexcept {
-  return preconditioner != "auto" && preconditioner != "none" && preconditioner != "companion";
+  return preconditioner == "factorisation" || preconditioner == "jacobi";
 }
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
   chosen = name;
-  // The assembled tangent needs the whole body on one rank.
-  if (name == "auto") chosen = communicator().size() == 1 && factorisation_pays(problem) ? "factorisation" : "companion";
+  if (name == "auto") chosen = factorisation_pays(problem) ? "factorisation" : "companion";
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
-  if (chosen == "companion") {
-    std::string how;
-    auto companion = make_companion_cycle(problem, std::numeric_limits<double>::infinity(), &how);
-    if (!how.empty()) chosen += ", " + how;
-    return companion;
-  }
+  if (chosen == "companion") return make_companion_cycle(problem, std::numeric_limits<double>::infinity(), chosen);
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);
   return nullptr;
 }
 
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how) {
-  std::string unasked;
-  return std::make_unique<CompanionCycle>(problem, most_bulk, how ? *how : unasked);
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string& chosen) {
+  std::string how;
+  auto companion = std::make_unique<CompanionCycle>(problem, most_bulk, how);
+  if (!how.empty()) chosen += ", " + how;
+  return companion;
 }
 
 }  // namespace perikit

@@ -40,9 +40,16 @@ class Preconditioner {
   explicit Preconditioner(Problem& problem);
   /// How many times as many iterations a digit as at first it may take before it is made anew.
   virtual double patience() const noexcept { return 2; }
-  /// Makes it at u. kept: u is not the present state, but where the preconditioner in use was made before the run was
-  /// interrupted.
-  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, bool kept, std::string& failure) = 0;
+  /// Why it is made: it is worn out; bonds have changed, or there is none; or it is to be what it was where it was made, u, which
+  /// is not the present state: after an interruption, and where something in it was older.
+  enum class Occasion { worn, bonds, kept };
+  /// Makes it at u.
+  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) = 0;
+  /// Not -1: something in it comes from one made before, in this load step. A run that goes on from the end of the step cannot
+  /// make it so, and therefore none has it in the next one.
+  virtual std::int64_t alike_within() const noexcept { return -1; }
+  /// Iterations a digit of the first solve with it; 0: none yet.
+  double first_effort() const noexcept { return numbers_[1]; }
 
  private:
   double& made() noexcept { return numbers_[0]; }      ///< 0: not, or not to be kept
@@ -61,7 +68,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 
 /// Whether mixed systems are predicted to be faster than what `auto` chooses for displacements alone, where the kinematics has
 /// the volumes that they need: the bulk modulus is at least 50 shear moduli somewhere (20 on lattices in 3D, 200 in 2D), and the
-/// factorisation does not pay.
+/// factorisation does not pay, as never on several ranks. All ranks must call it.
 bool mixed_pays(Problem& problem);
 
 /// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.
@@ -73,7 +80,7 @@ bool needs_one_rank(const std::string& preconditioner) noexcept;
 /// `chosen` <- what auto chose, and how the companion is solved on several ranks, for the log.
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen);
 
-/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli. *how <- as of make_multigrid_cycle, where wanted.
-std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string* how = nullptr);
+/// "companion" of a body whose bulk moduli are at most `most_bulk` shear moduli. `chosen` gets how it is solved on several ranks.
+std::unique_ptr<Preconditioner> make_companion_cycle(Problem& problem, double most_bulk, std::string& chosen);
 
 }  // namespace perikit

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
-#include <vector>
 
 #include "block_product.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
@@ -21,22 +20,16 @@ constexpr double full_weight = 50;        // in shear moduli: errors of volumes 
 constexpr double most_with_waves = 1000;  // ratio: beyond it W^-1 loses no waves of bodies of up to 30 points a side, and is faster
 constexpr double small_pressure = 0.1;    // in shear moduli: an error of it leaves the tangent as it is
 
-/// Sum of term(k) over [0, n), block by block in their order: not exact, but the same on any number of threads, and mixed systems are on one rank.
+/// Sum of term(k) over [0, n) and all ranks.
 template <class Term>
 double sum_of(std::size_t n, Term&& term) {
-  std::vector<double> sums(n / padding + 1, 0.0);
-  over_blocks(n, [&](std::size_t begin, std::size_t end) {
-    double sum = 0;
-    for (std::size_t k = begin; k < end; ++k) sum += term(k);
-    sums[begin / padding] = sum;
-  });
-  return std::accumulate(sums.begin(), sums.end(), 0.0);
+  return total_over_ranks(exact_sum(n, term));
 }
 
 }  // namespace
 
 VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPart> volumes)
-    : problem_(problem), volumes_(std::move(volumes)) {
+    : problem_(problem), volumes_(std::move(volumes)), R_(problem) {
   for (Field* scalar : {&W_, &inverse_W_, &active_, &row_scales_, &inverse_diagonal_, &residual_, &direction_, &product_, &first_,
                         &second_, &compliant_})
     *scalar = problem.body().make_field(1);
@@ -79,6 +72,7 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
     inverse_diagonal_.data()[p] = 1 / (inverse_diagonal_.data()[p] + 1 / excess);
   }
   mask(active_, inverse_diagonal_);
+  largest_ratio_ = communicator().largest(largest_ratio_);
   waves_ = largest_ratio_ <= most_with_waves;
   if (waves_) R_.make(companion, inverse_W_);
   return status;
@@ -110,14 +104,17 @@ void VolumeEquations::multiply_commutator(ConstFieldView p, FieldView Mp) {
   mask(inverse_D_, force_);
   // M = C (1 + X)^-1, X = D^-1 C, and 1/(1 + x) by a polynomial on [0, 2], where the eigenvalues of X are.
   copy(force_, power_);
-  for (const double coefficient : {-0.75, 0.22}) {
-    perikit::multiply(*companion_, power_, action_);
+  const auto multiply_scaled = [&](FieldView w) {
+    problem_.share(w);
+    perikit::multiply(*companion_, w, action_);
     mask(inverse_D_, action_);
+  };
+  for (const double coefficient : {-0.75, 0.22}) {
+    multiply_scaled(power_);
     std::swap(power_, action_);
     combine(1, force_, coefficient, power_, force_);
   }
-  perikit::multiply(*companion_, force_, action_);
-  mask(inverse_D_, action_);
+  multiply_scaled(force_);
   rates(action_, Mp);
   if (waves_) {
     R_.multiply(p, product_);
@@ -186,7 +183,7 @@ double VolumeEquations::largest_pressure(ConstFieldView error) const {
     const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
     most = std::max(most, W_.data()[p] * std::abs(error.data[p]) / shear);
   }
-  return most;
+  return communicator().largest(most);
 }
 
 std::pair<double, double> VolumeEquations::correct(ConstFieldView u, ConstFieldView growth, double enough, FieldView du) {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/core/field.hpp"
+#include "perikit/problem/problem.hpp"
 
 namespace perikit {
 
@@ -18,12 +18,16 @@ namespace perikit {
 /// prescribed.
 class WaveCompliance {
  public:
-  /// inverse_W: 0 where a point has no pressure. `companion` must outlive R.
+  /// `problem` must outlive it.
+  explicit WaveCompliance(Problem& problem);
+  /// inverse_W: 0 where a point has no pressure. `companion` is the problem's and must outlive R. All ranks must call it.
   void make(const BlockMatrix& companion, ConstFieldView inverse_W);
-  /// Rp <- R p on the points of the companion.
-  void multiply(ConstFieldView p, FieldView Rp) const;
+  /// Rp <- R p on the points of the companion, 0 at ghosts. All ranks must call it.
+  void multiply(ConstFieldView p, FieldView Rp);
 
  private:
+  Problem& problem_;
+  Field seen_;  ///< p with the values of ghosts; empty where there are none
   const BlockMatrix* companion_ = nullptr;
   std::vector<double> weight_;  ///< e_ij by block; 0 for j = i
   std::vector<double> least_;   ///< W_i^-1/100 by row

@@ -126,6 +126,18 @@ LONG_CLOUD = LONG_CLOUD.replace("[[boundary]]", 'velocity = ["0.1*(x - 16)/16", 
 LONG_CLOUD += '[damage]\ntype = "critical_stretch"\nstretch = 0.02\n'
 
 
+def pulled_open():
+    """A slit that opens in equilibrium, most of it within one load step: its preconditioner is made again and again there."""
+    text = without_velocity(scene('type = "baqp"', 2, False, 'type = "jfnk"\npreconditioner = "companion"\nsteps = 6\ntolerance = 1e-8', cells=[30, 20]))
+    begin, end = text.index("[[load]]"), text.index("[integrator]")
+    text = text[:begin] + '[[boundary]]\nset = "high"\ndisplacement = [1.6, 0]\n' + text[end:]
+    text = text.replace("frames = 3", "frames = 7\ncheckpoint_every = 1").replace('"reaction"]', '"reaction", "damage"]')
+    return text + '[[crack]]\nsegment = [[14.3, 11.2], [14.3, 22]]\n[damage]\ntype = "critical_stretch"\nstretch = 0.08\n'
+
+
+PULLED_OPEN = pulled_open()
+
+
 def output_fails():
     """Rank 0 cannot write a frame; the others wait for it in the next step."""
     folder = WORK + "/output"
@@ -162,20 +174,22 @@ def children(process):
 
 
 def stops():
-    """A signal to one rank, to mpirun, and a rank that is killed: the run goes on from its checkpoint on another number of ranks."""
+    """A signal to one rank, to mpirun, and a rank that is killed: the run goes on from its checkpoint on another number of ranks, in statics on as many."""
     for name, text, target, number, ranks in (
+            ("SIGTERM to one rank, in equilibrium", PULLED_OPEN, lambda p: children(p)[1], signal.SIGTERM, 2),
             ("SIGTERM to one rank", LONG, lambda p: children(p)[1], signal.SIGTERM, 2),
             ("SIGTERM to one rank, with a law that remembers", LONG_MEMORY, lambda p: children(p)[1], signal.SIGTERM, 2),
             ("SIGTERM to one rank, of a cloud", LONG_CLOUD, lambda p: children(p)[1], signal.SIGTERM, 4),
             ("SIGTERM to mpirun", LONG, lambda p: p.pid, signal.SIGTERM, 1),
             ("kill -9 of one rank", LONG, lambda p: children(p)[2], signal.SIGKILL, 1)):
-        whole = WORK + {LONG: "/whole", LONG_MEMORY: "/whole_memory", LONG_CLOUD: "/whole_cloud"}[text]
+        whole = WORK + {LONG: "/whole", LONG_MEMORY: "/whole_memory", LONG_CLOUD: "/whole_cloud", PULLED_OPEN: "/whole_equilibrium"}[text]
+        static = text == PULLED_OPEN
         if not os.path.exists(whole + "/history.csv"):
-            done = run(PROGRAM, text, whole, 0)
+            done = run(PROGRAM, text, whole, ranks if static else 0)
             check(done.returncode == 0, "a run without a stop")
         folder = WORK + "/stopped"
-        process = start(text, folder, 3)
-        wait_for(folder, 3)
+        process = start(text, folder, ranks if static else 3)
+        wait_for(folder, 4 if static else 3)
         began = time.time()
         os.kill(target(process), number)
         _, err = process.communicate(timeout=60)

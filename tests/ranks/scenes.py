@@ -131,7 +131,8 @@ def run(program, text, folder, ranks=1, threads=1, options=(), limit=300, enviro
 
 
 def command(program, file, folder, ranks, threads, options=()):
-    before = ["mpirun", "--oversubscribe", "--bind-to", "none", "-np", str(ranks)] if ranks else []
+    # Ranks that wait let others run: machines are shared.
+    before = ["mpirun", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1", "-np", str(ranks)] if ranks else []
     return before + [program, "run", file, "-o", folder, "--threads", str(threads), "--quiet", *options]
 
 

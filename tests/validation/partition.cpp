@@ -231,6 +231,40 @@ TEST_CASE("partition: the companion of a body in space, of one held at a face, a
     }
 }
 
+TEST_CASE("partition: mixed systems of displacements and pressures on several ranks are those on one") {
+  struct Variant {
+    std::string base;
+    double bulk;       // beyond 1000 shear moduli other equations for pressures
+    std::string what;  // space, face, symmetry, periodic, bonds
+  };
+  for (const auto& [base, bulk, what] :
+       {Variant{"baqp", 300, ""}, Variant{"projection", 5000, ""}, Variant{"bond_associated", 300, "symmetry"}, Variant{"baqp", 5000, "face"},
+        Variant{"sub_horizon", 300, "periodic"}, Variant{"baqp", 300, "bonds"}, Variant{"baqp", 300, "space"}})
+    for (const bool cloud : {false, true}) {
+      INFO(base, ", bulk modulus ", bulk, ", ", what, " ", std::string(cloud ? "cloud" : "lattice"));
+      contract::BodyOptions body = body_of(what == "space" ? 3 : 2, cloud);
+      body.material = fmt::format("type = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = {}", bulk);
+      body.two_materials = false;
+      body.crack = what == "bonds";
+      body.integrator = fmt::format("type = \"jfnk\"\npreconditioner = \"{}\"\nsteps = 2\ntolerance = 1e-9", what == "space" ? "auto" : "mixed");
+      if (what == "symmetry") body.conditions += "[[symmetry]]\naxis = \"y\"\n";
+      if (what == "periodic") body.conditions += "[[periodic]]\naxis = \"y\"\n";
+      const auto replace = [&](const std::string& text, const std::string& other) {
+        body.conditions.replace(body.conditions.find(text), text.size(), other);
+      };
+      // Bonds fail at a crack, by a motion that does not tear the body apart.
+      if (what == "bonds") {
+        body.conditions.resize(body.conditions.find("[[load]]"));
+        body.conditions += "[[boundary]]\nset = \"high\"\ndisplacement = [0.6, 0]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.06\n";
+      } else {
+        replace("force = [0.02, 0.01", "force = [2.0, 1.0");
+      }
+      if (what == "face") replace("set = \"low\"\n", "face = \"-x\"\n");
+      compare(contract::scene_text(body, fmt::format("type = \"selective\"\nbase = \"{}\"", base)), what == "space" ? std::vector{2} : std::vector{2, 3},
+              what == "bonds");
+    }
+}
+
 TEST_CASE("partition: a body that nothing holds is refused on several ranks, too") {
   contract::BodyOptions body = body_of(2, false);
   body.conditions = body.conditions.substr(body.conditions.find("[[load]]"));

@@ -5,7 +5,33 @@ namespace perikit {
 
 namespace {
 
-constexpr int chunks_at_once = batch_points / chunk_points;
+constexpr std::size_t chunks_at_once = batch_points / chunk_points;
+
+/// Chunks of a block that follow each other, no more than go into a batch: indices into LatticeTiles::chunks.
+struct ChunkRun {
+  std::size_t begin, end;
+};
+
+/// Whether a point of the chunk is marked.
+bool any(const std::vector<std::uint8_t>& marked, const LatticeChunk& chunk) {
+  const auto first = marked.begin() + chunk.first;
+  return std::any_of(first, first + chunk_points, [](std::uint8_t here) { return here != 0; });
+}
+
+/// Those that hold marked points.
+std::vector<ChunkRun> chunk_runs(const LatticeTiles& tiles, const std::vector<std::uint8_t>& marked) {
+  std::vector<ChunkRun> runs;
+  for (const LatticeBlock& block : tiles.blocks) {
+    bool joins = false;
+    for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
+      const bool wanted = any(marked, tiles.chunks[c]);
+      if (wanted && joins && runs.back().end - runs.back().begin < chunks_at_once) ++runs.back().end;
+      else if (wanted) runs.push_back({c, c + 1});
+      joins = wanted;
+    }
+  }
+  return runs;
+}
 
 /// B w = Fbar^-T : grad w and B^T q = -div(q Fbar^-T) by the operator that forces are made of: five times as fast as reading b.
 template <int D>
@@ -20,16 +46,26 @@ class LatticeVolumes final : public VolumetricState<D> {
         tiles_(families_.tiles),
         operator_(families_),
         inverse_transpose_(families_.body().make_field(D * D)),
-        flux_(families_.body().make_field(D * D)) {}
+        flux_(families_.body().make_field(D * D)),
+        felt_(marked(this->roles_.felt)),
+        felt_chunks_(chunk_runs(tiles_, felt_)),
+        own_chunks_(chunk_runs(tiles_, marked(this->roles_.own))) {
+    // Families reach beyond the ends of pieces of rows.
+    for (const LatticeRow& row : tiles_.rows) {
+      const auto first = felt_.begin() + row.first;
+      felt_rows_.push_back(std::any_of(first - row.before * chunk_points, first + (row.chunks + row.after) * chunk_points,
+                                       [](std::uint8_t here) { return here != 0; }));
+    }
+  }
 
   std::int64_t linearise(ConstFieldView u) override {
     this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });
     FirstBad bad;
-    over_chunks(u, [&](const LatticeChunk& chunk, const double* H) {
+    over_chunks(felt_chunks_, u, [&](const LatticeChunk& chunk, const double* H) {
       const LatticePattern& pattern = families_.pattern(chunk);
       for (int l = 0; l < chunk_points; ++l) {
-        if (!(families_.live_bits(chunk.first) >> l & 1)) continue;
         const auto p = static_cast<std::size_t>(chunk.first + l);
+        if (!felt_[p]) continue;
         T gradient{};
         for (int c = 0; c < D * D; ++c) gradient(c / D, c % D) = H[c * batch_points + l];
         const std::optional<T> inverse_transpose = this->keep(p, gradient, pattern.singular >> l & 1 ? 0.0 : pattern.left[l]);
@@ -37,16 +73,11 @@ class LatticeVolumes final : public VolumetricState<D> {
         for (int c = 0; c < D * D; ++c) inverse_transpose_.component(c)[p] = (*inverse_transpose)(c / D, c % D);
       }
     });
-    if (bad.point() >= 0) return bad.point();
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      const std::int64_t point = this->find_stiffness(begin, end, this->memory_.mine());
-      if (point >= 0) bad.report(point);
-    });
-    return bad.point();
+    return bad.point() >= 0 ? bad.point() : this->find_stiffnesses();
   }
 
   void rates(ConstFieldView w, FieldView q) const override {
-    over_chunks(w, [&](const LatticeChunk& chunk, const double* H) {
+    over_chunks(own_chunks_, w, [&](const LatticeChunk& chunk, const double* H) {
       for (int l = 0; l < chunk_points; l += pack_width) {
         Pack rate(0.0);
         for (int c = 0; c < D * D; ++c)
@@ -63,6 +94,7 @@ class LatticeVolumes final : public VolumetricState<D> {
       alignas(64) double stress[D * D * chunk_points];
       for (std::size_t c = tiles_.blocks[b].chunk_begin; c < tiles_.blocks[b].chunk_end; ++c) {
         const LatticeChunk& chunk = tiles_.chunks[c];
+        if (!any(felt_, chunk)) continue;
         for (int k = 0; k < D * D; ++k)
           for (int l = 0; l < chunk_points; l += pack_width)
             (-Pack::load(q.data + chunk.first + l) * Pack::load(inverse_transpose_.component(k) + chunk.first + l))
@@ -73,32 +105,35 @@ class LatticeVolumes final : public VolumetricState<D> {
     });
     tiles_.colouring.for_each([&](std::size_t b) {
       const LatticeBlock& block = tiles_.blocks[b];
-      for (std::size_t r = block.row_begin; r < block.row_end; ++r) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, f);
+      for (std::size_t r = block.row_begin; r < block.row_end; ++r)
+        if (felt_rows_[r]) operator_.divergence(tiles_.rows[r], flux_, tiles_.rows[r].first, f);
       for (std::size_t c = block.chunk_begin; c < block.chunk_end && families_.any_broken(); ++c)
-        operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, f);
+        if (any(felt_, tiles_.chunks[c])) operator_.remove_broken(tiles_.chunks[c], flux_, tiles_.chunks[c].first, {}, f);
     });
     tiles_.clear_dead(f);
   }
 
   void squares(ConstFieldView c, FieldView q) const override {
     this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) q.data[this->rows_.point(i)] = square(i, c, this->memory_.mine());
-    });
+    this->over_rows(this->roles_.own, [&](std::size_t i) { q.data[this->rows_.point(i)] = square(i, c, this->memory_.mine()); });
   }
 
  private:
+  /// By internal index: 1 at the points of these block rows.
+  std::vector<std::uint8_t> marked(std::span<const std::int32_t> rows) const {
+    std::vector<std::uint8_t> marks(families_.body().stride(), 0);
+    for (const std::int32_t row : rows) marks[this->rows_.point(static_cast<std::size_t>(row))] = 1;
+    return marks;
+  }
+
   /// visit(chunk, H) with the gradient of w in the lanes of the chunk.
   template <class Visit>
-  void over_chunks(ConstFieldView w, Visit&& visit) const {
-    parallel_for(tiles_.blocks.size(), [&](std::size_t b) {
+  void over_chunks(const std::vector<ChunkRun>& runs, ConstFieldView w, Visit&& visit) const {
+    parallel_for(runs.size(), [&](std::size_t r) {
       alignas(64) double H[D * D * batch_points];
-      const LatticeBlock& block = tiles_.blocks[b];
-      for (std::size_t first = block.chunk_begin; first < block.chunk_end; first += chunks_at_once) {
-        const std::size_t n = std::min<std::size_t>(chunks_at_once, block.chunk_end - first);
-        operator_.gradient(&tiles_.chunks[first], static_cast<int>(n), w, H, batch_points);
-        for (std::size_t k = 0; k < n; ++k) visit(tiles_.chunks[first + k], H + k * chunk_points);
-      }
+      const auto [begin, end] = runs[r];
+      operator_.gradient(&tiles_.chunks[begin], static_cast<int>(end - begin), w, H, batch_points);
+      for (std::size_t c = begin; c < end; ++c) visit(tiles_.chunks[c], H + (c - begin) * chunk_points);
     });
   }
 
@@ -123,8 +158,11 @@ class LatticeVolumes final : public VolumetricState<D> {
   const LatticeFamilies& families_;
   const LatticeTiles& tiles_;
   LatticeOperator<D> operator_;
-  Field inverse_transpose_;        ///< Fbar^-T, 0 in dead cells
+  Field inverse_transpose_;  ///< Fbar^-T, 0 in dead cells, and where nobody feels a stress
   mutable Field flux_;
+  std::vector<std::uint8_t> felt_;
+  std::vector<ChunkRun> felt_chunks_, own_chunks_;
+  std::vector<std::uint8_t> felt_rows_;  ///< by row of the divergence
 };
 
 }  // namespace

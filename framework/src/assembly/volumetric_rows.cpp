@@ -4,6 +4,7 @@
 
 #include "assembly/volumetric_state.hpp"
 #include "perikit/core/dimension.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "spaces/shift.hpp"
 
 namespace perikit {
@@ -23,6 +24,7 @@ class StoredRows final : public VolumetricState<D> {
   using Base = VolumetricState<D>;
   using typename Base::Memory;
   using typename Base::T;
+  using Base::roles_;
   using Base::rows_;
 
  public:
@@ -35,52 +37,40 @@ class StoredRows final : public VolumetricState<D> {
   std::int64_t linearise(ConstFieldView u) override {
     this->memory_.prepare([] { return std::make_unique<Memory>(); });
     FirstBad bad;
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        if (!make_row(i, u, this->memory_.mine())) return bad.report(static_cast<std::int64_t>(rows_.point(i)));
-      const std::int64_t point = this->find_stiffness(begin, end, this->memory_.mine());
-      if (point >= 0) bad.report(point);
+    this->over_rows(roles_.felt, [&](std::size_t i) {
+      if (!make_row(i, u, this->memory_.mine())) bad.report(static_cast<std::int64_t>(rows_.point(i)));
     });
     if (bad.point() >= 0) return bad.point();
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) transpose_row(i);
-    });
-    return -1;
+    this->over_rows(roles_.complete, [&](std::size_t i) { transpose_row(i); });
+    return this->find_stiffnesses();
   }
 
   void rates(ConstFieldView w, FieldView q) const override {
     mirror_.resize(rows_.body().stride());
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) mirror_[rows_.point(i)] = vector_at(w, rows_.point(i));
-    });
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        Vector sum = own_[i] * mirror_[rows_.point(i)];
-        each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * mirror_[far]; });
-        q.data[rows_.point(i)] = total(sum);
-      }
+    parallel_for(rows_.size(), [&](std::size_t i) { mirror_[rows_.point(i)] = vector_at(w, rows_.point(i)); });
+    this->over_rows(roles_.own, [&](std::size_t i) {
+      Vector sum = own_[i] * mirror_[rows_.point(i)];
+      each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * mirror_[far]; });
+      q.data[rows_.point(i)] = total(sum);
     });
   }
 
   void forces(ConstFieldView q, FieldView f) const override {
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t p = rows_.point(i);
-        Vector sum = own_[i] * q.data[p];
-        each(i, column_, [&](const Entry& b, std::size_t far) { sum += widened(b) * q.data[far]; });
-        for (int c = 0; c < D; ++c) f.component(c)[p] = sum[c];
-      }
+    if (rows_.body().part()) fill(0.0, f);
+    this->over_rows(roles_.complete, [&](std::size_t i) {
+      const std::size_t p = rows_.point(i);
+      Vector sum = own_[i] * q.data[p];
+      each(i, column_, [&](const Entry& b, std::size_t far) { sum += widened(b) * q.data[far]; });
+      for (int c = 0; c < D; ++c) f.component(c)[p] = sum[c];
     });
   }
 
   void squares(ConstFieldView c, FieldView q) const override {
-    this->over_batches([&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t p = rows_.point(i);
-        Vector sum = own_[i] * own_[i] * vector_at(c, p);
-        each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * widened(b) * vector_at(c, far); });
-        q.data[p] = total(sum);
-      }
+    this->over_rows(roles_.own, [&](std::size_t i) {
+      const std::size_t p = rows_.point(i);
+      Vector sum = own_[i] * own_[i] * vector_at(c, p);
+      each(i, row_, [&](const Entry& b, std::size_t far) { sum += widened(b) * widened(b) * vector_at(c, far); });
+      q.data[p] = total(sum);
     });
   }
 
@@ -138,7 +128,7 @@ class StoredRows final : public VolumetricState<D> {
     }
   }
 
-  AlignedVector<Vector> own_;      ///< b_ii
+  AlignedVector<Vector> own_;      ///< b_ii; 0, as b_ij, in rows that nobody feels
   std::vector<std::int32_t> far_;  ///< field index by bond
   mutable AlignedVector<Vector> mirror_;
   std::vector<Entry> row_, column_;  ///< b_ij, b_ji by bond

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "assembly/assembly.hpp"
+#include "assembly/row_roles.hpp"
 #include "assembly/volumetric_rows.hpp"
 #include "perikit/core/tensor.hpp"
 
@@ -34,17 +35,25 @@ class VolumetricState : public VolumetricRows {
   explicit VolumetricState(const SpaceParts& parts)
       : parts_(parts),
         rows_(parts.families),
+        roles_(rows_, parts.laws),
         H_(rows_.body().make_field(D * D)),
         share_(rows_.body().make_field(1)),
         logarithms_(rows_.body().make_field(1)),
         stiffness_(rows_.body().make_field(1)) {}
 
-  /// Block rows in batches of the law.
+  /// Some block rows, in batches of the law.
   template <class Body>
-  void over_batches(Body&& body) const {
+  static void over_batches(std::span<const std::int32_t> rows, Body&& body) {
     constexpr auto batch = static_cast<std::size_t>(batch_points);
-    const std::size_t n = rows_.size();
-    parallel_for((n + batch - 1) / batch, [&](std::size_t b) { body(b * batch, std::min(n, (b + 1) * batch)); });
+    parallel_for((rows.size() + batch - 1) / batch,
+                 [&](std::size_t b) { body(rows.subspan(b * batch, std::min(batch, rows.size() - b * batch))); });
+  }
+  /// The same, one by one.
+  template <class Body>
+  static void over_rows(std::span<const std::int32_t> rows, Body&& body) {
+    over_batches(rows, [&](std::span<const std::int32_t> batch) {
+      for (const std::int32_t row : batch) body(static_cast<std::size_t>(row));
+    });
   }
 
   /// Fbar - I of point p.
@@ -65,14 +74,31 @@ class VolumetricState : public VolumetricRows {
     return 1 / (1 + j) * cofactor(add_diagonal(H, 1.0));
   }
 
+  /// Stiffness of the points that are this rank's. Field index of the first one where the law has none, or -1.
+  std::int64_t find_stiffnesses() {
+    FirstBad bad;
+    over_batches(roles_.own, [&](std::span<const std::int32_t> rows) {
+      const std::int64_t point = find_stiffness(rows, memory_.mine());
+      if (point >= 0) bad.report(point);
+    });
+    return bad.point();
+  }
+
+  SpaceParts parts_;
+  BlockRows rows_;
+  RowRoles roles_;
+  mutable PerThread<Memory> memory_;
+
+ private:
   /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. Field index of a point
   /// where the law has none, or -1.
-  std::int64_t find_stiffness(std::size_t begin, std::size_t end, Memory& m) {
-    const int n = static_cast<int>(end - begin);
+  std::int64_t find_stiffness(std::span<const std::int32_t> batch_rows, Memory& m) {
+    const int n = static_cast<int>(batch_rows.size());
+    const auto row = [&](int l) { return static_cast<std::size_t>(batch_rows[static_cast<std::size_t>(l)]); };
     for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
-      const T H = l < n ? gradient(rows_.point(begin + static_cast<std::size_t>(l))) : T{}, F = add_diagonal(H, 1.0);
+      const T H = l < n ? gradient(rows_.point(row(l))) : T{}, F = add_diagonal(H, 1.0);
       for (int c = 0; c < S::components; ++c) m.H[c * batch_points + l] = H[c], m.F[c * batch_points + l] = l < n ? F[c] : 0.0;
-      m.owner[l] = static_cast<std::int32_t>(rows_.point(begin + static_cast<std::size_t>(std::min(l, n - 1))));
+      m.owner[l] = static_cast<std::int32_t>(rows_.point(row(std::min(l, n - 1))));
     }
     parts_.laws.prepare(m.law, false);
     LawBatch batch;
@@ -85,7 +111,7 @@ class VolumetricState : public VolumetricRows {
     const Status status = parts_.laws.evaluate(batch, m.law);
     if (!status.ok()) return m.owner[status.inadmissible];
     for (int l = 0; l < n; ++l) {
-      const std::size_t i = begin + static_cast<std::size_t>(l), p = rows_.point(i);
+      const std::size_t i = row(l), p = rows_.point(i);
       double sum = 0;
       for (int c = 0; c < S::components; ++c)
         sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
@@ -95,11 +121,6 @@ class VolumetricState : public VolumetricRows {
     return -1;
   }
 
-  SpaceParts parts_;
-  BlockRows rows_;
-  mutable PerThread<Memory> memory_;
-
- private:
   Field H_;                        ///< Fbar - I at the state of the rows
   Field share_;                    ///< c of the selective map
   Field logarithms_, stiffness_;

@@ -13,7 +13,7 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
   if (communicator().size() == 1 || integrator.several_ranks) return;
   throw InputError(scene.integrator->values.position("type"), "integrator.type",
                    fmt::format("found \"{}\" on {} ranks; allowed: integrators that need no matrix (explicit ones; Krylov solvers with "
-                               "preconditioner = \"companion\" or \"none\"), or one rank with many threads (--threads)",
+                               "preconditioner = \"companion\", \"mixed\" of jfnk, or \"none\"), or one rank with many threads (--threads)",
                                scene.integrator->type, communicator().size()));
 }
 

@@ -76,15 +76,22 @@ BodyProblem::Seen BodyProblem::seen(ConstFieldView u, Field& memory) {
     images()->extend(memory);
     return {memory, nullptr};
   }
-  if (ghosts_) ghosts_->forward(Seen::writable(u));
-  return {u, ghosts()};
+  return shared(u);
+}
+
+BodyProblem::Seen BodyProblem::shared(ConstFieldView field) {
+  if (ghosts_) ghosts_->forward(Seen::writable(field));
+  return {field, ghosts()};
+}
+
+void BodyProblem::settle(FieldView force) const {
+  if (images()) images()->fold(force);
+  if (ghosts_) ghosts_->clear(force);
 }
 
 void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
-  if (images() && status.ok()) images()->fold(force);
-  if (!ghosts_) return;
-  agree(status);
-  if (status.ok()) ghosts_->clear(force);
+  if (ghosts_) agree(status);
+  if (status.ok()) settle(force);
 }
 
 template <class Fill>

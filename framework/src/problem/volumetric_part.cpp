@@ -1,50 +1,45 @@
 #include "perikit/problem/volumetric_part.hpp"
 
 #include "assembly/volumetric_rows.hpp"
-#include "perikit/core/field_operations.hpp"
 #include "perikit/problem/body_problem.hpp"
 
 namespace perikit {
 
-namespace {
-
 /// Rows over all points that the terms see, between displacements and forces of the problem.
-class SeenVolumes final : public VolumetricPart {
+class BodyProblem::Volumes final : public VolumetricPart {
  public:
-  SeenVolumes(const Terms& terms, std::unique_ptr<VolumetricRows> rows, const ImageMap* images, Field seen)
-      : terms_(terms), rows_(std::move(rows)), images_(images), seen_(std::move(seen)) {}
+  Volumes(BodyProblem& problem, std::unique_ptr<VolumetricRows> rows)
+      : problem_(problem), rows_(std::move(rows)), memory_(problem.images() ? problem.make_field() : Field()) {}
 
-  EvaluationStatus linearise(ConstFieldView u) override { return terms_.status(rows_->linearise(seen(u))); }
-  void rates(ConstFieldView w, FieldView q) const override { rows_->rates(seen(w), q); }
-  void forces(ConstFieldView q, FieldView f) const override {
-    rows_->forces(q, f);
-    if (images_) images_->fold(f);
+  EvaluationStatus linearise(ConstFieldView u) override {
+    EvaluationStatus status = problem_.terms().status(rows_->linearise(problem_.seen(u, memory_)));
+    problem_.finish({}, status);
+    return status;
   }
-  void squares(ConstFieldView c, FieldView q) const override { rows_->squares(c, q); }
+  void rates(ConstFieldView w, FieldView q) const override { own(q, [&] { rows_->rates(problem_.seen(w, memory_), q); }); }
+  void forces(ConstFieldView q, FieldView f) const override {
+    rows_->forces(problem_.shared(q), f);
+    problem_.settle(f);
+  }
+  void squares(ConstFieldView c, FieldView q) const override { own(q, [&] { rows_->squares(problem_.shared(c), q); }); }
   ConstFieldView logarithms() const override { return rows_->logarithms(); }
   ConstFieldView stiffness() const override { return rows_->stiffness(); }
 
  private:
-  ConstFieldView seen(ConstFieldView u) const {
-    if (!images_) return u;
-    copy(u, seen_);
-    images_->extend(seen_);
-    return seen_;
+  template <class Fill>
+  void own(FieldView q, Fill&& fill) const {
+    fill();
+    if (problem_.ghosts()) problem_.ghosts()->clear(q);
   }
 
-  const Terms& terms_;
+  BodyProblem& problem_;
   std::unique_ptr<VolumetricRows> rows_;
-  const ImageMap* images_;
-  mutable Field seen_;
+  mutable Field memory_;
 };
 
-}  // namespace
-
 std::unique_ptr<VolumetricPart> BodyProblem::volumetric_part() {
-  if (parts_.partition) return nullptr;
   std::unique_ptr<VolumetricRows> rows = terms().volumetric_rows();
-  if (!rows) return nullptr;
-  return std::make_unique<SeenVolumes>(terms(), std::move(rows), images(), images() ? make_field() : Field());
+  return rows ? std::make_unique<Volumes>(*this, std::move(rows)) : nullptr;
 }
 
 }  // namespace perikit

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "perikit/core/block_matrix.hpp"
+#include "perikit/core/communicator.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "perikit/operators/laws.hpp"
 #include "perikit/problem/volumetric_part.hpp"
 
@@ -17,11 +19,21 @@ constexpr double nearly_incompressible = 500;
 constexpr double ordinary_bulk = 5.0 / 3;  // of the companion, of which only the pattern counts
 constexpr double noticed = 0.01;
 
+/// On whatever rank.
 bool has_nearly_incompressible(const Problem& problem) {
-  return std::ranges::any_of(problem.body().owned(), [&](std::int32_t index) {
+  const bool here = std::ranges::any_of(problem.body().owned(), [&](std::int32_t index) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(index));
     return moduli.mu > 0 && moduli.bulk() >= nearly_incompressible * moduli.mu;
   });
+  return communicator().largest(here ? 1.0 : 0.0) > 0;
+}
+
+/// By point, of ghosts, too.
+Field shared(Problem& problem, ConstFieldView of_owners) {
+  Field all = problem.body().make_field(1);
+  for (const std::int32_t p : problem.body().owned()) all.data()[p] = of_owners.data[p];
+  problem.share(all);
+  return all;
 }
 
 }  // namespace
@@ -34,10 +46,12 @@ double energy_of_alternating_volumes(Problem& problem, ConstFieldView u) {
   if (!problem.evaluate_forces(u, force, &strain_energy).ok() || !(strain_energy > 0)) return 0;
   BlockMatrix neighbours;
   problem.assemble_companion(u, neighbours, ordinary_bulk);
-  const double *logarithm = volumes->logarithms().data, *stiffness = volumes->stiffness().data;
-  double energy = 0;
+  const Field logarithms = shared(problem, volumes->logarithms()), stiffnesses = shared(problem, volumes->stiffness());
+  const double *logarithm = logarithms.data(), *stiffness = stiffnesses.data();
+  ExactSum energy;
   for (std::size_t r = 0; r < neighbours.rows(); ++r) {
     const auto point = static_cast<std::size_t>(neighbours.point[r]);
+    if (!problem.body().owns(point)) continue;
     if (stiffness[point] < nearly_incompressible * problem.laws().moduli(point).mu * problem.body().volume(point)) continue;
     double sum = 0;
     int count = 0;
@@ -50,9 +64,9 @@ double energy_of_alternating_volumes(Problem& problem, ConstFieldView u) {
     }
     if (count == 0) continue;
     const double alternating = logarithm[point] - sum / count;
-    energy += stiffness[point] * alternating * alternating / 2;
+    energy.add(stiffness[point] * alternating * alternating / 2);
   }
-  return energy / strain_energy;
+  return total_over_ranks(energy) / strain_energy;
 }
 
 std::string warn_of_alternating_volumes(Problem& problem, ConstFieldView u) {

@@ -27,7 +27,8 @@ namespace {
 /// GAMG: two steps of a Chebyshev polynomial of D^-1 K. Aggregates are points with all their neighbours, on every level, but for
 /// springs that have lost most of their stiffness with their bonds. Single rows are faster than rows that share a pattern
 /// (inode).
-constexpr const char* options = "-pc_type gamg -pc_gamg_aggressive_coarsening 10 -pc_gamg_threshold 0.02 -mat_no_inode";
+constexpr const char* options = 
+    "-pc_type gamg -pc_gamg_aggressive_coarsening 10 -pc_gamg_threshold 0.02 -pc_gamg_reuse_interpolation -mat_no_inode";
 
 /// The way to P^T K P. The fast one of several ranks adds what comes from others as it arrives: from two of them in other bits
 /// every time.
@@ -101,24 +102,31 @@ class Cycle final : public MultigridCycle {
     if (std::uncaught_exceptions() == 0) clear();
   }
 
-  void make(Problem& problem, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid) override {
+  bool make(Problem& problem, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool alike) override {
+    if (alike && unknowns_) {
+      if (ranks_ != MPI_COMM_NULL) renew(K);
+      return true;
+    }
     initialise();
     clear();
     unknowns_.emplace(problem, K, free);
     // Ranks without unknowns stay away.
     const MPI_Comm all = *static_cast<MPI_Comm*>(communicator().mpi());
     MPI_Comm_split(all, unknowns_->mine() > 0 ? 0 : MPI_UNDEFINED, communicator().rank(), &ranks_);
-    if (ranks_ == MPI_COMM_NULL) return;
+    if (ranks_ == MPI_COMM_NULL) return false;
     int size = 0;
     MPI_Comm_size(ranks_, &size);
     check(PetscOptionsSetValue(nullptr, "-matptap_via", product(size)));
+    allocate(K);
     fill(K);
+    check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
     attach(rigid);
     check(PCCreate(ranks_, &cycle_));
     check(PCSetOperators(cycle_, matrix_, matrix_));
     check(PCSetFromOptions(cycle_));
     check(PCSetUp(cycle_));
     check(MatCreateVecs(matrix_, &z_, &r_));
+    return false;
   }
 
   void apply(ConstFieldView r, FieldView z) override {
@@ -144,7 +152,14 @@ class Cycle final : public MultigridCycle {
     if (ranks_ != MPI_COMM_NULL) MPI_Comm_free(&ranks_);
   }
 
-  void fill(const BlockMatrix& K) {
+  /// Other values of the same pattern. Prolongations are the old ones, matrices of coarse levels and smoothers are made anew.
+  void renew(const BlockMatrix& K) {
+    fill(K);
+    check(PCSetOperators(cycle_, matrix_, matrix_));
+    check(PCSetUp(cycle_));
+  }
+
+  void allocate(const BlockMatrix& K) {
     const std::int64_t n = unknowns_->mine(), first = unknowns_->before(), d = unknowns_->dimension();
     std::vector<PetscInt> here(static_cast<std::size_t>(n), 0), elsewhere(here);
     std::int64_t entries = 0;
@@ -160,14 +175,16 @@ class Cycle final : public MultigridCycle {
     check(MatSetType(matrix_, MATAIJ));
     check(MatSetBlockSize(matrix_, block));
     check(MatXAIJSetPreallocation(matrix_, block, here.data(), elsewhere.data(), nullptr, nullptr));
-    for (std::int64_t k = 0; k < n; ++k)
+  }
+
+  void fill(const BlockMatrix& K) {
+    for (std::int64_t k = 0; k < unknowns_->mine(); ++k)
       unknowns_->over_row(K, k, [&](std::int64_t column, const double* values) {
-        const auto row = static_cast<PetscInt>(first + k), at = static_cast<PetscInt>(column);
+        const auto row = static_cast<PetscInt>(unknowns_->before() + k), at = static_cast<PetscInt>(column);
         check(MatSetValuesBlocked(matrix_, 1, &row, 1, &at, values, INSERT_VALUES));
       });
     check(MatAssemblyBegin(matrix_, MAT_FINAL_ASSEMBLY));
     check(MatAssemblyEnd(matrix_, MAT_FINAL_ASSEMBLY));
-    check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
   }
 
   /// What the coarse levels are to represent.

@@ -106,6 +106,7 @@ class BodyProblem final : public Problem {
 
  private:
   class Damaged;
+  class Volumes;
   class Weakening;
 
   ProblemParts parts_;
@@ -131,9 +132,13 @@ class BodyProblem final : public Problem {
 
   /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
   Seen seen(ConstFieldView u, Field& memory);
+  /// A field with the values of ghosts, without images.
+  Seen shared(ConstFieldView field);
   /// Whether evaluations may begin before the values of ghosts are there: images follow them at once.
   bool meanwhile() const noexcept { return ghosts_ && !images(); }
-  /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
+  /// Forces of the terms -> those of the problem: of images they go to where they belong, those on ghosts are nobody's.
+  void settle(FieldView force) const;
+  /// Ends an evaluation: one status for all ranks, and forces of the problem.
   void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
   template <class Fill>

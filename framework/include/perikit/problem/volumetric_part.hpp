@@ -13,11 +13,12 @@ namespace perikit {
 ///   (B w)_i = tr(Fbar_i^-1 dFbar_i) = d(ln Jbar_i) w,   Fbar the point gradient:
 ///
 /// where a body has far more bulk than shear modulus, pressures p = W B u as further unknowns make its equations well
-/// conditioned. Fields of displacements and forces have `dimension` components, those of volumes and pressures one.
+/// conditioned. Fields of displacements and forces have `dimension` components, those of volumes and pressures one. On several
+/// ranks fields are zero at ghosts, as all of a problem are, and all ranks must call what takes one.
 class VolumetricPart {
  public:
   virtual ~VolumetricPart() = default;
-  /// B at u, with the bonds as they are, from now on. Not ok where u is inadmissible.
+  /// B at u, with the bonds as they are, from now on. Not ok where u is inadmissible, on whatever rank.
   virtual EvaluationStatus linearise(ConstFieldView u) = 0;
   /// q <- B w [-], 0 at dead points.
   virtual void rates(ConstFieldView w, FieldView q) const = 0;
@@ -25,7 +26,7 @@ class VolumetricPart {
   virtual void forces(ConstFieldView q, FieldView f) const = 0;
   /// q <- the diagonal of B C B^T, C = diag(c).
   virtual void squares(ConstFieldView c, FieldView q) const = 0;
-  /// ln Jbar by point, of the state of B.
+  /// ln Jbar by point, of the state of B. This and `stiffness` are of the points that a rank owns, and nobody's at ghosts.
   virtual ConstFieldView logarithms() const = 0;
   /// By point: the second derivative of its energy where its volume grows alone, d^2/d(ln Jbar)^2 [J]; 0 where there is no
   /// energy.
