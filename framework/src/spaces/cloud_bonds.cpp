@@ -18,14 +18,17 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
       gradient_of_(families_, formulation_.order),
       upper_(points_),
-      scale_(points_),
-      u_(points_),
+      scale_(families_.body().stride()),
+      pieces_(families_.body()),
+      u_(pieces_.size()),
       gradient_(D * points_),
       flux_(D * points_),
       force_(points_) {
-  const BlockReach reach = cloud_reach(families_.lists(), blocks_);
-  colouring_ = cloud_colouring(families_.body(), families_.lists(), blocks_, reach);
+  BlockReach reach = cloud_reach(families_.body(), families_.lists());
+  sequence_ = BlockSequence(reach);
   quiet_ = parts.quiet_blocks(reach);
+  reach.elsewhere.clear();  // everything has arrived before the first block scatters
+  colouring_ = cloud_colouring(families_.body(), families_.lists(), blocks_, reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
@@ -315,7 +318,7 @@ void CloudBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   const bool tangent = pass.work.tangent();
-  mirror_rows(pass.u, points_, u_, scale_.data());
+  ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival, scale_.data());
   if (tangent) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
@@ -323,16 +326,18 @@ void CloudBonds<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(last, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
+    quiet_.look(last, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   // Each pass reads what the one before it left at one family's reach.
   const auto awake = [&](auto&& block) {
     return [&](std::size_t b) {
       if (quiet_.awake(b, 2)) block(b);
     };
   };
-  parallel_for(blocks_.count(), [&](std::size_t b) {
-    if (quiet_.begins(b)) gradients(b, pass);
-  });
+  sequence_.for_each(
+      [&](std::size_t b) {
+        if (quiet_.begins(b)) gradients(b, pass);
+      },
+      &arrival);
   if (pass.alone()) return parallel_for(blocks_.count(), [&](std::size_t b) { bonds(b, pass); });
   colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
   if (selective_) parallel_for(blocks_.count(), awake([&](std::size_t b) { pressures(b, pass); }));

@@ -131,8 +131,6 @@ class BodyProblem final : public Problem {
 
   /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
   Seen seen(ConstFieldView u, Field& memory);
-  /// Whether evaluations may begin before the values of ghosts are there: images follow them at once.
-  bool meanwhile() const noexcept { return ghosts_ && !images(); }
   /// Ends an evaluation: forces on images go to where they belong, those on ghosts are nobody's; one status for all ranks.
   void finish(FieldView force, EvaluationStatus& status);
   /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
