@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "perikit/core/communicator.hpp"
@@ -61,6 +62,10 @@ class ThreadRank final : public Communicator {
           if (theirs.rank == rank_) std::copy(theirs.to.begin(), theirs.to.end(), message.from.begin());
     });
   }
+  /// Nothing arrives before somebody waits.
+  std::unique_ptr<ExchangePlan> plan_exchange(std::vector<Message> messages) override {
+    return std::make_unique<Plan>(*this, std::move(messages));
+  }
   std::vector<std::vector<std::byte>> gather(std::span<const std::byte> bytes) override {
     meeting_.bytes[mine()].assign(bytes.begin(), bytes.end());
     std::vector<std::vector<std::byte>> all;
@@ -76,8 +81,23 @@ class ThreadRank final : public Communicator {
   [[noreturn]] void abort(int status) noexcept override { std::_Exit(status); }
 
   int exchanges = 0;
+  int looks = 0;  ///< that did not wait for what was on its way
 
  private:
+  class Plan final : public ExchangePlan {
+   public:
+    Plan(ThreadRank& rank, std::vector<Message> messages) : rank_(rank), messages_(std::move(messages)) {}
+    void start() override {}
+    bool done(bool wait) override {
+      if (wait) rank_.exchange(messages_);
+      else ++rank_.looks;
+      return wait;
+    }
+
+   private:
+    ThreadRank& rank_;
+    std::vector<Message> messages_;
+  };
   std::size_t mine() const noexcept { return static_cast<std::size_t>(rank_); }
   /// Reads what all have written, before any writes again.
   template <class Read>

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <set>
 
+#include "core/following_arrival.hpp"
 #include "families/quiet_blocks.hpp"
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/loop_times.hpp"
@@ -109,6 +110,45 @@ TEST_CASE("blocks that read what arrives run after it, those that wait for them 
     }
   }
   set_thread_count(threads);
+}
+
+namespace {
+
+class Follower final : public FollowingArrival {
+ public:
+  explicit Follower(Late* first) : FollowingArrival(first), first_(first) {}
+  int put_after = 0, put_before = 0;
+
+ private:
+  void put() override { ++(first_->there ? put_after : put_before); }
+  Late* first_;
+};
+
+}  // namespace
+
+TEST_CASE("what follows something that arrives is put there once, after it") {
+  Late first;
+  first.start();
+  Follower looked(&first);
+  for (int look = 0; look < 3; ++look) looked.look();
+  CHECK(looked.pending());
+  CHECK(looked.put_after == 0);
+  looked.look();
+  looked.finish();
+  CHECK_FALSE(looked.pending());
+  CHECK(looked.put_before == 0);
+  CHECK(looked.put_after == 1);
+  first.start();
+  Follower waited(&first);
+  waited.finish();
+  CHECK(waited.put_before == 0);
+  CHECK(waited.put_after == 1);
+  // What has arrived before is followed by nothing.
+  Follower late(&first);
+  CHECK_FALSE(late.pending());
+  late.finish();
+  CHECK(late.put_after == 0);
+  CHECK_FALSE(Follower(nullptr).pending());
 }
 
 TEST_CASE("quiet blocks: what is not here yet is looked at where something rests, and counts as moving where nothing does") {

@@ -5,12 +5,21 @@
 #include <utility>
 
 #include "body/block_colours.hpp"
+#include "perikit/body/body.hpp"
 
 namespace perikit {
 
 bool BlockReach::late(std::size_t b) const noexcept {
   return !elsewhere.empty() &&
          std::ranges::any_of(touches[b], [&](std::int32_t unit) { return elsewhere[static_cast<std::size_t>(unit)] != 0; });
+}
+
+std::vector<std::uint8_t> arriving_points(const Body& body) {
+  if (!body.part()) return {};
+  std::vector<std::uint8_t> arriving(body.stride(), 0);
+  for (const std::int32_t p : body.internal()) arriving[static_cast<std::size_t>(p)] = 1;
+  for (const std::int32_t p : body.owned()) arriving[static_cast<std::size_t>(p)] = 0;
+  return arriving;
 }
 
 std::vector<std::int32_t> free_colours(const BlockReach& reach) {

@@ -11,6 +11,8 @@
 
 namespace perikit {
 
+class Body;
+
 /// One byte by group of eight points (internal index / 8): where something has to be evaluated.
 using GroupMarks = std::vector<std::uint8_t>;
 
@@ -19,11 +21,15 @@ struct BlockReach {
   std::size_t units = 0;
   std::vector<std::int32_t> own;                   ///< unit of block b
   std::vector<std::vector<std::int32_t>> touches;  ///< units that hold the points of block b and of all their families
-  std::vector<std::uint8_t> elsewhere;             ///< by unit: whether it holds points of other ranks; empty: none does
+  std::vector<std::uint8_t> elsewhere;             ///< by unit: whether it holds points whose values arrive; empty: none does
 
   /// Whether block b reads what comes from other ranks.
   bool late(std::size_t b) const noexcept;
 };
+
+/// By internal index, of a part of a body: 1 where values come from other ranks: of ghosts, and of all images, which follow their sources.
+/// Empty: this is no part.
+std::vector<std::uint8_t> arriving_points(const Body& body);
 
 /// All blocks, those first that read nothing of other ranks.
 class BlockSequence {

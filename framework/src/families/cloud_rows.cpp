@@ -7,14 +7,49 @@
 
 namespace perikit {
 
+namespace {
+
+Row mirrored(ConstFieldView u, const double* fourth, std::size_t p) noexcept {
+  Row row{};
+  for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
+  if (fourth) row[3] = fourth[p];
+  return row;
+}
+
+}  // namespace
+
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth) {
   rows.resize(points);
-  pieces_of(points).over_points([&](std::size_t p) {
-    Row row{};
-    for (int c = 0; c < u.components; ++c) row[c] = u.component(c)[p];
-    if (fourth) row[3] = fourth[p];
-    rows[p] = row;
-  });
+  pieces_of(points).over_points([&](std::size_t p) { rows[p] = mirrored(u, fourth, p); });
+}
+
+ArrivingPieces::ArrivingPieces(const Body& body) : size_(body.stride()) {
+  const std::vector<std::uint8_t> arriving = arriving_points(body);
+  const CloudBlocks blocks = pieces_of(size_);
+  for (std::size_t b = 0; b < blocks.count(); ++b)
+    for (std::size_t begin = blocks.begin(b), end = begin; begin < blocks.end(b); begin = end) {
+      const auto same = [&](std::size_t p) { return arriving.empty() || arriving[p] == arriving[begin]; };
+      while (end < blocks.end(b) && same(end)) ++end;
+      pieces_.push_back({static_cast<std::int32_t>(begin), static_cast<std::int32_t>(end)});
+    }
+  const auto late = std::ranges::stable_partition(
+      pieces_, [&](const Piece& piece) { return arriving.empty() || arriving[static_cast<std::size_t>(piece.begin)] == 0; });
+  here_ = pieces_.size() - late.size();
+}
+
+ArrivingRows::ArrivingRows(const ArrivingPieces& pieces, ConstFieldView u, AlignedVector<Row>& rows, Arrival* first, const double* fourth)
+    : FollowingArrival(first), pieces_(pieces), u_(u), rows_(rows), fourth_(fourth) {
+  rows.resize(pieces.size());
+  const std::span<const ArrivingPieces::Piece> known = pending() ? pieces.here() : pieces.all();
+  parallel_for(known.size(), [&](std::size_t k) { mirror(known[k]); });
+}
+
+void ArrivingRows::put() {
+  for (const ArrivingPieces::Piece& piece : pieces_.arriving()) mirror(piece);
+}
+
+void ArrivingRows::mirror(const ArrivingPieces::Piece& piece) noexcept {
+  for (auto p = static_cast<std::size_t>(piece.begin); p < static_cast<std::size_t>(piece.end); ++p) rows_[p] = mirrored(u_, fourth_, p);
 }
 
 BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks) {
@@ -35,6 +70,16 @@ BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks) {
     std::sort(units.begin(), units.end());
     units.erase(std::unique(units.begin(), units.end()), units.end());
   }
+  return reach;
+}
+
+BlockReach cloud_reach(const Body& body, const FamilyLists& families) {
+  const CloudBlocks blocks(body);
+  BlockReach reach = cloud_reach(families, blocks);
+  const std::vector<std::uint8_t> arriving = arriving_points(body);
+  if (!arriving.empty()) reach.elsewhere.assign(reach.units, 0);
+  for (std::size_t p = 0; p < body.points() && !arriving.empty(); ++p)
+    if (arriving[p]) reach.elsewhere[blocks.of(p)] = 1;
   return reach;
 }
 

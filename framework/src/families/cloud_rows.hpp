@@ -2,7 +2,11 @@
 /// What the loops over clouds share: point-major mirrors of fields, and blocks of points.
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
 
+#include "core/following_arrival.hpp"
 #include "families/blocks.hpp"
 #include "families/counted_row.hpp"
 #include "perikit/body/body.hpp"
@@ -48,8 +52,45 @@ inline CloudBlocks pieces_of(std::size_t points) noexcept { return {points, 256}
 /// rows[p] <- components of u at p, zero in the rest, and fourth[p] in the last place where it is given.
 void mirror_rows(ConstFieldView u, std::size_t points, AlignedVector<Row>& rows, const double* fourth = nullptr);
 
+/// All internal indices of a body, in pieces of which what is there arrives from other ranks, or does not.
+class ArrivingPieces {
+ public:
+  explicit ArrivingPieces(const Body& body);
+
+  struct Piece {
+    std::int32_t begin, end;
+  };
+  std::span<const Piece> here() const noexcept { return {pieces_.data(), here_}; }
+  std::span<const Piece> arriving() const noexcept { return {pieces_.data() + here_, pieces_.size() - here_}; }
+  std::span<const Piece> all() const noexcept { return pieces_; }
+  std::size_t size() const noexcept { return size_; }  ///< the stride of the body
+
+ private:
+  std::size_t size_;
+  std::vector<Piece> pieces_;  ///< those first that are here
+  std::size_t here_ = 0;
+};
+
+/// A mirror of u at all internal indices, as mirror_rows makes it; of what arrives when it does.
+class ArrivingRows final : public FollowingArrival {
+ public:
+  /// first: of u; null: it is there.
+  ArrivingRows(const ArrivingPieces& pieces, ConstFieldView u, AlignedVector<Row>& rows, Arrival* first, const double* fourth = nullptr);
+
+ private:
+  void put() override;
+  void mirror(const ArrivingPieces::Piece& piece) noexcept;
+
+  const ArrivingPieces& pieces_;
+  ConstFieldView u_;
+  AlignedVector<Row>& rows_;
+  const double* fourth_;
+};
+
 /// Blocks, and those that hold neighbours of them.
 BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks);
+/// The same of the blocks of a body, and which of them hold points of other ranks.
+BlockReach cloud_reach(const Body& body, const FamilyLists& families);
 
 /// Colours of these blocks; on a part of a body those that they have in the whole one. Blocks wait for those that write to the same eight points.
 Colouring cloud_colouring(const Body& body, const FamilyLists& families, const CloudBlocks& blocks, const BlockReach& reach);

@@ -105,11 +105,12 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
     reach.own.push_back(tile);
     reach.touches.push_back(std::move(touches[static_cast<std::size_t>(tile)]));
   }
-  if (body.part()) reach.elsewhere.assign(reach.units, 0);
-  for (std::size_t b = 0; b < blocks.size() && body.part(); ++b)
+  const std::vector<std::uint8_t> arriving = arriving_points(body);
+  if (!arriving.empty()) reach.elsewhere.assign(reach.units, 0);
+  for (std::size_t b = 0; b < blocks.size() && !arriving.empty(); ++b)
     for (std::size_t c = blocks[b].chunk_begin; c < blocks[b].chunk_end; ++c)
       for (auto p = static_cast<std::size_t>(chunks[c].first), end = p + chunk_points; p < end; ++p)
-        if (body.alive(p) && !body.owns(p)) reach.elsewhere[static_cast<std::size_t>(tiles[b])] = 1;
+        if (arriving[p]) reach.elsewhere[static_cast<std::size_t>(tiles[b])] = 1;
   sequence = BlockSequence(reach);
   // Cells of the colouring: groups of eight along rows; whole rows where a tile is as long.
   const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;

@@ -203,8 +203,7 @@ struct Pass {
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
   BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
-  Arrival* arrival =
-      nullptr;  ///< of u at the points of other ranks; null: it is there. For spaces that say so (EvaluationSpace::overlaps)
+  Arrival* arrival = nullptr;  ///< of u at the points of other ranks; null: it is there
 
   /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
   /// points. both_ends: sums of far ends, too.

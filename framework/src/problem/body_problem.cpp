@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/following_arrival.hpp"
 #include "core/merged_rows.hpp"
 #include "families/families.hpp"
 #include "families/shared_bonds.hpp"
@@ -18,6 +19,18 @@
 namespace perikit {
 
 namespace {
+
+/// Images follow their sources, some of which are ghosts.
+class Extension final : public FollowingArrival {
+ public:
+  Extension(Arrival& ghosts, const ImageMap& images, FieldView u) : FollowingArrival(&ghosts), images_(images), u_(u) {}
+
+ private:
+  void put() override { images_.extend(u_); }
+
+  const ImageMap& images_;
+  FieldView u_;
+};
 
 void refuse_ranks(const ProblemParts& parts) {
   if (parts.partition)
@@ -119,11 +132,16 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status;
-  if (meanwhile()) {
+  if (!ghosts_) {
+    status = terms().forces(seen(u, seen_), force, energy);
+  } else if (!images()) {
     ghosts_->start(Seen::writable(u));
     status = terms().forces(Seen(u, ghosts()), force, energy, &*ghosts_);
   } else {
-    status = terms().forces(seen(u, seen_), force, energy);
+    copy(u, seen_);
+    ghosts_->start(seen_);
+    Extension extension(*ghosts_, *images(), seen_);
+    status = terms().forces(seen_, force, energy, &extension);
   }
   if (history) history->set_time_step(0);
   describe(status);

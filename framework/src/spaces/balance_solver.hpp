@@ -27,6 +27,7 @@ struct BalanceEffort {
 
 /// What conjugate gradients came to.
 struct Solved {
+  Field x;
   int iterations = 0;
   bool contradiction = false;   ///< no x solves the system: x is nothing
 };
@@ -35,21 +36,23 @@ struct Solved {
 /// without bound where it has none.
 inline constexpr double contradictory_growth = 1e4;
 
-/// x with A x = b, from the x that is there, to a residual of `wanted`. Ends where the residual no longer falls, too.
+/// x with A x = b, from x = 0, to a residual of `wanted`. Ends where the residual no longer falls, too.
 template <class System>
-Solved solve(System& system, const Field& b, double wanted, const BalanceEffort& effort, Field& x) {
-  Field r = system.make(), z = r, direction = r, image = r;
-  int iterations = 0;
+Solved solve(System& system, const Field& b, double wanted, const BalanceEffort& effort) {
+  Solved solved{system.make()};
+  auto& [x, iterations, contradiction] = solved;
+  Field r = b, direction = system.make(), image = system.make();
   double best = 0;
   for (int restart = 0; restart < 4; ++restart) {
-    system.apply(x, r);
-    combine(1, b, -1, r, r);
+    if (restart > 0) {
+      system.apply(x, r);
+      combine(1, b, -1, r, r);
+    }
     double residual = system.largest(r);
     if (residual <= wanted || (restart > 0 && residual > 0.5 * best)) break;
     best = residual;
-    system.precondition(r, z);
-    copy(z, direction);
-    double product = dot(r, z);
+    system.precondition(r, direction);
+    double product = dot(r, direction);
     const double start = product;
     int since = 0;
     for (double least = product; !effort.ends(residual, iterations) && product > 0; ++iterations) {
@@ -61,17 +64,19 @@ Solved solve(System& system, const Field& b, double wanted, const BalanceEffort&
       combine(1, r, -step, image, r);
       residual = system.largest(r);
       if (residual <= 0.5 * wanted) break;
+      Field& z = image;  // which has had its use
       system.precondition(r, z);
       const double next = dot(r, z);
       since = next < 0.5 * least ? 0 : since + 1;
       least = std::min(least, next);
-      if (next > contradictory_growth * start) return {iterations, true};
+      contradiction = next > contradictory_growth * start;
+      if (contradiction) return solved;
       if (since > 1000 || next < 1e-30 * start) break;
       combine(1, z, next / product, direction, direction);
       product = next;
     }
   }
-  return {iterations, false};
+  return solved;
 }
 
 }  // namespace perikit

@@ -18,14 +18,17 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
       gradient_of_(families_, formulation_.order),
       upper_(points_),
-      scale_(points_),
-      u_(points_),
+      scale_(families_.body().stride()),
+      pieces_(families_.body()),
+      u_(pieces_.size()),
       gradient_(D * points_),
       flux_(D * points_),
       force_(points_) {
-  const BlockReach reach = cloud_reach(families_.lists(), blocks_);
-  colouring_ = cloud_colouring(families_.body(), families_.lists(), blocks_, reach);
+  BlockReach reach = cloud_reach(families_.body(), families_.lists());
+  sequence_ = BlockSequence(reach);
   quiet_ = parts.quiet_blocks(reach);
+  reach.elsewhere.clear();  // everything has arrived before the first block scatters
+  colouring_ = cloud_colouring(families_.body(), families_.lists(), blocks_, reach);
   for (std::size_t p = 0; p < points_; ++p) {
     const double normaliser = families_.normaliser(p, formulation_.weight);
     upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
@@ -50,13 +53,21 @@ void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
 template <int D>
 void CloudBonds<D>::set_factors(std::span<const double> factors) {
   factor_ = factors.empty() ? nullptr : factors.data();
-  if (!pairs_) return;
-  far_factor_.resize(factors.size());
+  if (!pairs_ || !factor_) return;
   const FamilyLists& lists = families_.lists();
-  parallel_for(factor_ ? blocks_.count() : 0, [&](std::size_t b) {
+  if (far_first_.empty()) {
+    std::int64_t evaluated = 0;
+    for (std::size_t p = 0; p < points_; ++p) {
+      far_first_.push_back(evaluated);
+      evaluated += lists.first[p + 1] - upper_[p];
+    }
+    far_factor_.resize(static_cast<std::size_t>(evaluated));
+  }
+  parallel_for(blocks_.count(), [&](std::size_t b) {
     over_points(b, [&](std::size_t p) {
+      double* to = far_factor_.data() + far_first_[p];
       for (auto k = static_cast<std::size_t>(upper_[p]); k < static_cast<std::size_t>(lists.first[p + 1]); ++k)
-        far_factor_[k] = factors[static_cast<std::size_t>(families_.index(lists.neighbour[k], static_cast<std::int32_t>(p)))];
+        *to++ = factors[static_cast<std::size_t>(families_.index(lists.neighbour[k], static_cast<std::int32_t>(p)))];
     });
   });
 }
@@ -78,6 +89,8 @@ void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lan
   std::fill(s.far + n, s.far + lanes, neighbour[0]);
   const double* const influence = families_.omegas() + begin;
   const double* const left = families_.integrities();
+  // Where bonds are evaluated for both ends.
+  const double* const far_factor = factor_ && pairs_ && begin >= upper_[p] ? far_factor_.data() + far_first_[p] + (begin - upper_[p]) : nullptr;
   const double* const share = formulation_.weight == BondWeight::kernel ? influence : left ? left + begin : nullptr;
   const Row *const position = position_, *const scale = u_.data(), x = position[p];
   const Pack own_volume(x[3]), own_scale(scale[p][3]);
@@ -101,7 +114,7 @@ void CloudBonds<D>::read_bonds(std::size_t p, std::int64_t begin, int n, int lan
     Pack weight = own_scale * far[3] * factor, far_weight = far_u[3] * own_volume * factor;
     if (factor_) {
       weight *= of_bonds(factor_ + begin);
-      if (pairs_) far_weight *= of_bonds(far_factor_.data() + begin);
+      if (far_factor) far_weight *= of_bonds(far_factor);
     }
     weight.store(s.weight + l);
     far_weight.store(s.far_weight + l);
@@ -305,7 +318,7 @@ void CloudBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
   const bool tangent = pass.work.tangent();
-  mirror_rows(pass.u, points_, u_, scale_.data());
+  ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival, scale_.data());
   if (tangent) {
     mirror_rows(pass.w, points_, w_);
     direction_.resize(D * points_);
@@ -313,16 +326,18 @@ void CloudBonds<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(last, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
+    quiet_.look(last, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   // Each pass reads what the one before it left at one family's reach.
   const auto awake = [&](auto&& block) {
     return [&](std::size_t b) {
       if (quiet_.awake(b, 2)) block(b);
     };
   };
-  parallel_for(blocks_.count(), [&](std::size_t b) {
-    if (quiet_.begins(b)) gradients(b, pass);
-  });
+  sequence_.for_each(
+      [&](std::size_t b) {
+        if (quiet_.begins(b)) gradients(b, pass);
+      },
+      &arrival);
   if (pass.alone()) return parallel_for(blocks_.count(), [&](std::size_t b) { bonds(b, pass); });
   colouring_.for_each(awake([&](std::size_t b) { bonds(b, pass); }));
   if (selective_) parallel_for(blocks_.count(), awake([&](std::size_t b) { pressures(b, pass); }));
@@ -377,8 +392,8 @@ template <int D>
 void CloudBonds<D>::report(ModelReport& report) const {
   report.fallbacks += gradient_of_.fallbacks();
   report.evaluation_points += pairs_ ? families_.bonds() / 2 : families_.bonds();
-  report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size()) * sizeof(std::int64_t) +
-                  scale_.size() * sizeof(double) + scratch_.bytes() +
+  report.bytes += gradient_of_.bytes() + (upper_.size() + number_.size() + far_first_.size()) * sizeof(std::int64_t) +
+                  (scale_.size() + far_factor_.size()) * sizeof(double) + scratch_.bytes() +
                   (u_.size() + w_.size() + gradient_.size() + direction_.size() + flux_.size() + stress_.size() + force_.size() +
                    volume_.size() + pressure_.size()) *
                       sizeof(Row);

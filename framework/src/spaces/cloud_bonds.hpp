@@ -61,10 +61,13 @@ class CloudBonds final : public EvaluationSpace {
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
   std::vector<std::int64_t> number_;           ///< of the first bond that a point evaluates, where laws have a history
   std::size_t one_end_ = 0;
-  AlignedVector<double> scale_;       ///< V_i / N_i
+  AlignedVector<double> scale_;       ///< V_i / N_i, by internal index
   const double* factor_ = nullptr;    ///< w_ij / W_ij; null: 1
-  AlignedVector<double> far_factor_;  ///< w_ji / W_ji by bond, where bonds are evaluated once
+  AlignedVector<double> far_factor_;      ///< w_ji / W_ji of the bonds that points evaluate for both ends, point by point
+  std::vector<std::int64_t> far_first_;   ///< by point: of the first of its bonds
+  BlockSequence sequence_;
   Colouring colouring_;
+  ArrivingPieces pieces_;
   AlignedVector<Row> u_, w_;                 ///< mirrors; {u, scale}
   AlignedVector<Row> gradient_, direction_;  ///< Hbar of u and w, D rows a point
   AlignedVector<Row> stress_;                ///< on shifted gradients

@@ -12,9 +12,11 @@ CloudPoints<D>::CloudPoints(const SpaceParts& parts)
       blocks_(families_.body()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())),
       gradient_(families_),
-      u_(points_),
+      pieces_(families_.body()),
+      u_(pieces_.size()),
       flux_(D * points_) {
-  const BlockReach reach = cloud_reach(families_.lists(), blocks_);
+  const BlockReach reach = cloud_reach(families_.body(), families_.lists());
+  sequence_ = BlockSequence(reach);
   quiet_ = parts.quiet_blocks(reach);
 }
 
@@ -76,15 +78,17 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
 template <int D>
 void CloudPoints<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
-  mirror_rows(pass.u, points_, u_);
+  ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival);
   if (pass.work.tangent()) mirror_rows(pass.w, points_, w_);
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(2, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
-  parallel_for(blocks_.count(), [&](std::size_t b) {
-    if (quiet_.begins(b)) block(b, pass);
-  });
+    quiet_.look(2, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
+  sequence_.for_each(
+      [&](std::size_t b) {
+        if (quiet_.begins(b)) block(b, pass);
+      },
+      &arrival);
   if (pass.bad >= 0 || pass.alone()) return;
   parallel_for(blocks_.count(), [&](std::size_t b) {
     if (!quiet_.awake(b, 2)) return;

@@ -28,6 +28,8 @@ class CloudPoints final : public EvaluationSpace {
   CloudBlocks blocks_;
   const Row* position_;                        ///< {x, y, z, V}
   CloudGradient<D> gradient_;
+  ArrivingPieces pieces_;
+  BlockSequence sequence_;
   AlignedVector<Row> u_, w_;          ///< mirrors
   AlignedVector<Row> flux_, stress_;  ///< Q, D rows a point
   ScratchPool scratch_;

@@ -61,14 +61,22 @@ class WeightSystem {
   std::size_t let_go(const Field& r, double above) { return closed_.let_go(r, above); }
   const ClosedPoints& closed() const noexcept { return closed_.points(); }
 
-  /// y <- (sum_q W_q s_q g_qk, sum of W_q s_q over the q of a point), s_q = constant + tr H_q[lambda] + mu, with the weights that
-  /// the space has.
-  void apply(const Field& x, double constant, Field& y) { pass(x, constant, y, nullptr); }
-  void apply(const Field& x, Field& y) { pass(x, 0, y, nullptr); }
+  /// y <- (sum_q W_q s_q g_qk, sum of W_q s_q over the q of a point), s_q = tr H_q[lambda] + mu, with the weights that the space
+  /// has.
+  void apply(const Field& x, Field& y) {
+    copy(x, shown_);
+    pass(0, &y, nullptr);
+  }
+  /// The same of s_q = 1.
+  void apply_to_ones(Field& y) {
+    shown_.fill(0);
+    pass(1, &y, nullptr);
+  }
   /// tr H_q[lambda] + mu by evaluation point; 0 where it has no weight.
   void factors(const Field& x, AlignedVector<double>& out) {
     out.assign(space_.factors(), 0.0);
-    pass(x, 0, out_, out.data());
+    copy(x, shown_);
+    pass(0, nullptr, out.data());
   }
   void precondition(const Field& r, Field& z) const {
     copy(r, z);
@@ -99,24 +107,24 @@ class WeightSystem {
     }
   }
 
-  void pass(const Field& x, double constant, Field& y, double* factors) {
-    copy(x, shown_);
+  /// Of x in shown_: y, or the factors.
+  void pass(double constant, Field* y, double* factors) {
     const FieldView lambda{shown_.data(), body_.stride(), d()}, mu{shown_.component(d()), body_.stride(), 1};
     if (beyond_.extend) beyond_.extend(lambda);
     if (beyond_.copy_from_sources) beyond_.copy_from_sources(mu);
     out_.fill(0);
-    double* const sums = factors ? nullptr : y.component(d());
+    double* const sums = y ? y->component(d()) : nullptr;
     if (sums) std::fill_n(sums, body_.stride(), 0.0);
     const Balance balance{constant, mu.data, counted_.data(), sums, factors};
     const BatchWork work(laws_, Work::force, false, selective_, nullptr, &balance);
     Pass pass{work, lambda, {}, out_, nullptr, nullptr, -1, {}};
     space_.run(pass);
-    if (factors) return;
+    if (!y) return;
     if (beyond_.fold) beyond_.fold(out_);
     for (int c = 0; c < d(); ++c)  // forces are the negative of the adjoint
-      for (std::size_t p = 0; p < body_.stride(); ++p) y.component(c)[p] = -out_.component(c)[p];
+      for (std::size_t p = 0; p < body_.stride(); ++p) y->component(c)[p] = -out_.component(c)[p];
     mask(owned_, FieldView{sums, body_.stride(), 1});
-    closed_.project(y);
+    closed_.project(*y);
   }
 
   const Body& body_;
@@ -138,22 +146,21 @@ class WeightSearch {
       : body_(parts.families.body()),
         space_(space),
         system_(without_factors(space), parts, closed, out),
-        none_(system_.make()),
-        volumes_(none_),
-        rest_(none_),
+        volumes_(body_.make_field(1)),
+        rest_(system_.make()),
         effort_(effort_of_balance(parts)),
         out_(out) {
-    system_.apply(none_, 1, volumes_);  // sum of W_q g_qk, and of W_q
-    out_.weights.before = system_.largest(volumes_);
+    system_.apply_to_ones(rest_);  // sum of W_q g_qk, and of W_q
+    out_.weights.before = system_.largest(rest_);
+    std::copy_n(rest_.component(system_.d()), volumes_.stride(), volumes_.data());
   }
 
   void run() {
     while (!search()) {
     }
-    space_.set_factors(out_.factors);
     out_.weights.after = left(&out_.weights.worst);
     if (!(out_.weights.after <= out_.weights.before)) {  // the constraints contradict each other
-      out_.factors.assign(space_.factors(), 1.0);
+      replace_factors([](double) { return 1.0; });
       out_.weights.after = left(&out_.weights.worst);
     }
     double low = 1, high = 1;
@@ -172,9 +179,9 @@ class WeightSearch {
 
   /// rest_ <- c - C W f with the factors that the space has.
   double left(Point* where = nullptr) {
-    system_.apply(none_, 1, rest_);
+    system_.apply_to_ones(rest_);
     combine(-1, rest_, 0, rest_, rest_);
-    for (const std::int32_t p : body_.owned()) rest_.component(system_.d())[p] += volumes_.component(system_.d())[p];
+    for (const std::int32_t p : body_.owned()) rest_.component(system_.d())[p] += volumes_.data()[p];
     return system_.largest(rest_, where);
   }
 
@@ -184,44 +191,57 @@ class WeightSearch {
     return system_.let_go(rest_, surfaces && ++times_ > 2 ? 0 : forcing * residual);
   }
 
-  /// From f = 1. False: points were let go, so that it is to be begun again.
+  /// out_.factors <- of[y] of all evaluation points, y = C^T x.
+  template <class Of>
+  void set_factors(const Field& x, const Of& of) {
+    space_.set_factors({});
+    system_.factors(x, out_.factors);
+    replace_factors(of);
+  }
+  /// The same of what is there.
+  template <class Of>
+  void replace_factors(const Of& of) {
+    AlignedVector<double>& f = out_.factors;
+    over_blocks(f.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t q = begin; q < end; ++q) f[q] = of(f[q]);
+    });
+    space_.set_factors(f);
+  }
+
+  /// From f = 1. False: points were let go, so that it is to be begun again. Bonds are many, and one number is held of each: f, or f' while
+  /// a step is looked for, or what that changes y by. All of them follow from the sum of the steps, four numbers a point.
   bool search() {
-    AlignedVector<double> y(space_.factors(), 0.0), step;
     AlignedVector<double>& f = out_.factors;
     f.assign(space_.factors(), 1.0);
+    space_.set_factors(f);
+    Field x = system_.make();
     std::vector<double> residuals;
     const int before = out_.weights.iterations;
     for (out_.rounds = 1;; ++out_.rounds) {
-      space_.set_factors(f);
       const double residual = residuals.emplace_back(left());
       const int spent = out_.weights.iterations - before;
       if (effort_.ends(residual, spent) || out_.rounds > most_rounds) return true;
       const bool stuck = residuals.size() > 3 && residual > 0.75 * residuals[residuals.size() - 4];
       if (stuck && residual <= enough_residual) return true;  // rounding
       if (stuck) return let_go(residual) == 0;
-      AlignedVector<double> slopes(f);
-      for (double& slope : slopes) slope = slope_of(slope);
-      space_.set_factors(slopes);
-      Field x = system_.make();
+      replace_factors(slope_of);
       const BalanceEffort rest{effort_.polish - spent, effort_.most - spent};
-      const Solved solved = solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest, x);
-      out_.weights.iterations += solved.iterations;
-      if (solved.contradiction) return true;
-      system_.factors(x, step);
-      double longest = 0;
-      for (const double s : step) longest = std::max(longest, std::abs(s));
-      const double part = std::min(1.0, 2 / communicator().largest(longest));
-      for (std::size_t q = 0; q < y.size(); ++q) {
-        y[q] += part * step[q];
-        f[q] = factor_of(y[q]);
+      const Solved step = solve(system_, rest_, std::max(0.5 * rounding_residual, std::min(forcing, residual) * residual), rest);
+      out_.weights.iterations += step.iterations;
+      if (!step.contradiction) {
+        set_factors(step.x, [](double y) { return y; });
+        const double longest = largest_magnitude({f.data(), f.size(), 1});
+        combine(1, x, std::min(1.0, 2 / longest), step.x, x);
       }
+      set_factors(x, factor_of);
+      if (step.contradiction) return true;
     }
   }
 
   const Body& body_;
   EvaluationSpace& space_;
   WeightSystem system_;
-  Field none_, volumes_, rest_;
+  Field volumes_, rest_;
   BalanceEffort effort_;
   int times_ = 0;  ///< that points at surfaces were let go
   CloudConsistency& out_;

@@ -22,10 +22,8 @@ namespace perikit {
 class EvaluationSpace {
  public:
   virtual ~EvaluationSpace() = default;
-  /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone.
+  /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone. What arrives has arrived then.
   virtual void run(Pass& pass) = 0;
-  /// Whether a run may begin while displacements of points of other ranks are on their way.
-  virtual bool overlaps() const noexcept { return false; }
   /// Marks the groups whose energies a run sums up together with those of marked ones (Pass::energies).
   virtual void complete(GroupMarks&) const {}
   /// The numbers of evaluation points lie below this.

@@ -20,7 +20,6 @@ class LatticeBonds final : public EvaluationSpace {
   explicit LatticeBonds(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  bool overlaps() const noexcept override { return true; }
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   PointFlux point_flux() const noexcept override { return last_ == Last::other || stencils_ ? PointFlux() : PointFlux{gradient_, flux_, last_ == Last::all_forces}; }

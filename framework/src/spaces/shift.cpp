@@ -345,11 +345,13 @@ constexpr double most_moved = 1;
 
 template <int D, class System>
 Field solve_shift(System&& system, const SpaceParts& parts, Balanced& result) {
-  Field x = system.make(), b = x, r = x;
+  Field b = system.make();
   system.unshifted(b);
   result.before = system.largest(b);
   combine(-1, b, 0, b, b);
-  result.iterations = solve(system, b, rounding_residual, effort_of_balance(parts), x).iterations;
+  auto [x, iterations, contradiction] = solve(system, b, rounding_residual, effort_of_balance(parts));
+  result.iterations = iterations;
+  Field r = system.make();
   system.apply(x, r);
   result.moved = std::sqrt(dot(x, r) / system.unmoved());
   combine(1, b, -1, r, r);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 #include "spaces/weighted_kernel.hpp"
 
@@ -317,8 +318,10 @@ void Weighted<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   while (memory_.size() < static_cast<std::size_t>(thread_count())) memory_.push_back(std::make_unique<Memory>());
   const std::size_t stride = body_.stride();
+  Arrival* arrival = pass.arrival;
+  std::optional<ArrivingRows> rows;
   if (singles_) {
-    mirror_rows(pass.u, stride, u_rows_);
+    arrival = &rows.emplace(pieces_, pass.u, u_rows_, arrival);
     if (pass.work.tangent()) mirror_rows(pass.w, stride, w_rows_);
   }
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { block(b, pass); });
@@ -326,12 +329,14 @@ void Weighted<D>::run(Pass& pass) {
   if (pass.everywhere())
     quiet_.wake();
   else
-    quiet_.look(1, [&](std::size_t b) {
-      return lattice_ ? lattice_->tiles.moves(b, pass.u) : CloudBlocks(body_).moves(pass.u, b);
-    });
-  (lattice_ ? lattice_->tiles.colouring : cloud_colouring_).for_each([&](std::size_t b) {
-    if (quiet_.awake(b, 1)) block(b, pass);
-  });
+    quiet_.look(
+        1, [&](std::size_t b) { return lattice_ ? lattice_->tiles.moves(b, pass.u) : CloudBlocks(body_).moves(pass.u, b); }, arrival);
+  (lattice_ ? lattice_->tiles.colouring : cloud_colouring_)
+      .for_each(
+          [&](std::size_t b) {
+            if (quiet_.awake(b, 1)) block(b, pass);
+          },
+          arrival);
   if (!singles_) return;
   pieces_of(stride).over_points([&](std::size_t p) {
     for (int c = 0; c < D; ++c) pass.out.component(c)[p] += out_rows_[p][c];

@@ -151,6 +151,7 @@ class Weighted final : public EvaluationSpace {
   const double* factor_ = nullptr;  ///< w_q / W_q; null: 1
   Colouring cloud_colouring_;
   std::size_t fallbacks_ = 0, dropped_ = 0;
+  ArrivingPieces pieces_;
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows
   std::vector<Place> place_;                     ///< by point, once bonds have failed
   std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending

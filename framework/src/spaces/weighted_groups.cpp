@@ -15,9 +15,10 @@ Weighted<D>::Weighted(const SpaceParts& parts)
     : families_(parts.families), lattice_(families_.lattice()), cloud_(families_.cloud()), body_(families_.body()), formulation_(parts.formulation),
       laws_(parts.laws), rules_{&formulation_, body_.horizon()}, selective_(formulation_.selective()),
       // Local force states have no common adjoint: every point makes its own stencil.
-      share_(parts.share && formulation_.force_state == ForceState::variational), owners_(selective_ ? 1 : 0), parts_(formulation_.parts(D)) {
+      share_(parts.share && formulation_.force_state == ForceState::variational), owners_(selective_ ? 1 : 0), parts_(formulation_.parts(D)), pieces_(body_) {
   lattice_ ? prepare_lattice() : prepare_cloud();
-  const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(cloud_->lists(), CloudBlocks(body_));
+  const BlockReach reach = lattice_ ? lattice_->tiles.reach : cloud_reach(body_, cloud_->lists());
+  if (cloud_) cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), CloudBlocks(body_), reach);
   quiet_ = parts.quiet_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
   if (parts.numbered()) number_groups();
@@ -112,7 +113,6 @@ void Weighted<D>::prepare_cloud() {
   }
   block_first_.push_back(groups_.size());
   make_cloud_stencils();
-  cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), blocks, cloud_reach(cloud_->lists(), blocks));
 }
 
 template <int D>

@@ -102,10 +102,14 @@ BondScreen* BondCriterion::screen() noexcept {
   return screen_.near.empty() ? nullptr : &screen_;
 }
 
-void BondCriterion::begin_forces(ConstFieldView u) {
+void BondCriterion::begin_forces() {
   screen_.known = false;
   std::fill(screen_.near.begin(), screen_.near.end(), std::uint8_t{0});
+}
+
+void BondCriterion::end_forces(ConstFieldView u) {
   screen_.u.assign(u.data, u.data + u.size());
+  screen_.known = true;
 }
 
 /// By group of eight points: the points with bonds that may fail at u, as bits.

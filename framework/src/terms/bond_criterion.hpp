@@ -35,8 +35,8 @@ class BondCriterion final : public BondFinder {
   /// For evaluations of forces to mark the groups that need a look; null where they cannot.
   BondScreen* screen() noexcept;
   /// Before and after an evaluation of forces at u where they do.
-  void begin_forces(ConstFieldView u);
-  void end_forces() noexcept { screen_.known = true; }
+  void begin_forces();
+  void end_forces(ConstFieldView u);
   /// Of all bonds, ascending: what they hold, or dE/db.
   std::vector<BondEnergy> energies(ConstFieldView u);
 

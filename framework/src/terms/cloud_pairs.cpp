@@ -67,6 +67,7 @@ class CloudPairs final : public PairLoop {
   std::vector<std::int64_t> upper_;            ///< first neighbour with a larger index
   NearestFailure nearest_;                     ///< only where damage is on
   Colouring colouring_;
+  ArrivingPieces pieces_;
   AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
   AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
   AlignedVector<Row> force_;
@@ -76,9 +77,9 @@ template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
     : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
       dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()), blocks_(families_.body()),
-      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), force_(points_) {
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), pieces_(families_.body()), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
-  const BlockReach reach = cloud_reach(lists_, blocks_);
+  const BlockReach reach = cloud_reach(families_.body(), lists_);
   colouring_ = cloud_colouring(families_.body(), lists_, blocks_, reach);
   if (parts.quiet) watch_waves(reach);
 }
@@ -290,9 +291,9 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
 template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
-  look(pass, [&](std::size_t b) { return blocks_.moves(pass.u, b); });
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
-  mirror_rows(pass.u, points_, u_, pass.q.data);
+  ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival, pass.q.data);
+  look(pass, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   if (fails_) {
     nearest_.u = nullptr;
     nearest_.excess.resize(points_);
@@ -310,7 +311,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
     if (vectors) force_[p] = Row{};
     else pass.out.data[p] = 0;
   });
-  each_block(pass, colouring_, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
+  each_block(pass, colouring_, &arrival, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
   if (pass.work == PairWork::force && fails_ && !pass.only && bad() < 0) nearest_.u = &u_;
   if (vectors && bad() < 0) {
     blocks_.over_points([&](std::size_t p) {

@@ -48,9 +48,9 @@ class LatticePairs final : public PairLoop {
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
-    look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); });
+    look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); }, pass.arrival);
     if ((!pass.only || pass.local) && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
-    each_block(pass, families_.tiles.colouring, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
+    each_block(pass, families_.tiles.colouring, pass.arrival, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
     return bad();
   }
 

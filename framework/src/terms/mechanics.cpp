@@ -142,11 +142,6 @@ void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double Group
   perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
 }
 
-std::int64_t Mechanics::add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
-  if (!space_->overlaps()) arrival.finish();
-  return forces(u, force, energy, &arrival);
-}
-
 std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
   const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
   const bool dissipates = work.dissipates(), wanted = energy || dissipates;

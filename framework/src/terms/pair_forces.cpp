@@ -276,12 +276,6 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
-  if (!families_.lattice()) arrival.finish();
-  return forces(u, force, energy, &arrival);
-}
-
-template <int D>
 std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
   if (energy) energies_.assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {

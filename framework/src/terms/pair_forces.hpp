@@ -25,7 +25,9 @@ class PairForces final : public Term {
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
     return forces(u, force, energy, nullptr);
   }
-  std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override;
+  std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override {
+    return forces(u, force, energy, &arrival);
+  }
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
     return tangent_of(u, w, Kw, nullptr, nullptr);
   }

@@ -35,7 +35,7 @@ struct PairPass {
   bool local = false;
   const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
   BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
-  Arrival* arrival = nullptr;        ///< of u at the points of other ranks; null: it is there. Lattices only
+  Arrival* arrival = nullptr;        ///< of u at the points of other ranks; null: it is there
 };
 
 /// Point quantities that bonds need.
@@ -111,12 +111,13 @@ class PairLoop {
   /// Skips what no wave has reached from now on.
   void watch_waves(const BlockReach& reach) { quiet_ = QuietBlocks(reach); }
   static bool adds(PairWork work) noexcept { return work == PairWork::force || work == PairWork::tangent; }
-  /// At the beginning of `run`. Dilatations, and forces without them, reach one family; forces from dilatations two.
+  /// At the beginning of `run`. Dilatations, and forces without them, reach one family; forces from dilatations two. arrival: of what blocks
+  /// read; null: it is there.
   template <class Moves>
-  void look(const PairPass& pass, const Moves& moves) {
+  void look(const PairPass& pass, const Moves& moves, Arrival* arrival) {
     reach_ = pass.q.data ? 2 : 1;
     if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
-      quiet_.look(reach_, moves, pass.arrival);
+      quiet_.look(reach_, moves, arrival);
     else
       quiet_.wake();
   }
@@ -124,13 +125,13 @@ class PairLoop {
   bool at_once(const PairPass& pass) const noexcept { return half_ && pass.work != PairWork::energy && (!pass.only || pass.local); }
   /// block(work, b) for each block that is awake, `work` being pass.work as a constant; coloured where far ends are written.
   template <class Block>
-  void each_block(const PairPass& pass, const Colouring& colouring, const Block& block) const {
+  void each_block(const PairPass& pass, const Colouring& colouring, Arrival* arrival, const Block& block) const {
     const auto sweep = [&]<PairWork work>(std::integral_constant<PairWork, work> constant) {
       auto body = [&](std::size_t b) {
         if (quiet_.awake(b, reach_)) block(constant, b);
       };
-      if (at_once(pass)) return colouring.for_each(body, pass.arrival);
-      if (pass.arrival) pass.arrival->finish();
+      if (at_once(pass)) return colouring.for_each(body, arrival);
+      if (arrival) arrival->finish();
       parallel_for(blocks(), body);
     };
     switch (pass.work) {

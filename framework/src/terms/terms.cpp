@@ -161,17 +161,14 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
 EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival) {
   clear(force.data, force.size());
   ExactSum sum;
-  if (criterion_) {
-    if (arrival) arrival->finish();  // it keeps u
-    criterion_->begin_forces(u);
-  }
+  if (criterion_) criterion_->begin_forces();
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) {
     ExactSum* const to = energy ? &sum : nullptr;
     bad =
         arrival && arrival->pending() ? (*term)->add_forces_meanwhile(*arrival, u, force, to) : (*term)->add_forces(u, force, to);
   }
-  if (criterion_ && bad < 0) criterion_->end_forces();
+  if (criterion_ && bad < 0) criterion_->end_forces(u);
   if (energy) *energy = total_over_ranks(sum);
   return status(bad);
 }

@@ -134,8 +134,6 @@ class BodyProblem final : public Problem {
   Seen seen(ConstFieldView u, Field& memory);
   /// A field with the values of ghosts, without images.
   Seen shared(ConstFieldView field);
-  /// Whether evaluations may begin before the values of ghosts are there: images follow them at once.
-  bool meanwhile() const noexcept { return ghosts_ && !images(); }
   /// Forces of the terms -> those of the problem: of images they go to where they belong, those on ghosts are nobody's.
   void settle(FieldView force) const;
   /// Ends an evaluation: one status for all ranks, and forces of the problem.
