@@ -186,6 +186,9 @@ def cases(everything, work):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
+    # Rows in pieces, some of which no point of a rank feels beside pieces that it does.
+    porous = scene(KINEMATICS["baqp"], 3, False, 'type = "verlet"\nend_time = 0.5\ntime_step = 0.05', cells=[200, 8, 4])
+    yield "baqp, porous bar", porous.replace("[sets]", 'inside = "sin(12.9898*x + 78.233*y + 37.719*z) > 0.2"\n[sets]'), ranks, threads
     for name, text in itertools.chain(own_parts(everything), loads_on_surfaces(everything), planes_of_parts(everything), other_clouds(everything, work), long_interfaces(everything)):
         yield name, text, (2, 3, 4) if everything else (2, 4), threads
 

@@ -37,8 +37,9 @@ std::vector<std::uint8_t> felt_here(const LatticeFamilies& families) {
 std::vector<std::uint8_t> felt_rows(const LatticeFamilies& families, const std::vector<std::uint8_t>& felt) {
   std::vector<std::uint8_t> rows;
   for (const LatticeRow& row : families.tiles.rows) {
-    const auto first = felt.begin() + row.first;
-    rows.push_back(std::any_of(first, first + row.chunks * chunk_points, [](std::uint8_t here) { return here != 0; }));
+    // What comes from the pieces of the row before and after this one to its columns is added up here, too.
+    const auto first = felt.begin() + row.first - row.before * chunk_points;
+    rows.push_back(std::any_of(first, first + (row.before + row.chunks + row.after) * chunk_points, [](std::uint8_t here) { return here != 0; }));
   }
   return rows;
 }
