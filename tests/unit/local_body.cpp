@@ -110,6 +110,25 @@ bool same_terms(const Images& a, const Images& b) {
   });
 }
 
+/// What all ranks say is wrong when each of them calls `check`.
+template <class Check>
+std::string message_on(int ranks, const Check& check) {
+  std::mutex one;
+  std::vector<std::string> said;
+  on_ranks(ranks, [&](ThreadRank&) {
+    std::string what;
+    try {
+      check();
+    } catch (const InputError& error) {
+      what = error.what();
+    }
+    const std::lock_guard lock(one);
+    said.push_back(what);
+  });
+  for (const std::string& what : said) CHECK(what == said.front());
+  return said.front();
+}
+
 void compare_images(const Images& found, const Images& expected) {
   CHECK(found.source == expected.source);
   CHECK(found.sign == expected.sign);
@@ -236,31 +255,20 @@ TEST_CASE("local bodies: parts of lattices with images are those of the whole bo
 
 TEST_CASE("local bodies: sides of lattices that cannot have images are refused on all ranks as on one") {
   const auto message = [](const std::string& text, int ranks) {
-    std::mutex one;
-    std::vector<std::string> said;
-    on_ranks(ranks, [&](ThreadRank&) {
-      std::string what;
-      try {
-        const Scene scene = parsed(text);
-        if (ranks > 1) {
-          build_local_body(scene, {}, 7);
-        } else {
-          const Body body = build_body(scene);
-          const ScenePlanes planes = build_planes(scene, placed_points(body), false);
-          try {
-            Body(body, make_images(body, planes.planes), 3);
-          } catch (const OverlappingImage& error) {
-            refuse_overlap(planes, error);
-          }
-        }
-      } catch (const InputError& error) {
-        what = error.what();
+    return message_on(ranks, [&] {
+      const Scene scene = parsed(text);
+      if (ranks > 1) {
+        build_local_body(scene, {}, 7);
+        return;
       }
-      const std::lock_guard lock(one);
-      said.push_back(what);
+      const Body body = build_body(scene);
+      const ScenePlanes planes = build_planes(scene, placed_points(body), false);
+      try {
+        Body(body, make_images(body, planes.planes), 3);
+      } catch (const OverlappingImage& error) {
+        refuse_overlap(planes, error);
+      }
     });
-    for (const std::string& what : said) CHECK(what == said.front());
-    return said.front();
   };
   const std::string sets = "low = \"x < 5\"\nsome = \"x > 9\"";
   for (const char* wrong : {"[[symmetry]]\naxis = \"x\"\nat = 7.0\n", "[[symmetry]]\naxis = \"x\"\nat = -7.0\n", "[[periodic]]\naxis = \"y\"\nupper = 25.0\n",
@@ -426,20 +434,7 @@ TEST_CASE("local bodies: what is wrong with a file is said as on one rank, by al
   const TemporaryFolder folder;
   const std::filesystem::path file = folder.path / "wrong.csv", other = folder.path / "wrong.h5";
   const auto message = [](const std::filesystem::path& from, int ranks) {
-    std::mutex one;
-    std::vector<std::string> said;
-    on_ranks(ranks, [&](ThreadRank&) {
-      std::string what;
-      try {
-        ranks == 1 ? read_points(from, 3) : read_run_of_points(from, 3);
-      } catch (const InputError& error) {
-        what = error.what();
-      }
-      const std::lock_guard lock(one);
-      said.push_back(what);
-    });
-    for (const std::string& what : said) CHECK(what == said.front());
-    return said.front();
+    return message_on(ranks, [&] { ranks == 1 ? read_points(from, 3) : read_run_of_points(from, 3); });
   };
   const auto same_for_ranks = [&](const std::filesystem::path& from) {
     const std::string expected = message(from, 1);

@@ -1,4 +1,5 @@
 #include "assembly/volumetric_state.hpp"
+#include "spaces/chunk_roles.hpp"
 #include "spaces/lattice_gradient.hpp"
 
 namespace perikit {
@@ -49,14 +50,8 @@ class LatticeVolumes final : public VolumetricState<D> {
         flux_(families_.body().make_field(D * D)),
         felt_(marked(this->roles_.felt)),
         felt_chunks_(chunk_runs(tiles_, felt_)),
-        own_chunks_(chunk_runs(tiles_, marked(this->roles_.own))) {
-    // Families reach beyond the ends of pieces of rows.
-    for (const LatticeRow& row : tiles_.rows) {
-      const auto first = felt_.begin() + row.first;
-      felt_rows_.push_back(std::any_of(first - row.before * chunk_points, first + (row.chunks + row.after) * chunk_points,
-                                       [](std::uint8_t here) { return here != 0; }));
-    }
-  }
+        own_chunks_(chunk_runs(tiles_, marked(this->roles_.own))),
+        felt_rows_(felt_rows(families_, felt_)) {}
 
   std::int64_t linearise(ConstFieldView u) override {
     this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });

@@ -27,7 +27,7 @@ namespace {
 /// GAMG: two steps of a Chebyshev polynomial of D^-1 K. Aggregates are points with all their neighbours, on every level, but for
 /// springs that have lost most of their stiffness with their bonds. Single rows are faster than rows that share a pattern
 /// (inode).
-constexpr const char* options = 
+constexpr const char* options =
     "-pc_type gamg -pc_gamg_aggressive_coarsening 10 -pc_gamg_threshold 0.02 -pc_gamg_reuse_interpolation -mat_no_inode";
 
 /// The way to P^T K P. The fast one of several ranks adds what comes from others as it arrives: from two of them in other bits
