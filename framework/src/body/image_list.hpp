@@ -39,6 +39,9 @@ class ImageList {
   Images& images_;
 };
 
+/// ImagePlane::surface where every point has an image, and lies below itself.
+inline std::int64_t itself(const Point&, std::int64_t number) noexcept { return number; }
+
 /// Appends one of the images of a point, the k-th of `made`, as that of the point with the input number `source`.
 void append_image(const Images& made, std::size_t k, std::int32_t source, Images& images);
 

@@ -96,7 +96,7 @@ Images make_images(const Body& body, std::vector<ImagePlane> planes, std::span<c
 }
 
 Lattice with_images(const Lattice& lattice, double horizon, std::vector<ImagePlane> planes) {
-  for (ImagePlane& plane : planes) plane.surface = [](const Point&, std::int64_t number) { return number; };
+  for (ImagePlane& plane : planes) plane.surface = itself;
   const ImageMaker maker(lattice.dimension, halo(horizon), std::move(planes));
   std::array<std::int64_t, 3> low{}, high = lattice.extent;
   Images images;

@@ -15,7 +15,7 @@ LatticeImages::LatticeImages(const Lattice& points, const Lattice& grown, Inside
       if (points.axis[k] == grown.axis[a]) box_.high[a] += points.extent[k];
   }
   std::vector<ImagePlane> planes = maker_.planes();
-  for (ImagePlane& plane : planes) plane.surface = [](const Point&, std::int64_t number) { return number; };
+  for (ImagePlane& plane : planes) plane.surface = itself;
   for (std::size_t a = 0; a < 3; ++a) {
     // Planes across an axis move nothing along the others.
     std::vector<ImagePlane> across;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "body/image_list.hpp"
 #include "build/conditions.hpp"
 #include "perikit/core/rank_values.hpp"
 
@@ -253,7 +254,7 @@ class PlaneBuilder {
     for (const Side& side : sides) {
       ImagePlane& plane = plane_at(side, "all", path + ".axis", periodic.position, false);
       plane.period = sides[1].at - sides[0].at;
-      plane.surface = [](const Point&, std::int64_t number) { return number; };
+      plane.surface = itself;
     }
   }
 
