@@ -67,11 +67,11 @@ class LatticeOperator {
   /// f += div Q for the target rows that the sources in `row` reach, where forces are to be complete. Q of the cell row.first is
   /// at `from`; sources are read along the row, as far as a family reaches beyond its ends.
   void divergence(const LatticeRow& row, ConstFieldView Q, std::int64_t from, FieldView f) const noexcept {
-    for (std::int64_t k = 0; k < std::int64_t(row.chunks) * chunk_points; k += pack_width) scatter<false>(row, row.first + k, Q, from + k, {}, f);
+    scatter<false>(row, Q, from, {}, f);
   }
   /// The same and f_k += sum_s omega_s v_{k+s}; v is 0 in dead cells. Q and v are fields of the body.
   void divergence(const LatticeRow& row, ConstFieldView Q, ConstFieldView v, FieldView f) const noexcept {
-    for (std::int64_t p = row.first; p < row.first + std::int64_t(row.chunks) * chunk_points; p += pack_width) scatter<true>(row, p, Q, p, v, f);
+    scatter<true>(row, Q, row.first, v, f);
   }
 
   /// Takes what the sources in irregular lanes have sent too much along broken and weakened bonds back out of the divergence (v: null if there
@@ -216,119 +216,69 @@ class LatticeOperator {
     }
   }
 
-  /// From the sources at p, whose Q is at `from`, and their neighbours along the row.
+  /// From the sources of a row, component by component: few rows are written at a time, and what profiles sum stays in registers.
   template <bool with_source>
-  void scatter(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
-    // Sums and differences of mirrored neighbours along the row, used by every profile.
-    constexpr int most = 16;
-    if (f_.slots.row_reach > most) {
-      scatter_far<with_source>(row, p, Q, from, source, f);
-      return;
-    }
-    Pack difference[most + 1][D], sum1[most + 1][D], sum2[most + 1][D], sum0[most + 1][D];
+  void scatter(const LatticeRow& row, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
+    constexpr int packs = 4;
+    const int cells = row.chunks * chunk_points;
     for (int c = 0; c < D; ++c) {
-      const double* q0 = Q.component(c * D) + from;
-      for (int k = 1; k <= f_.slots.row_reach; ++k) difference[k][c] = Pack::load(q0 + k) - Pack::load(q0 - k);
-      if constexpr (D > 1) {
-        const double* q1 = Q.component(c * D + 1) + from;
-        sum1[0][c] = Pack::load(q1);
-        for (int k = 1; k <= f_.slots.row_reach; ++k) sum1[k][c] = Pack::load(q1 + k) + Pack::load(q1 - k);
-      }
-      if constexpr (D > 2) {
-        const double* q2 = Q.component(c * D + 2) + from;
-        sum2[0][c] = Pack::load(q2);
-        for (int k = 1; k <= f_.slots.row_reach; ++k) sum2[k][c] = Pack::load(q2 + k) + Pack::load(q2 - k);
-      }
-      if constexpr (with_source) {
-        const double* v = source.component(c) + p;
-        sum0[0][c] = Pack::load(v);
-        for (int k = 1; k <= f_.slots.row_reach; ++k) sum0[k][c] = Pack::load(v + k) + Pack::load(v - k);
-      }
+      const double* q[3] = {};
+      for (int e = 0; e < D; ++e) q[e] = Q.component(c * D + e) + from;
+      const double* const v = with_source ? source.component(c) + row.first : nullptr;
+      double* const target = f.component(c) + row.first;
+      int k = 0;
+      for (; k + packs * pack_width <= cells; k += packs * pack_width) scatter<packs, with_source>(row, k, q, v, target);
+      for (; k < cells; k += pack_width) scatter<1, with_source>(row, k, q, v, target);
     }
+  }
+
+  /// A component of the forces of V packs of sources from cell k of the row on.
+  template <int V, bool with_source>
+  void scatter(const LatticeRow& row, int k, const double* const (&q)[3], const double* source, double* target) const noexcept {
+    const auto at = [&](const double* values, int v) { return Pack::load(values + k + v * pack_width); };
     if (f_.slots.own_row >= 0) {
       const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(f_.slots.own_row)];
-      for (int c = 0; c < D; ++c) {
-        Pack a = Pack::load(f.component(c) + p);
-        for (int k = 1; k <= profile.reach; ++k) {
-          a += Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * difference[k][c];
-          if constexpr (with_source) a += Pack(profile.omega[static_cast<std::size_t>(k)]) * sum0[k][c];
+      for (int v = 0; v < V; ++v) {
+        Pack a = at(target, v);
+        for (int n = 1; n <= profile.reach; ++n) {
+          a = multiply_add(Pack(profile.omega_d0[static_cast<std::size_t>(n)]), at(q[0] + n, v) - at(q[0] - n, v), a);
+          if constexpr (with_source) a = multiply_add(Pack(profile.omega[static_cast<std::size_t>(n)]), at(source + n, v) + at(source - n, v), a);
         }
-        a.store(f.component(c) + p);
+        a.store(target + k + v * pack_width);
       }
     }
     if constexpr (D > 1) {
       int current = -1;
-      Pack a[D], b[D], g[D], near[D];
+      Pack a[V], b[V], g[V];  // even in the offset across the rows, and odd along one and the other axis
       for (const RowPair& pair : f_.slots.row_pairs) {
         const bool below = wanted(row.k1 - pair.d1, row.k2 - pair.d2), above = wanted(row.k1 + pair.d1, row.k2 + pair.d2);
         if (!below && !above) continue;
         if (pair.profile != current) {
           current = pair.profile;
           const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(current)];
-          const double* w = profile.omega.data();
-          const double* wk = profile.omega_d0.data();
-          for (int c = 0; c < D; ++c) {
-            a[c] = Pack(0.0);
-            b[c] = Pack(w[0]) * sum1[0][c];
-            if constexpr (D > 2) g[c] = Pack(w[0]) * sum2[0][c];
-            if constexpr (with_source) near[c] = Pack(w[0]) * sum0[0][c];
+          const Pack w0(profile.omega[0]);
+          for (int v = 0; v < V; ++v) {
+            a[v] = with_source ? w0 * at(source, v) : Pack(0.0);
+            b[v] = w0 * at(q[1], v);
+            if constexpr (D > 2) g[v] = w0 * at(q[2], v);
           }
-          for (int k = 1; k <= profile.reach; ++k) {
-            for (int c = 0; c < D; ++c) {
-              a[c] += Pack(wk[k]) * difference[k][c];
-              b[c] += Pack(w[k]) * sum1[k][c];
-              if constexpr (D > 2) g[c] += Pack(w[k]) * sum2[k][c];
-              if constexpr (with_source) near[c] += Pack(w[k]) * sum0[k][c];
+          for (int n = 1; n <= profile.reach; ++n) {
+            const Pack w(profile.omega[static_cast<std::size_t>(n)]), wn(profile.omega_d0[static_cast<std::size_t>(n)]);
+            for (int v = 0; v < V; ++v) {
+              a[v] = multiply_add(wn, at(q[0] + n, v) - at(q[0] - n, v), a[v]);
+              b[v] = multiply_add(w, at(q[1] + n, v) + at(q[1] - n, v), b[v]);
+              if constexpr (D > 2) g[v] = multiply_add(w, at(q[2] + n, v) + at(q[2] - n, v), g[v]);
+              if constexpr (with_source) a[v] = multiply_add(w, at(source + n, v) + at(source - n, v), a[v]);
             }
           }
         }
-        for (int c = 0; c < D; ++c) {
-          Pack across = Pack(pair.d1) * b[c];
-          if constexpr (D > 2) across += Pack(pair.d2) * g[c];
-          const Pack even = with_source ? a[c] + near[c] : a[c];
-          double* target = f.component(c) + p;
-          if (below) (Pack::load(target - pair.shift) + (even + across)).store(target - pair.shift);
-          if (above) (Pack::load(target + pair.shift) + (even - across)).store(target + pair.shift);
+        for (int v = 0; v < V; ++v) {
+          Pack across = multiply_add(Pack(pair.d1), b[v], Pack(0.0));
+          if constexpr (D > 2) across = multiply_add(Pack(pair.d2), g[v], across);
+          double* const to = target + k + v * pack_width;
+          if (below) (Pack::load(to - pair.shift) + (a[v] + across)).store(to - pair.shift);
+          if (above) (Pack::load(to + pair.shift) + (a[v] - across)).store(to + pair.shift);
         }
-      }
-    }
-  }
-
-  /// Horizons of many cells: no buffers.
-  template <bool with_source>
-  void scatter_far(const LatticeRow& row, std::int64_t p, ConstFieldView Q, std::int64_t from, ConstFieldView source, FieldView f) const noexcept {
-    const auto sums = [&](int profile_index, int c, Pack (&out)[3]) {
-      const RowProfile& profile = f_.slots.profiles[static_cast<std::size_t>(profile_index)];
-      for (int e = 0; e < D; ++e) {
-        const double* q = Q.component(c * D + e) + from;
-        out[e] = e == 0 ? Pack(0.0) : Pack(profile.omega[0]) * Pack::load(q);
-        for (int k = 1; k <= profile.reach; ++k) {
-          out[e] += e == 0 ? Pack(profile.omega_d0[static_cast<std::size_t>(k)]) * (Pack::load(q + k) - Pack::load(q - k))
-                           : Pack(profile.omega[static_cast<std::size_t>(k)]) * (Pack::load(q + k) + Pack::load(q - k));
-        }
-      }
-      if constexpr (with_source) {   // goes where the first sum goes
-        const double* v = source.component(c) + p;
-        if (profile_index != f_.slots.own_row) out[0] += Pack(profile.omega[0]) * Pack::load(v);
-        for (int k = 1; k <= profile.reach; ++k) out[0] += Pack(profile.omega[static_cast<std::size_t>(k)]) * (Pack::load(v + k) + Pack::load(v - k));
-      }
-    };
-    for (int c = 0; c < D; ++c) {
-      Pack s[3];
-      double* target = f.component(c) + p;
-      if (f_.slots.own_row >= 0) {
-        sums(f_.slots.own_row, c, s);
-        (Pack::load(target) + s[0]).store(target);
-      }
-      int current = -1;
-      for (const RowPair& pair : f_.slots.row_pairs) {
-        if (pair.profile != current) sums(current = pair.profile, c, s);
-        Pack across = D > 1 ? Pack(pair.d1) * s[1] : Pack(0.0);
-        if (D > 2) across += Pack(pair.d2) * s[2];
-        if (wanted(row.k1 - pair.d1, row.k2 - pair.d2))
-          (Pack::load(target - pair.shift) + (s[0] + across)).store(target - pair.shift);
-        if (wanted(row.k1 + pair.d1, row.k2 + pair.d2))
-          (Pack::load(target + pair.shift) + (s[0] - across)).store(target + pair.shift);
       }
     }
   }
