@@ -6,6 +6,7 @@ usage: ends.py PROGRAM LIBRARY WORK FOLDER_OF_THE_FAILING_INTEGRATOR
 import glob
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -89,6 +90,26 @@ def named_pair():
         check(done.returncode == 2 and perikit_lines(done.stderr, expected) == 1, "%d ranks name the pair that comes first" % ranks)
         if done.returncode != 2 or perikit_lines(done.stderr, expected) != 1:
             print(done.stderr)
+
+
+def loose_pieces():
+    """Pieces that wind through all parts, or lie in one of them, or hang together across a plane of symmetry alone: any number of ranks names the same."""
+    serpentine = "x < 4 || (x > 6 && (cos(pi*y/4) < 0.7 || (cos(pi*y/8) > 0 ? x > 29 : x < 9)))"
+    islands = "(x < 6 || sin(1.3*x)*sin(1.1*y + 0.3*x) > 0.1)"
+    for what, cells, inside, extra in (
+            ("a serpentine", [32, 40], serpentine, ""),
+            ("islands", [40, 40], islands, ""),
+            ("islands at a plane of symmetry", [40, 40], islands, '[[symmetry]]\naxis = "y"\nat = 0.0\n'),
+            ("islands in a periodic body", [40, 40], islands, '[[periodic]]\naxis = "y"\nlower = 0.0\nupper = 40.0\n'),
+            ("islands in space", [16, 14, 12], "x < 3 || sin(2.3*x)*sin(2.1*y + 0.3*x)*cos(2*z) > 0.2", "")):
+        text = without_velocity(scene('type = "conventional"', len(cells), integrator='type = "jfnk"\npreconditioner = "companion"', cells=cells, extra=extra))
+        text = text.replace("horizon_ratio = 3.015", "horizon_ratio = 1.5").replace("horizon_ratio = 2.515", "horizon_ratio = 1.5").replace("[sets]", 'inside = "%s"\n[sets]' % inside, 1)
+        said = []
+        for ranks in (0, 2, 3, 4):
+            done = run(PROGRAM, text, WORK + "/loose", ranks)
+            found = re.findall("found nothing that holds ([^:]*):", done.stderr)
+            said.append(found[0] if len(found) == 1 and done.returncode == 2 else "status %d, %s" % (done.returncode, done.stderr))
+        check(said[0].startswith("a piece of") and len(set(said)) == 1, "%s: %s" % (what, said[0] if len(set(said)) == 1 else said))
 
 
 def other_commands():
@@ -207,6 +228,7 @@ shutil.rmtree(WORK, ignore_errors=True)
 os.makedirs(WORK)
 refusals()
 named_pair()
+loose_pieces()
 throws()
 other_commands()
 output_fails()

@@ -156,12 +156,12 @@ def cases(everything, work):
         yield "%s, large, torn" % name, text, (2, 3) if everything else (2,), (1,)
     for name in STATICS if everything else ("jfnk",):
         for cloud in (False, True) if everything else (False,):
-            yield "%s, %s" % (name, "cloud" if cloud else "lattice"), without_velocity(scene(KINEMATICS["baqp"], 2, cloud, STATICS[name])), ranks, threads
+            yield OWN_PART + "%s, %s" % (name, "cloud" if cloud else "lattice"), without_velocity(scene(KINEMATICS["baqp"], 2, cloud, STATICS[name])), ranks, threads
     for integrator in TEARING if everything else ("jfnk",):
         for name, criterion in (("baqp", "critical_energy"), ("bond_based", "critical_stretch")) if everything else (("baqp", "critical_stretch"),):
             for cloud in (False, True) if everything else (True,):
                 text = torn_slowly(KINEMATICS[name], TEARING[integrator], DAMAGE[criterion], cloud)
-                yield "%s, %s, %s, %s" % (integrator, name, criterion, "cloud" if cloud else "lattice"), text, ranks, threads
+                yield OWN_PART + "%s, %s, %s, %s" % (integrator, name, criterion, "cloud" if cloud else "lattice"), text, ranks, threads
     for name in ("conventional", "projection", "ordinary", "bond_associated") if everything else ("projection",):
         for cloud in (False, True) if everything else (False,):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))

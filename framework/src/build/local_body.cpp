@@ -61,8 +61,8 @@ struct CloudPlanes {
 };
 
 /// points: of this rank. The frame gets images of its cracks.
-CloudPlanes planes_of_cloud(const Scene& scene, const PointStream& points, BodyFrame& frame) {
-  ScenePlanes planes = build_planes(scene, placed_points(scene, frame, points), false);
+CloudPlanes planes_of_cloud(const Scene& scene, const PointStream& points, bool quasi_static, BodyFrame& frame) {
+  ScenePlanes planes = build_planes(scene, placed_points(scene, frame, points), quasi_static);
   ImageMaker maker(dimension(frame.space), halo(frame.horizon), planes.planes);
   frame.cracks = maker.cracks(std::move(frame.cracks));
   return {std::move(planes), std::move(maker)};
@@ -77,20 +77,20 @@ LocalPlaces placed(const BodyFrame& frame, const CloudShares& shares, const Part
 }
 
 /// A rank without others goes through the points of the cloud.
-LocalPlaces place_stream(const Scene& scene, const CloudOutline& cloud, const Partition::Reach& reach, std::uint16_t far_material) {
+LocalPlaces place_stream(const Scene& scene, const CloudOutline& cloud, const Partition::Reach& reach, std::uint16_t far_material, bool quasi_static) {
   BodyFrame frame = scene_frame(scene, cloud.spacing);
   if (!has_images(scene))
     return placed(std::make_unique<Partition>(frame, StreamedCloud(cloud.points, cloud.extent, frame.horizon), reach), far_material);
-  CloudPlanes planes = planes_of_cloud(scene, cloud.points, frame);
+  CloudPlanes planes = planes_of_cloud(scene, cloud.points, quasi_static, frame);
   const CloudImages images(planes.maker, cloud.extent.points, most_images(planes.maker, cloud.points), finder_of_stream(cloud.points));
   const PointStream all = images.with_images(cloud.points);
   return placed(frame, StreamedCloud(all, extent_of(all), frame.horizon), reach, far_material, images, planes);
 }
 
-LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
+LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, bool quasi_static) {
   if (!communicator().complete())
     if (const CloudOutline cloud = cloud_outline(scene); !lone_rank_orders(static_cast<double>(cloud.extent.points)))
-      return place_stream(scene, cloud, reach, far_material);
+      return place_stream(scene, cloud, reach, far_material, quasi_static);
   CloudPoints cloud = cloud_points(scene, WhichPoints::run);
   BodyFrame frame = scene_frame(scene, cloud.spacing);
   if (!has_images(scene))
@@ -101,7 +101,7 @@ LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::
     for (std::size_t n = 0; n < mine.position.size(); ++n)
       visit({mine.position[n], mine.volume[n], points.before + static_cast<std::int64_t>(n)});
   };
-  CloudPlanes planes = planes_of_cloud(scene, run, frame);
+  CloudPlanes planes = planes_of_cloud(scene, run, quasi_static, frame);
   CloudImages::Points with_images, made;
   const std::int64_t most = most_images(planes.maker, run, &with_images);
   const CloudImages images(planes.maker, points.all, most, finder_of_run(with_images, points.before));
@@ -146,8 +146,8 @@ void check_part(const Scene& scene, const LatticeShares& shares) {
 
 /// With what lies beyond planes: of a lattice that has places for it, too.
 LocalPlaces part_with_images(const Scene& scene, const Lattice& points, const Inside& inside, const Partition::Reach& reach,
-                             std::uint16_t far_material) {
-  ScenePlanes planes = build_planes(scene, placed_points(scene, points, inside), false);
+                             std::uint16_t far_material, bool quasi_static) {
+  ScenePlanes planes = build_planes(scene, placed_points(scene, points, inside), quasi_static);
   BodyFrame frame = scene_frame(scene, points.spacing);
   const Lattice lattice = with_images(points, frame.horizon, planes.planes);
   const LatticeImages images(points, lattice, inside, ImageMaker(points.dimension, halo(frame.horizon), planes.planes));
@@ -166,7 +166,7 @@ LocalPlaces part_with_images(const Scene& scene, const Lattice& points, const In
   }
 }
 
-LocalPlaces place_lattice(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
+LocalPlaces place_lattice(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, bool quasi_static) {
   const LatticeDescription& description = *scene.body.lattice;
   const double estimate = estimated_cells(scene), ratio = scene_horizon(scene, description.spacing) / description.spacing;
   const Lattice lattice = scene_lattice(scene);
@@ -175,8 +175,8 @@ LocalPlaces place_lattice(const Scene& scene, const Partition::Reach& reach, std
   std::vector<std::int64_t> points = points_in_tiles(lattice, inside);
   const std::int64_t all = std::accumulate(points.begin(), points.end(), std::int64_t{0});
   if (all == 0) refuse_empty_lattice(description);
-  if (sparse(static_cast<double>(all), lattice)) return place_cloud(scene, reach, far_material);
-  if (has_images(scene)) return part_with_images(scene, lattice, inside, reach, far_material);
+  if (sparse(static_cast<double>(all), lattice)) return place_cloud(scene, reach, far_material, quasi_static);
+  if (has_images(scene)) return part_with_images(scene, lattice, inside, reach, far_material, quasi_static);
   const LatticeShares shares(lattice, std::move(points), communicator().size());
   check_part(scene, shares);
   return placed(std::make_unique<Partition>(scene_frame(scene, description.spacing), lattice, shares, inside, reach), far_material);
@@ -218,9 +218,9 @@ int heaviest_rank(const Scene& scene, int ranks) {
   return heaviest;
 }
 
-LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, std::uint16_t image_material) {
+LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, std::uint16_t image_material, bool quasi_static) {
   check_volumes(scene);
-  LocalPlaces places = is_cloud(scene) ? place_cloud(scene, reach, far_material) : place_lattice(scene, reach, far_material);
+  LocalPlaces places = is_cloud(scene) ? place_cloud(scene, reach, far_material, quasi_static) : place_lattice(scene, reach, far_material, quasi_static);
   const SetMembers members = add_sets(scene.sets, places.body);
   std::vector<std::uint16_t> material = materials_of_part(scene, members, places.body);
   set_materials(material, far_material, image_material, places.body);

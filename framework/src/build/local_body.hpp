@@ -24,6 +24,6 @@ struct LocalBody {
 /// reach alone; of a cloud ranks make runs of points in the order of the input, and give each other those that they need.
 /// far_material: of far points; image_material: of images. All ranks must call it. Throws InputError as build_body, and
 /// std::domain_error as Partition.
-LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, std::uint16_t image_material = 0);
+LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, std::uint16_t image_material = 0, bool quasi_static = false);
 
 }  // namespace perikit

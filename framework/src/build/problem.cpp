@@ -20,7 +20,6 @@
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/rank_values.hpp"
-#include "problem/whole_body.hpp"
 #include "spaces/consistency.hpp"
 
 namespace perikit {
@@ -60,9 +59,9 @@ Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
 }
 
 /// The body of this rank, which no rank has as a whole.
-Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts) {
+Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   try {
-    LocalBody local = build_local_body(scene, reach_of(scene, formulation), far_material(scene, has_images(scene)), image_material(scene));
+    LocalBody local = build_local_body(scene, reach_of(scene, formulation), far_material(scene, has_images(scene)), image_material(scene), quasi_static);
     parts.body = std::make_unique<const Body>(std::move(local.body));
     parts.partition = std::move(local.partition);
     Beyond beyond;
@@ -82,8 +81,8 @@ Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulat
 /// The bodies of this rank and, where there are several, of all of them.
 Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   if (communicator().size() > 1) {
-    parts.placed_whole = needs_whole_body(scene, quasi_static);
-    if (parts.placed_whole.empty()) return place_part(scene, factory, formulation, parts);
+    parts.placed_whole = needs_whole_body(scene);
+    if (parts.placed_whole.empty()) return place_part(scene, factory, formulation, parts, quasi_static);
   }
   Body whole = build_body(scene);
   std::vector<std::uint16_t> material = materials_of_points(whole);
@@ -227,15 +226,6 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
   }
 }
 
-std::unique_ptr<WholeBody> build_whole(const Scene& scene, const ProblemParts& parts, const Beyond& beyond) {
-  const Body& whole = *parts.partition->whole();
-  std::unique_ptr<Families> families = Families::make(whole, parts.families->influence(), parts.families->needs());
-  if (scene.damage) families->let_fail();
-  std::unique_ptr<const ImageMap> images;
-  if (beyond.images.size() > 0) images = std::make_unique<const ImageMap>(whole, beyond.images);
-  return std::make_unique<WholeBody>(WholeBody{std::move(families), std::move(images), build_constraints(scene, whole, beyond.images, beyond.motions, true)});
-}
-
 }  // namespace
 
 std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory& factory, const IntegratorTraits& integrator,
@@ -275,7 +265,6 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.materials.resize(parts.laws->records().size(), scene.material->type);
 
   steps.begin("boundaries and loads");
-  if (partition && quasi_static && communicator().rank() == 0) parts.whole = build_whole(scene, parts, beyond);
   Constraints constraints = build_constraints(scene, body, images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
@@ -283,7 +272,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
   Loads loads = build_loads(scene, of_terms, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
-  if (partition && !parts.whole) parts.partition->forget_whole();
+  if (partition) parts.partition->forget_whole();
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }

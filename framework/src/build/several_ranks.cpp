@@ -33,9 +33,8 @@ bool faces_of_single_points(const Scene& scene) {
 
 }  // namespace
 
-std::string needs_whole_body(const Scene& scene, bool quasi_static) {
+std::string needs_whole_body(const Scene& scene) {
   if (scene.body.voronoi) return "Voronoi cells are found of all points together";
-  if (quasi_static) return "pieces that nothing holds are looked for";
   if (!has_images(scene)) return {};
   if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); }))
     return "there are images beyond held surfaces";

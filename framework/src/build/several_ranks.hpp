@@ -16,6 +16,6 @@ bool has_images(const Scene& scene);
 
 /// Why every rank places the whole body of the scene, in words; empty where each of them places its own part alone. All
 /// ranks must call it.
-std::string needs_whole_body(const Scene& scene, bool quasi_static);
+std::string needs_whole_body(const Scene& scene);
 
 }  // namespace perikit

@@ -5,9 +5,7 @@
 #include <algorithm>
 
 #include "core/following_arrival.hpp"
-#include "core/merged_rows.hpp"
 #include "families/families.hpp"
-#include "families/shared_bonds.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
@@ -251,15 +249,7 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
 }
 
 void BodyProblem::find_pieces(bool fresh) {
-  if (!weak_springs_) return;
-  if (ghosts_ && parts_.fracture.damage()) {
-    Families* const whole = parts_.whole ? parts_.whole->families.get() : nullptr;  // on rank 0
-    if (whole) whole->mend();
-    const std::vector<NamedChange> mine = terms().own_changed_bonds();
-    over_merged(std::span(mine),
-                [&](std::span<const NamedChange> piece) { whole->lower(SharedBonds(whole->body()).inward(piece)); });
-  }
-  weak_springs_->find(seen(state().displacement(), seen_), fresh);
+  if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), fresh);
 }
 
 /// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
@@ -298,7 +288,7 @@ void BodyProblem::react(std::span<const std::int32_t> ends, FieldView velocity) 
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
-  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs, parts_.whole.get());
+  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
   find_pieces(true);
   return weak_springs_->names();
 }
@@ -350,15 +340,24 @@ void BodyProblem::write_snapshot(const std::function<void(std::uint64_t)>& begin
 }
 
 std::vector<std::byte> BodyProblem::snapshot() const {
-  std::vector<std::byte> all;
-  write_snapshot([&](std::uint64_t size) { all.reserve(size); },
-                 [&](std::span<const std::byte> piece) { all.insert(all.end(), piece.begin(), piece.end()); });
-  return all;
+  ByteWriter out;
+  out.value(static_cast<std::uint64_t>(body().stride()));
+  values_.constraints.write(out);
+  parts_.fracture.write_here(terms(), out);
+  HistoryRecord::write_here(terms(), out);
+  values_.state.write_here(out);
+  return out.take();
 }
 
 void BodyProblem::restore(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
-  restore(in);
+  if (in.value<std::uint64_t>() != body().stride()) throw InputError("the saved state belongs to another body");
+  constraints().read(in);
+  parts_.fracture.read_here(terms(), in);
+  HistoryRecord::read_here(in, terms());
+  state().read_here(in);
+  if (!in.done()) throw InputError("the saved state is damaged");
+  find_pieces(false);
 }
 
 void BodyProblem::restore(ByteReader& in) {

@@ -7,6 +7,10 @@
 
 namespace perikit {
 
+namespace {
+[[noreturn]] void refuse() { throw InputError("the saved state belongs to other materials"); }
+}  // namespace
+
 HistoryRecord::HistoryRecord(const Terms& terms) : history_(terms.history()), components_(history_ ? history_->components() : 0) {
   for (const HistoryPlace& place : terms.history_points()) {
     if (!place.own) continue;
@@ -41,16 +45,15 @@ void HistoryRecord::write(ByteWriter& out) const {
 
 void HistoryRecord::read(ByteReader& in, Terms& terms) {
   LawHistory* const history = terms.history();
-  const char* const other = "the saved state belongs to other materials";
   const auto components = in.value<std::uint64_t>(), count = in.value<std::uint64_t>();
-  if (components != (history ? history->components() : 0)) throw InputError(other);
+  if (components != (history ? history->components() : 0)) refuse();
   in.expect(count, sizeof(HistoryPoint) + components * sizeof(double));
   const std::vector<HistoryPlace> places = terms.history_points();
   std::vector<std::uint64_t> rows;  // of these in the record; both ascend
   for (std::uint64_t row = 0; row < count; ++row)
     for (const auto point = in.value<HistoryPoint>(); rows.size() < places.size() && places[rows.size()].point == point;)
       rows.push_back(row);
-  if (rows.size() < places.size()) throw InputError(other);
+  if (rows.size() < places.size()) refuse();
   if (!history) return;
   const std::span<double> all = history->values();
   std::ranges::fill(all, 0.0);
@@ -70,6 +73,19 @@ std::size_t HistoryRecord::count(ByteReader& in) {
   in.expect(components, 1);
   in.expect(points, sizeof(HistoryPoint) + components * sizeof(double));
   return points * components;
+}
+
+void HistoryRecord::write_here(const Terms& terms, ByteWriter& out) {
+  const LawHistory* const history = terms.history();
+  out.numbers(history ? history->values() : std::span<const double>());
+}
+
+void HistoryRecord::read_here(ByteReader& in, Terms& terms) {
+  LawHistory* const history = terms.history();
+  const std::span<double> values = history ? history->values() : std::span<double>();
+  if (in.value<std::uint64_t>() != values.size()) refuse();
+  in.bytes(values.data(), values.size_bytes());
+  if (history) terms.history_restored();
 }
 
 }  // namespace perikit

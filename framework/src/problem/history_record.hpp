@@ -26,6 +26,10 @@ class HistoryRecord {
   /// How many values there are, which are left where they are.
   static std::size_t count(ByteReader& in);
 
+  // The same of this rank alone.
+  static void write_here(const Terms& terms, ByteWriter& out);
+  static void read_here(ByteReader& in, Terms& terms);
+
  private:
   const LawHistory* history_;
   std::size_t components_;            ///< numbers an evaluation point

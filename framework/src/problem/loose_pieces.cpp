@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numeric>
 
 #include "core/symmetric_matrix.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -19,11 +22,14 @@ constexpr int motions_of(int dimension) {
   return dimension * (dimension + 1) / 2;
 }
 constexpr std::array<std::array<int, 2>, 3> planes{{{0, 1}, {0, 2}, {1, 2}}};
+constexpr std::size_t most_motions = motions_of(3);
+/// Products of each motion with each.
+using Products = std::array<double, most_motions * most_motions>;
 
-/// Which points belong together.
+/// Which of so many things belong together.
 class Parts {
  public:
-  explicit Parts(std::size_t points) : above_(points) { std::iota(above_.begin(), above_.end(), 0); }
+  explicit Parts(std::size_t things) : above_(things) { std::iota(above_.begin(), above_.end(), 0); }
   std::int32_t of(std::int32_t p) {
     while (above_[static_cast<std::size_t>(p)] != p) {
       std::int32_t& above = above_[static_cast<std::size_t>(p)];
@@ -59,59 +65,159 @@ Sources sources_of(const Body& body, const ImageMap* images) {
   if (!images) return all;
   Field number = body.make_field(1);
   all.sign = body.make_field(body.dimension());
-  std::vector<std::int32_t> of_images(body.internal().begin(), body.internal().end());
-  const std::size_t real = of_images.size() - images->size();
-  for (std::size_t k = 0; k < real; ++k) {
-    const std::int32_t p = of_images[k];
+  for (const std::int32_t p : body.internal()) {
+    if (body.image(static_cast<std::size_t>(p))) continue;
     number.data()[p] = p;
     for (int c = 0; c < body.dimension(); ++c) all.sign.component(c)[p] = 1;
   }
   images->copy_from_sources(number);
   images->extend(all.sign);
-  for (std::size_t k = real; k < of_images.size(); ++k)
-    all.source[static_cast<std::size_t>(of_images[k])] = static_cast<std::int32_t>(number.data()[of_images[k]]);
+  for (const std::int32_t p : body.internal())
+    if (body.image(static_cast<std::size_t>(p))) all.source[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(number.data()[p]);
   return all;
 }
 
-/// The piece before its motions are sifted: those of unit norm that move it at all.
-void find_motions(const Body& body, ConstFieldView u, LoosePiece& piece) {
-  const int d = body.dimension(), m = motions_of(d);
-  piece.centre = {};
-  for (const std::int32_t p : piece.points)
-    for (std::size_t c = 0; c < 3; ++c) piece.centre[c] += place(body, u, p)[c] / static_cast<double>(piece.points.size());
-  piece.size = 1e-3 * body.spacing();
-  for (const std::int32_t p : piece.points)
-    for (std::size_t c = 0; c < 3; ++c) piece.size = std::max(piece.size, std::abs(place(body, u, p)[c] - piece.centre[c]));
-  std::vector<double> gram(static_cast<std::size_t>(m * m), 0.0);
-  for (const std::int32_t p : piece.points) {
-    std::array<Point, 6> at;
-    for (int k = 0; k < m; ++k) {
-      LoosePiece::Motion unit{};
-      unit[static_cast<std::size_t>(k)] = 1;
-      at[static_cast<std::size_t>(k)] = piece.at(unit, d, place(body, u, p));
-    }
-    for (int j = 0; j < m; ++j)
-      for (int k = 0; k < m; ++k)
-        for (std::size_t c = 0; c < 3; ++c) gram[static_cast<std::size_t>(j * m + k)] += at[static_cast<std::size_t>(j)][c] * at[static_cast<std::size_t>(k)][c];
+/// Pieces of one rank that are parts of one: `other` holds the lowest number of a point of the other part, on its rank.
+struct Link {
+  std::int64_t mine, other;
+};
+
+/// What the pieces are called that have parts on several ranks: by the lowest number of a part that of the whole. All ranks must call it.
+std::map<std::int64_t, std::int64_t> names_of_parts(const std::vector<Link>& links) {
+  const std::vector<Link> all = gathered(std::span(links));
+  std::vector<std::int64_t> numbers;
+  for (const Link& link : all) {
+    numbers.push_back(link.mine);
+    numbers.push_back(link.other);
   }
-  const SymmetricEigen axes(m, gram.data());
-  for (int k = 0; k < m; ++k) {
-    // Points on a line do not turn about it, and a single one does not turn.
-    if (axes.value(k) <= 1e-9 * axes.largest()) continue;
-    LoosePiece::Motion motion{};
-    for (int j = 0; j < m; ++j)
-      motion[static_cast<std::size_t>(j)] = axes.vector(j, k) / std::sqrt(axes.value(k));
-    piece.motions.push_back(motion);
+  std::ranges::sort(numbers);
+  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
+  const auto index = [&](std::int64_t number) { return static_cast<std::int32_t>(std::ranges::lower_bound(numbers, number) - numbers.begin()); };
+  Parts parts(numbers.size());
+  for (const Link& link : all) parts.join(index(link.mine), index(link.other));
+  std::vector<Link> names;
+  for (const std::int64_t number : numbers)
+    names.push_back({number, numbers[static_cast<std::size_t>(parts.of(index(number)))]});
+  std::map<std::int64_t, std::int64_t> name_of;
+  for (const Link& name : told_to_all(names)) name_of[name.mine] = name.other;
+  return name_of;
+}
+
+/// values, `width` of each piece, <- their sums over all parts of the piece. All ranks must call it.
+void add_up(const std::vector<LoosePiece>& pieces, std::size_t width, std::span<double> values) {
+  if (communicator().size() == 1) return;
+  std::vector<double> mine;  // of each piece its number, which a double holds, and the values
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    if (!pieces[k].shared) continue;
+    mine.push_back(static_cast<double>(pieces[k].first));
+    mine.insert(mine.end(), values.begin() + k * width, values.begin() + (k + 1) * width);
+  }
+  const std::vector<double> all = gathered<double>(mine);
+  std::map<double, std::vector<double>> sums;
+  for (std::size_t k = 0; k < all.size(); k += width + 1) {
+    std::vector<double>& sum = sums.try_emplace(all[k], width, 0.0).first->second;
+    for (std::size_t i = 0; i < width; ++i) sum[i] += all[k + 1 + i];
+  }
+  std::vector<double> told;
+  for (const auto& [number, sum] : sums) {
+    told.push_back(number);
+    told.insert(told.end(), sum.begin(), sum.end());
+  }
+  told = told_to_all(told);
+  std::map<double, std::size_t> place;
+  for (std::size_t k = 0; k < told.size(); k += width + 1) place[told[k]] = k + 1;
+  for (std::size_t k = 0; k < pieces.size(); ++k)
+    if (pieces[k].shared) std::copy_n(told.begin() + place.at(static_cast<double>(pieces[k].first)), width, values.begin() + k * width);
+}
+
+/// The pieces of which this rank has points, with these alone.
+std::vector<LoosePiece> find_pieces(const Body& body, Parts& parts, Problem& problem) {
+  constexpr std::int64_t none = std::numeric_limits<std::int64_t>::max();
+  std::vector<std::int64_t> first(body.stride(), none);  // by the point that the part leads to
+  const auto first_of = [&](std::int32_t p) -> std::int64_t& { return first[static_cast<std::size_t>(parts.of(p))]; };
+  for (const std::int32_t p : body.owned()) first_of(p) = std::min(first_of(p), body.number(static_cast<std::size_t>(p)));
+  std::map<std::int64_t, std::int64_t> name_of;
+  if (communicator().size() > 1) {
+    Field at_owners = body.make_field(1);
+    for (const std::int32_t p : body.owned()) at_owners.data()[p] = static_cast<double>(first_of(p));
+    problem.share(at_owners);
+    std::vector<Link> links;
+    for (const std::int32_t p : body.internal()) {
+      const auto point = static_cast<std::size_t>(p);
+      if (!body.owns(point) && !body.image(point) && first_of(p) != none) links.push_back({first_of(p), static_cast<std::int64_t>(at_owners.data()[p])});
+    }
+    const auto both = [](const Link& link) { return std::pair(link.mine, link.other); };
+    std::ranges::sort(links, {}, both);
+    links.erase(std::ranges::unique(links, {}, both).begin(), links.end());
+    name_of = names_of_parts(links);
+  }
+  std::map<std::int64_t, std::size_t> place;  // by name
+  std::vector<LoosePiece> pieces;
+  for (const std::int32_t p : body.owned()) {
+    const auto found = name_of.find(first_of(p));
+    const std::int64_t name = found == name_of.end() ? first_of(p) : found->second;
+    const auto [piece, fresh] = place.try_emplace(name, pieces.size());
+    if (fresh) {
+      pieces.emplace_back().first = name;
+      pieces.back().shared = found != name_of.end();
+    }
+    pieces[piece->second].points.push_back(p);
+  }
+  for (LoosePiece& piece : pieces) std::ranges::sort(piece.points);
+  return pieces;
+}
+
+/// How many points the pieces have, where they are, and their motions before they are sifted: those of unit norm that move a piece at all.
+void find_motions(const Body& body, ConstFieldView u, std::vector<LoosePiece>& pieces) {
+  const int d = body.dimension(), m = motions_of(d);
+  std::vector<std::array<double, 4>> places(pieces.size());
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    places[k] = {static_cast<double>(pieces[k].points.size())};
+    for (const std::int32_t p : pieces[k].points)
+      for (std::size_t c = 0; c < 3; ++c) places[k][1 + c] += place(body, u, p)[c];
+  }
+  add_up(pieces, 4, {places.front().data(), 4 * places.size()});
+  std::vector<Products> gram(pieces.size());
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    LoosePiece& piece = pieces[k];
+    piece.count = static_cast<std::int64_t>(places[k][0]);
+    for (std::size_t c = 0; c < 3; ++c) piece.centre[c] = places[k][1 + c] / places[k][0];
+    gram[k] = {};
+    for (const std::int32_t p : piece.points) {
+      std::array<Point, most_motions> at;
+      for (int i = 0; i < m; ++i) {
+        LoosePiece::Motion unit{};
+        unit[static_cast<std::size_t>(i)] = 1;
+        at[static_cast<std::size_t>(i)] = piece.at(unit, d, place(body, u, p));
+      }
+      for (int i = 0; i < m; ++i)
+        for (int j = 0; j < m; ++j)
+          for (std::size_t c = 0; c < 3; ++c) gram[k][static_cast<std::size_t>(i * m + j)] += at[static_cast<std::size_t>(i)][c] * at[static_cast<std::size_t>(j)][c];
+    }
+  }
+  add_up(pieces, gram.front().size(), {gram.front().data(), gram.front().size() * gram.size()});
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    LoosePiece& piece = pieces[k];
+    // Turns as long as translations.
+    double turned = 0;
+    for (int i = translations(d); i < m; ++i) turned += gram[k][static_cast<std::size_t>(i * m + i)];
+    piece.size = std::max(1e-3 * body.spacing(), std::sqrt(turned / static_cast<double>(piece.count)));
+    const auto scale = [&](int i) { return i < translations(d) ? 1.0 : piece.size; };
+    for (int i = 0; i < m; ++i)
+      for (int j = 0; j < m; ++j) gram[k][static_cast<std::size_t>(i * m + j)] /= scale(i) * scale(j);
+    const SymmetricEigen axes(m, gram[k].data());
+    for (int i = 0; i < m; ++i) {
+      // Points on a line do not turn about it, and a single one does not turn.
+      if (axes.value(i) <= 1e-9 * axes.largest()) continue;
+      LoosePiece::Motion& motion = piece.motions.emplace_back();
+      for (int j = 0; j < m; ++j) motion[static_cast<std::size_t>(j)] = axes.vector(j, i) / std::sqrt(axes.value(i));
+    }
   }
 }
 
-/// Keeps the motions that violate none of the conditions: rows of their values.
-void keep_free(const std::vector<std::vector<double>>& rows, LoosePiece& piece) {
+/// Keeps the motions that violate none of the conditions, of whose values at the motions these are the products.
+void keep_free(const Products& squares, LoosePiece& piece) {
   const auto n = static_cast<int>(piece.motions.size());
-  std::vector<double> squares(static_cast<std::size_t>(n * n), 0.0);
-  for (const std::vector<double>& row : rows)
-    for (std::size_t j = 0; j < piece.motions.size(); ++j)
-      for (std::size_t k = 0; k < piece.motions.size(); ++k) squares[j * piece.motions.size() + k] += row[j] * row[k];
   const SymmetricEigen axes(n, squares.data());
   const double largest = n > 0 ? axes.largest() : 0.0;
   std::vector<LoosePiece::Motion> free;
@@ -124,6 +230,22 @@ void keep_free(const std::vector<std::vector<double>>& rows, LoosePiece& piece) 
     free.push_back(motion);
   }
   piece.motions = std::move(free);
+}
+
+/// The larger first, then the one with the lowest point.
+bool comes_before(const LoosePiece& a, const LoosePiece& b) { return a.count != b.count ? a.count > b.count : a.first < b.first; }
+
+/// Whether `mine` (null: this rank has none) comes before those of all other ranks. All ranks must call it, each with another piece.
+bool comes_first(const LoosePiece* mine) {
+  const double most = communicator().largest(mine ? static_cast<double>(mine->count) : 0.0);
+  const bool largest = mine && static_cast<double>(mine->count) == most;
+  const double number = largest ? -static_cast<double>(mine->first) : -std::numeric_limits<double>::infinity();
+  return communicator().largest(number) == number && largest;
+}
+
+/// Whether this rank speaks for the piece: it has its first point.
+bool speaks_for(const LoosePiece& piece, const Body& body) {
+  return std::ranges::any_of(piece.points, [&](std::int32_t p) { return body.number(static_cast<std::size_t>(p)) == piece.first; });
 }
 
 }  // namespace
@@ -142,103 +264,103 @@ Point LoosePiece::at(const Motion& motion, int dimension, const Point& y) const 
 }
 
 std::string LoosePiece::name(const Body& body) const {
-  if (points.size() == body.owned().size()) return "the body";
-  return fmt::format("a piece of {} point{} about ({:.6g}, {:.6g}, {:.6g})", points.size(), points.size() == 1 ? "" : "s",
-                     centre[0], centre[1], centre[2]);
+  if (count == static_cast<std::int64_t>(body.points_of_all_ranks())) return "the body";
+  return fmt::format("a piece of {} point{} about ({:.6g}, {:.6g}, {:.6g})", count, count == 1 ? "" : "s", centre[0], centre[1], centre[2]);
 }
 
 std::string names(const std::vector<LoosePiece>& pieces, const Body& body) {
-  if (pieces.empty()) return {};
-  const std::string first = pieces.front().name(body);
-  return pieces.size() == 1 ? first : fmt::format("{} and {} smaller or equal one{}", first, pieces.size() - 1, pieces.size() == 2 ? "" : "s");
+  const LoosePiece* mine = nullptr;
+  std::int64_t spoken_for = 0;
+  for (const LoosePiece& piece : pieces) {
+    if (!speaks_for(piece, body)) continue;
+    if (spoken_for++ == 0) mine = &piece;
+  }
+  const std::int64_t others = counted(spoken_for).all - 1;
+  const std::string first = first_message(comes_first(mine) ? mine->name(body) : "");
+  return others <= 0 ? first : fmt::format("{} and {} smaller or equal one{}", first, others, others == 1 ? "" : "s");
 }
 
-std::vector<LoosePiece> find_loose_pieces(const Families& families, const Constraints& constraints, const ImageMap* images,
-                                          ConstFieldView u) {
+std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, ConstFieldView u) {
   const Body& body = families.body();
   const int d = body.dimension();
-  const Sources sources = sources_of(body, images);
+  const Sources sources = sources_of(body, problem.images());
   const auto source = [&](std::int32_t p) { return sources.source[static_cast<std::size_t>(p)]; };
   Parts parts(body.stride());
-  std::vector<std::int32_t> real, bonded_images;
+  std::vector<std::pair<std::int32_t, std::int32_t>> bonded_images;  // and a point that is bonded to it
   FamilyArrays family;
   for (const std::int32_t p : body.owned()) {
-    if (source(p) >= 0) continue;
-    real.push_back(p);
     families.load(static_cast<std::size_t>(p), BondsOf::intact, family);
     for (int k = 0; k < family.bonds; ++k) {
       const std::int32_t q = family.far[static_cast<std::size_t>(k)];
       parts.join(p, source(q) >= 0 ? source(q) : q);
-      if (source(q) >= 0) bonded_images.push_back(q);
+      if (source(q) >= 0) bonded_images.emplace_back(q, p);
     }
   }
   std::ranges::sort(bonded_images);
-  bonded_images.erase(std::ranges::unique(bonded_images).begin(), bonded_images.end());
+  bonded_images.erase(std::ranges::unique(bonded_images, {}, &std::pair<std::int32_t, std::int32_t>::first).begin(), bonded_images.end());
 
-  std::vector<std::int32_t> number(body.stride(), -1);  // by the first point of a piece
-  std::vector<LoosePiece> pieces;
-  const auto piece_of = [&](std::int32_t p) -> LoosePiece& {
-    return pieces[static_cast<std::size_t>(number[static_cast<std::size_t>(parts.of(p))])];
+  std::vector<LoosePiece> pieces = find_pieces(body, parts, problem);
+  find_motions(body, u, pieces);
+  std::vector<std::int32_t> piece_at(body.stride(), -1);
+  for (std::size_t k = 0; k < pieces.size(); ++k)
+    for (const std::int32_t p : pieces[k].points) piece_at[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(k);
+  // What each motion does where it may do nothing.
+  std::vector<Products> squares(pieces.size(), Products{});
+  const auto add_row = [&](std::int32_t p, auto&& value) {
+    const auto k = static_cast<std::size_t>(piece_at[static_cast<std::size_t>(p)]);
+    const LoosePiece& piece = pieces[k];
+    const std::size_t n = piece.motions.size();
+    std::array<double, most_motions> row;
+    for (std::size_t j = 0; j < n; ++j) row[j] = value(piece, piece.motions[j]);
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j) squares[k][i * n + j] += row[i] * row[j];
   };
-  for (const std::int32_t p : real) {
-    std::int32_t& mine = number[static_cast<std::size_t>(parts.of(p))];
-    if (mine < 0) {
-      mine = static_cast<std::int32_t>(pieces.size());
-      pieces.emplace_back();
-    }
-    pieces[static_cast<std::size_t>(mine)].points.push_back(p);
-  }
-  for (LoosePiece& piece : pieces) {
-    std::ranges::sort(piece.points);
-    find_motions(body, u, piece);
-  }
-  // What each motion does where it may do nothing, piece by piece.
-  std::vector<std::vector<std::vector<double>>> rows(pieces.size());
-  const auto add_row = [&](const LoosePiece& piece, auto&& value) {
-    std::vector<double> row;
-    for (const LoosePiece::Motion& motion : piece.motions) row.push_back(value(motion));
-    rows[static_cast<std::size_t>(&piece - pieces.data())].push_back(std::move(row));
-  };
-  for (const std::int64_t dof : constraints.dofs()) {
+  for (const std::int64_t dof : problem.constraints().dofs()) {
     const auto p = static_cast<std::int32_t>(dof % static_cast<std::int64_t>(body.stride()));
     const auto c = static_cast<std::size_t>(dof / static_cast<std::int64_t>(body.stride()));
-    if (source(p) >= 0 || number[static_cast<std::size_t>(parts.of(p))] < 0) continue;
-    const LoosePiece& piece = piece_of(p);
-    add_row(piece, [&](const LoosePiece::Motion& motion) { return piece.at(motion, d, place(body, u, p))[c]; });
+    if (piece_at[static_cast<std::size_t>(p)] < 0) continue;  // of an image, or of another rank
+    add_row(p, [&](const LoosePiece& piece, const LoosePiece::Motion& motion) { return piece.at(motion, d, place(body, u, p))[c]; });
   }
-  for (const std::int32_t q : bonded_images) {
-    const LoosePiece& piece = piece_of(source(q));
+  for (const auto& [q, p] : bonded_images)
     for (int c = 0; c < d; ++c)
-      add_row(piece, [&](const LoosePiece::Motion& motion) {
+      add_row(p, [&](const LoosePiece& piece, const LoosePiece::Motion& motion) {
         const auto e = static_cast<std::size_t>(c);
         return piece.at(motion, d, place(body, u, q))[e] -
                sources.sign.component(c)[q] * piece.at(motion, d, place(body, u, source(q)))[e];
       });
-  }
-  for (std::size_t k = 0; k < pieces.size(); ++k) keep_free(rows[k], pieces[k]);
+  add_up(pieces, squares.front().size(), {squares.front().data(), squares.front().size() * squares.size()});
+  for (std::size_t k = 0; k < pieces.size(); ++k) keep_free(squares[k], pieces[k]);
   std::erase_if(pieces, [](const LoosePiece& piece) { return piece.motions.empty(); });
-  std::ranges::stable_sort(pieces, std::greater(), [](const LoosePiece& piece) { return piece.points.size(); });
+  std::ranges::sort(pieces, comes_before);
   return pieces;
 }
 
 const LoosePiece* driven_piece(const std::vector<LoosePiece>& pieces, const Body& body, ConstFieldView u, ConstFieldView force) {
-  for (const LoosePiece& piece : pieces) {
-    double size = 0;
-    std::vector<double> along(piece.motions.size(), 0.0);
+  constexpr std::size_t width = most_motions + 1;  // along each motion, and without signs
+  std::vector<double> work(width * pieces.size(), 0.0);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const LoosePiece& piece = pieces[i];
+    double* const along = work.data() + width * i;
     for (const std::int32_t p : piece.points) {
       const Point y = place(body, u, p);
-      for (std::size_t k = 0; k < along.size(); ++k) {
+      for (std::size_t k = 0; k < piece.motions.size(); ++k) {
         const Point w = piece.at(piece.motions[k], body.dimension(), y);
         for (int c = 0; c < body.dimension(); ++c) {
           const double part = force.component(c)[p] * w[static_cast<std::size_t>(c)];
           along[k] += part;
-          size += std::abs(part);
+          along[most_motions] += std::abs(part);
         }
       }
     }
-    if (std::ranges::any_of(along, [&](double sum) { return std::abs(sum) > 1e-9 * size; })) return &piece;
   }
-  return nullptr;
+  add_up(pieces, width, work);
+  const LoosePiece* mine = nullptr;
+  for (std::size_t i = 0; i < pieces.size() && !mine; ++i) {
+    const double* const along = work.data() + width * i;
+    const bool driven = std::any_of(along, along + pieces[i].motions.size(), [&](double sum) { return std::abs(sum) > 1e-9 * along[most_motions]; });
+    if (driven && speaks_for(pieces[i], body)) mine = &pieces[i];
+  }
+  return comes_first(mine) ? mine : nullptr;
 }
 
 }  // namespace perikit

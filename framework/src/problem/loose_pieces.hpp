@@ -3,23 +3,25 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "families/families.hpp"
-#include "perikit/problem/constraints.hpp"
-#include "perikit/problem/image_map.hpp"
+#include "perikit/problem/problem.hpp"
 
 namespace perikit {
 
-/// Points that whole bonds join to each other and to no others, and the rigid motions that no constraint prevents.
+/// Points that whole bonds join to each other and to no others, and the rigid motions that no constraint prevents. It may lie on
+/// several ranks, of which each has its own points.
 struct LoosePiece {
   /// Translation along the axes, then turning in the planes xy, xz, yz, about `centre` and over `size`; of unit norm over the
   /// piece.
   using Motion = std::array<double, 6>;
 
-  std::vector<std::int32_t> points;  ///< internal indices, ascending
+  std::vector<std::int32_t> points;  ///< of this rank: internal indices, ascending
+  std::int64_t first = 0;            ///< the lowest input number of its points, on whatever rank
+  std::int64_t count = 0;            ///< of its points
+  bool shared = false;               ///< whether it lies on several ranks
   Point centre{};                    ///< [m], mean of the points where they are
   double size = 1;                   ///< [m]
   std::vector<Motion> motions;       ///< orthonormal
@@ -30,14 +32,14 @@ struct LoosePiece {
   std::string name(const Body& body) const;
 };
 
-/// All of them, in words; empty: none.
+/// All of them, on whatever rank, in words; empty: none. All ranks must call it, and everything below.
 std::string names(const std::vector<LoosePiece>& pieces, const Body& body);
 
-/// At the displacement u as the terms see it. images: null without. Of bodies on one rank.
-std::vector<LoosePiece> find_loose_pieces(const Families& families, const Constraints& constraints, const ImageMap* images,
-                                          ConstFieldView u);
+/// Those of which this rank has points, the largest first, at the displacement u as the terms see it.
+std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, ConstFieldView u);
 
-/// The first piece that `force` [N] moves: its share along the free motions is more than rounding leaves of it.
+/// The first piece of all that `force` [N] moves: its share along the free motions is more than rounding leaves of it. Null on ranks
+/// that have not its first point.
 const LoosePiece* driven_piece(const std::vector<LoosePiece>& pieces, const Body& body, ConstFieldView u, ConstFieldView force);
 
 }  // namespace perikit

@@ -1,7 +1,6 @@
 #include "perikit/problem/state.hpp"
 
 #include <algorithm>
-#include <optional>
 
 #include "core/numbered_rows.hpp"
 #include "perikit/core/errors.hpp"
@@ -65,7 +64,7 @@ std::uint64_t State::written() const noexcept {
   return size;
 }
 
-void State::write(ByteWriter& out) const {
+void State::write_numbers(ByteWriter& out) const {
   out.value(time);
   out.value(step);
   out.value(energies);
@@ -74,22 +73,31 @@ void State::write(ByteWriter& out) const {
     out.text(name);
     out.numbers(values);
   }
-  std::optional<OwnPlaces> own;
-  if (body_->part()) own.emplace(*body_);
-  std::vector<double> values;
   out.value(static_cast<std::uint64_t>(fields_.size()));
+}
+
+void State::write_here(ByteWriter& out) const {
+  write_numbers(out);
   for (const auto& [name, field] : fields_) {
     out.text(name);
     out.value(static_cast<std::int64_t>(field.components()));
-    if (!own) {
-      out.bytes(field.data(), field.size() * sizeof(double));
-      continue;
-    }
+    out.bytes(field.data(), field.size() * sizeof(double));
+  }
+}
+
+void State::write(ByteWriter& out) const {
+  if (!body_->part()) return write_here(out);
+  const OwnPlaces own(*body_);
+  write_numbers(out);
+  std::vector<double> values;
+  for (const auto& [name, field] : fields_) {
+    out.text(name);
+    out.value(static_cast<std::int64_t>(field.components()));
     for (int c = 0; c < field.components(); ++c)
       each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
-        const std::vector<double> piece = gather_piece(own->places, first, count, 1, [&](std::size_t from, std::size_t to) {
+        const std::vector<double> piece = gather_piece(own.places, first, count, 1, [&](std::size_t from, std::size_t to) {
           values.clear();
-          for (std::size_t n = from; n < to; ++n) values.push_back(field.component(c)[own->points[n]]);
+          for (std::size_t n = from; n < to; ++n) values.push_back(field.component(c)[own.points[n]]);
           return std::span<const double>(values);
         });
         out.bytes(piece.data(), piece.size() * sizeof(double));
@@ -97,10 +105,7 @@ void State::write(ByteWriter& out) const {
   }
 }
 
-void State::read(ByteReader& in) {
-  std::optional<OwnPlaces> own;
-  if (body_->part()) own.emplace(*body_);
-  std::vector<double> values;
+void State::read_numbers(ByteReader& in) {
   time = in.value<double>();
   step = in.value<std::int64_t>();
   energies = in.value<Energies>();
@@ -112,23 +117,40 @@ void State::read(ByteReader& in) {
     in.bytes(declare_numbers(name, count).data(), count * sizeof(double));
   }
   for (auto& [name, field] : fields_) field.fill(0.0);
+}
+
+/// The field whose values come next.
+FieldView State::declared_like(ByteReader& in) {
+  const std::string name = in.text();
+  const auto components = in.value<std::int64_t>();
+  if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
+  const FieldView field = declare(name, static_cast<int>(components));
+  if (field.components != components) throw InputError("the saved state is damaged");
+  return field;
+}
+
+void State::read_here(ByteReader& in) {
+  read_numbers(in);
   for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
-    const std::string name = in.text();
-    const auto components = in.value<std::int64_t>();
-    if (components < 1 || components > 1024) throw InputError("the saved state is damaged");
-    const FieldView field = declare(name, static_cast<int>(components));
-    if (field.components != components) throw InputError("the saved state is damaged");
-    if (!own) {
-      in.bytes(field.data, field.size() * sizeof(double));
-      continue;
-    }
+    const FieldView field = declared_like(in);
+    in.bytes(field.data, field.size() * sizeof(double));
+  }
+}
+
+void State::read(ByteReader& in) {
+  if (!body_->part()) return read_here(in);
+  const OwnPlaces own(*body_);
+  read_numbers(in);
+  std::vector<double> values;
+  for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
+    const FieldView field = declared_like(in);
     for (int c = 0; c < field.components; ++c) {
       std::size_t next = 0;
       each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
         values.resize(count);
         in.bytes(values.data(), count * sizeof(double));
-        for (; next < own->points.size() && own->places[next] < static_cast<std::int64_t>(first + count); ++next)
-          field.component(c)[own->points[next]] = values[static_cast<std::size_t>(own->places[next]) - first];
+        for (; next < own.points.size() && own.places[next] < static_cast<std::int64_t>(first + count); ++next)
+          field.component(c)[own.points[next]] = values[static_cast<std::size_t>(own.places[next]) - first];
       });
     }
   }

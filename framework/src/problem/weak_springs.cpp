@@ -6,19 +6,11 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/exact_sum.hpp"
-#include "perikit/core/rank_values.hpp"
 #include "problem/loose_points.hpp"
 
 namespace perikit {
 
 namespace {
-
-/// Points and images that no other rank has.
-std::vector<std::int32_t> own_points(const Body& body) {
-  std::vector<std::int32_t> own;
-  std::ranges::copy_if(body.internal(), std::back_inserter(own), [&](std::int32_t p) { return body.owns(static_cast<std::size_t>(p)); });
-  return own;
-}
 
 std::vector<std::int32_t> points_of(const std::vector<LoosePiece>& pieces) {
   std::vector<std::int32_t> points;
@@ -29,32 +21,17 @@ std::vector<std::int32_t> points_of(const std::vector<LoosePiece>& pieces) {
 
 }  // namespace
 
-WeakSprings::WeakSprings(const Families& families, Problem& problem, double share, const WholeBody* whole)
+WeakSprings::WeakSprings(const Families& families, Problem& problem, double share)
     : families_(families),
       problem_(problem),
       share_(share),
-      whole_(whole),
       loose_(families.body().stride(), 0),
-      anchor_(share > 0 ? problem.state().declare("weak_spring_anchor") : FieldView{}) {
-  if (communicator().size() > 1) first_rank_.emplace(families.body(), own_points(families.body()));
-}
+      anchor_(share > 0 ? problem.state().declare("weak_spring_anchor") : FieldView{}) {}
 
 void WeakSprings::find(ConstFieldView u, bool fresh) {
-  const Body& body = families_.body();
-  if (!first_rank_) {
-    pieces_ = find_loose_pieces(families_, problem_.constraints(), problem_.images(), u);
-    points_ = points_of(pieces_);
-    any_ = !pieces_.empty();
-  } else {
-    const Field of_all = first_rank_->gather(u);
-    if (whole_) pieces_ = find_loose_pieces(*whole_->families, whole_->constraints, whole_->images.get(), of_all);
-    const std::vector<std::int32_t> places = told_to_all(points_of(pieces_));
-    any_ = !places.empty();
-    points_.clear();
-    std::ranges::copy_if(body.owned(), std::back_inserter(points_), [&](std::int32_t p) {
-      return std::ranges::binary_search(places, body.places().place[static_cast<std::size_t>(p)]);
-    });
-  }
+  pieces_ = find_loose_pieces(families_, problem_, u);
+  points_ = points_of(pieces_);
+  any_ = communicator().largest(pieces_.empty() ? 0 : 1) > 0;
   std::vector<std::uint8_t> now(loose_.size(), 0);
   for (const std::int32_t p : points_) {
     now[static_cast<std::size_t>(p)] = 1;
@@ -64,26 +41,14 @@ void WeakSprings::find(ConstFieldView u, bool fresh) {
   loose_ = std::move(now);
 }
 
-std::string WeakSprings::names() const {
-  if (!first_rank_) return perikit::names(pieces_, families_.body());
-  const std::string mine = whole_ ? perikit::names(pieces_, whole_->families->body()) : std::string();
-  const std::vector<char> told = told_to_all(std::vector<char>(mine.begin(), mine.end()));
-  return {told.begin(), told.end()};
-}
-
-EvaluationStatus WeakSprings::driven(const Body& body, ConstFieldView u, ConstFieldView force) const {
-  const LoosePiece* const piece = driven_piece(pieces_, body, u, force);
-  if (!piece) return {};
-  return {body.input_of(static_cast<std::size_t>(piece->points.front())), 0,
-          fmt::format("nothing holds {}, and the loads move it ([run] weak_springs would hold it)", piece->name(body))};
-}
+std::string WeakSprings::names() const { return perikit::names(pieces_, families_.body()); }
 
 EvaluationStatus WeakSprings::refuse(ConstFieldView u) const {
   if (share_ > 0 || !any_ || !problem_.loads().any()) return {};
-  const ConstFieldView force = problem_.state().external_force();
-  if (!first_rank_) return driven(families_.body(), u, force);
-  const Field u_of_all = first_rank_->gather(u), force_of_all = first_rank_->gather(force);
-  return whole_ ? driven(whole_->families->body(), u_of_all, force_of_all) : EvaluationStatus{};
+  const LoosePiece* const piece = driven_piece(pieces_, families_.body(), u, problem_.state().external_force());
+  if (!piece) return {};
+  return {piece->first, 0,
+          fmt::format("nothing holds {}, and the loads move it ([run] weak_springs would hold it)", piece->name(families_.body()))};
 }
 
 double WeakSprings::stiffness(std::int32_t point) const {

@@ -1,25 +1,21 @@
 #pragma once
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
-#include "perikit/problem/first_rank.hpp"
 #include "perikit/problem/problem.hpp"
 #include "problem/loose_pieces.hpp"
-#include "problem/whole_body.hpp"
 
 namespace perikit {
 
 /// What is done about the loose pieces of a body in a quasi-static run: their points hang on springs from where they came loose,
-/// -k (u - anchor) with k = share (lambda + 2 mu) V/dx^2; with a share of 0 loads that move them are refused. Pieces may lie on several
-/// ranks: the first one looks for them. All ranks must call everything but add_tangent and add_to.
+/// -k (u - anchor) with k = share (lambda + 2 mu) V/dx^2; with a share of 0 loads that move them are refused. All ranks
+/// must call everything but add_tangent and add_to.
 class WeakSprings {
  public:
-  /// whole: on the first one of several ranks; else null. All must outlive this.
-  WeakSprings(const Families& families, Problem& problem, double share, const WholeBody* whole);
+  /// Both must outlive this.
+  WeakSprings(const Families& families, Problem& problem, double share);
 
   /// Looks for the pieces at u, as the terms see it. fresh: points that are loose now and were not are anchored where they are.
   void find(ConstFieldView u, bool fresh);
@@ -28,8 +24,8 @@ class WeakSprings {
   /// All of them, in words; empty: none.
   std::string names() const;
   bool hold() const noexcept { return share_ > 0 && any_; }
-  /// The piece that the present loads move although nothing holds it; all well where springs do. On several
-  /// ranks the first one says it.
+  /// The piece that the present loads move although nothing holds it; all well where springs do. Of several
+  /// ranks the one with its first point says it.
   EvaluationStatus refuse(ConstFieldView u) const;
 
   // Where they hold.
@@ -39,14 +35,11 @@ class WeakSprings {
 
  private:
   double stiffness(std::int32_t point) const;
-  EvaluationStatus driven(const Body& body, ConstFieldView u, ConstFieldView force) const;
 
   const Families& families_;
   Problem& problem_;
   double share_;
-  const WholeBody* whole_;
-  std::optional<FirstRank> first_rank_;  ///< where there are several
-  std::vector<LoosePiece> pieces_;       ///< of several ranks on the first one, points of the whole body
+  std::vector<LoosePiece> pieces_;
   bool any_ = false;
   std::vector<std::int32_t> points_;     ///< of pieces, of this rank
   std::vector<std::uint8_t> loose_;      ///< by point

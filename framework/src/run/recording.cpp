@@ -270,7 +270,6 @@ bool RunRecorder::interrupted() const noexcept {
 
 void RunRecorder::stopped_within_step() {
   stopping_ = true;
-  if (communicator().size() > 1) communicator().broadcast(last_step_.state);  // rank 0 has it
   simulation_.problem().restore(last_step_.state);
   fields_.renew();
   if (!last_step_.row) write_history(last_step_.report, false);

@@ -19,7 +19,6 @@ class Companion;
 class Families;
 class WeakSprings;
 struct PointSamples;
-struct WholeBody;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
 struct ProblemParts {
@@ -37,7 +36,6 @@ struct ProblemParts {
   std::string kinematics;                       ///< names, for messages
   std::vector<std::string> materials;           ///< by material of the body
   std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
-  std::unique_ptr<WholeBody> whole;             ///< of quasi-static runs, on the first one of several ranks
 };
 
 class BodyProblem final : public Problem {
@@ -79,12 +77,12 @@ class BodyProblem final : public Problem {
   /// loose now, in words; empty: nothing. All ranks must call it.
   std::string watch_pieces(double weak_springs);
 
-  /// Everything that a run continues from, as bytes, on rank 0; restore is bitwise, on any number of ranks. All ranks must call
-  /// both. restore throws InputError for what belongs to another problem.
+  /// Everything that a run continues from of this rank, as bytes; restore is bitwise. All ranks must call restore, which throws
+  /// InputError for what belongs to another problem.
   std::vector<std::byte> snapshot() const;
   void restore(std::span<const std::byte> bytes);
-  /// The same bytes, on rank 0: begin(how many), then next(some of them) until all are out. Nobody has all points of all ranks at
-  /// once.
+  /// That of all ranks, on rank 0: begin(how many bytes), then next(some of them) until all are out. Nobody has all points of all
+  /// ranks at once, and any number of ranks may restore them. All ranks must call both.
   void write_snapshot(const std::function<void(std::uint64_t size)>& begin,
                       const std::function<void(std::span<const std::byte>)>& next) const;
   void restore(ByteReader& in);

@@ -55,8 +55,15 @@ class State {
   /// What was declared but not written becomes zero. Throws InputError where the bytes cannot be those of a state of the whole
   /// body.
   void read(ByteReader& in);
+  // The same of this rank alone.
+  void write_here(ByteWriter& out) const;
+  void read_here(ByteReader& in);
 
  private:
+  void write_numbers(ByteWriter& out) const;
+  void read_numbers(ByteReader& in);
+  FieldView declared_like(ByteReader& in);
+
   const Body* body_;
   std::map<std::string, Field> fields_;
   std::map<std::string, std::vector<double>> numbers_;
