@@ -86,9 +86,9 @@ bool same(const A& a, const B& b) {
 /// The colours that blocks have on one rank, by block of the whole body.
 std::vector<std::int32_t> colours_of_whole(const Body& whole) {
   const std::size_t blocks = (whole.points() + whole.block_points() - 1) / whole.block_points();
-  FreeColours free(blocks);
+  FreeColours free((whole.points() + colour_unit - 1) / colour_unit);
   std::vector<std::int32_t> colours;
-  for (const std::vector<std::int32_t>& units : block_reach(whole, 0, blocks)) colours.push_back(free.next(std::span(units)));
+  for (const std::vector<std::int32_t>& units : block_reach(whole, colour_unit, 0, blocks)) colours.push_back(free.next(std::span(units)));
   return colours;
 }
 

@@ -23,12 +23,13 @@ struct BlocksOfPart {
   }
 };
 
-/// Of the rank's own blocks, one after the other: how many units each touches, and which.
+/// Of the rank's own blocks, one after the other: how many units of the whole body each touches, and which.
 std::vector<std::int64_t> touches_of(const BlocksOfPart& blocks, const Body& part) {
   std::vector<std::int64_t> flat;
-  for (const std::vector<std::int32_t>& units : block_reach(part, blocks.first_own, blocks.last_own)) {
+  for (const std::vector<std::int32_t>& units : block_reach(part, colour_unit, blocks.first_own, blocks.last_own)) {
     flat.push_back(std::ssize(units));
-    for (const std::int32_t unit : units) flat.push_back(blocks.number[static_cast<std::size_t>(unit)]);
+    for (const std::int32_t unit : units)
+      flat.push_back(part.places().place[static_cast<std::size_t>(unit) * colour_unit] / static_cast<std::int64_t>(colour_unit));
   }
   return flat;
 }
@@ -86,7 +87,7 @@ void colour_blocks(const CurveShares& pieces, Body& part) {
   const BlocksOfPart blocks(part);
   const std::vector<std::int64_t> own =
       own_colours(touches_of(blocks, part), blocks.last_own - blocks.first_own,
-                  static_cast<std::size_t>(pieces.blocks()));
+                  static_cast<std::size_t>(pieces.blocks() * pieces.block()) / colour_unit);
   std::vector<std::vector<std::int64_t>> wanted(size);
   for (const std::int64_t number : blocks.number)
     wanted[static_cast<std::size_t>(pieces.owner_of_block(number))].push_back(number);

@@ -200,25 +200,29 @@ std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_
   return reached;
 }
 
-std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t first, std::size_t last) {
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t unit, std::size_t first, std::size_t last) {
   const std::span<const double> rows = body.rows();
   const std::size_t points = body.points();
   const CellList cells(rows, points, body.dimension(), body.horizon());
   const double limit = body.horizon() * (1 + 1e-10);
   const std::size_t block = body.block_points();
   std::vector<std::vector<std::int32_t>> touches(last - first);
+  std::vector<std::vector<std::size_t>> found(static_cast<std::size_t>(thread_count()));  // by unit: one more than the block that has it last
   parallel_for(touches.size(), [&](std::size_t k) {
     const std::size_t b = first + k;
-    std::vector<std::int32_t>& units = touches[k];
-    units.push_back(static_cast<std::int32_t>(b));
+    std::vector<std::size_t>& last_of = found[static_cast<std::size_t>(thread_index())];
+    last_of.resize((points + unit - 1) / unit);
+    const auto add = [&](std::size_t p) {
+      last_of[p / unit] = b + 1;
+      touches[k].push_back(static_cast<std::int32_t>(p / unit));
+    };
+    for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); p += unit) add(p);
     for (std::size_t p = b * block; p < std::min(points, (b + 1) * block); ++p)
-      cells.around(&rows[4 * p], [&](std::int32_t q) {
-        const auto unit = static_cast<std::int32_t>(static_cast<std::size_t>(q) / block);
-        if (unit == units.back() || std::ranges::find(units, unit) != units.end()) return;
-        if (squared_distance(rows, p, static_cast<std::size_t>(q)) > limit * limit) return;
-        if (!body.cut(body.position(p), body.position(static_cast<std::size_t>(q)))) units.push_back(unit);
+      cells.around(&rows[4 * p], [&](std::int32_t far) {
+        const auto q = static_cast<std::size_t>(far);
+        if (last_of[q / unit] == b + 1 || squared_distance(rows, p, q) > limit * limit) return;
+        if (!body.cut(body.position(p), body.position(q))) add(q);
       });
-    std::sort(units.begin(), units.end());
   });
   return touches;
 }

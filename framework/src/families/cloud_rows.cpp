@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "body/block_colours.hpp"
 #include "families/quiet_blocks.hpp"
 
 namespace perikit {
@@ -84,20 +85,26 @@ BlockReach cloud_reach(const Body& body, const FamilyLists& families) {
 }
 
 Colouring cloud_colouring(const Body& body, const FamilyLists& families, const CloudBlocks& blocks, const BlockReach& reach) {
-  const std::size_t points = families.first.size() - 1, groups = padded(points) / padding;
-  std::vector<std::size_t> found(groups);  // one more than the block that has listed a group last
-  const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
+  const std::size_t points = families.first.size() - 1, units = (points + colour_unit - 1) / colour_unit;
+  std::vector<std::size_t> found(units);  // one more than the block that has listed a unit last
+  std::vector<std::vector<std::int32_t>> touches(blocks.count());
+  for (std::size_t b = 0; b < blocks.count(); ++b) {
     const auto add = [&](std::size_t point) {
-      const std::size_t group = point / padding;
-      if (std::exchange(found[group], b + 1) != b + 1) touched.push_back(static_cast<std::int32_t>(group));
+      const std::size_t unit = point / colour_unit;
+      if (std::exchange(found[unit], b + 1) != b + 1) touches[b].push_back(static_cast<std::int32_t>(unit));
     };
     for (std::size_t p = blocks.begin(b); p < blocks.end(b); ++p) {
       add(p);
       for (std::int64_t k = families.first[p]; k < families.first[p + 1]; ++k)
         add(static_cast<std::size_t>(families.neighbour[static_cast<std::size_t>(k)]));
     }
-  };
-  return Colouring(reach, body.block_colours().empty() ? free_colours(reach) : body.block_colours(), groups, touch);
+  }
+  std::vector<std::int32_t> colours = body.block_colours();
+  if (colours.empty()) {
+    FreeColours free(units);
+    for (const std::vector<std::int32_t>& touched : touches) colours.push_back(free.next(std::span(touched)));
+  }
+  return Colouring(reach, colours, units, [&](std::size_t b, std::vector<std::int32_t>& touched) { touched = touches[b]; });
 }
 
 bool CloudBlocks::moves(ConstFieldView u, std::size_t b) const noexcept { return QuietBlocks::moves(u, begin(b), end(b)); }

@@ -92,7 +92,7 @@ BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks);
 /// The same of the blocks of a body, and which of them hold points of other ranks.
 BlockReach cloud_reach(const Body& body, const FamilyLists& families);
 
-/// Colours of these blocks; on a part of a body those that they have in the whole one. Blocks wait for those that write to the same eight points.
+/// Colours of these blocks; on a part of a body those that they have in the whole one. Blocks wait for those that write to the same unit of the colours.
 Colouring cloud_colouring(const Body& body, const FamilyLists& families, const CloudBlocks& blocks, const BlockReach& reach);
 
 }  // namespace perikit

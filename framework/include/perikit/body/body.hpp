@@ -247,7 +247,7 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
 std::vector<std::uint8_t> with_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
                                         std::vector<std::uint8_t> from);
 
-/// Of the blocks first ... last - 1 of a cloud: which blocks hold points of their families, but for bonds that cracks cut.
-std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t first, std::size_t last);
+/// Of the blocks first ... last - 1 of a cloud: where their points and their families are, but for bonds that cracks cut, in units of so many points.
+std::vector<std::vector<std::int32_t>> block_reach(const Body& body, std::size_t unit, std::size_t first, std::size_t last);
 
 }  // namespace perikit
