@@ -250,6 +250,16 @@ def loads_on_surfaces(everything):
 BETWEEN = SYMMETRY + '[[symmetry]]\naxis = "y"\nat = 3.0\n'
 
 
+# Points of the outermost layer, rows of 32 from the lowest on.
+FEW = {"listed": "{ points = [64, 0, 32, 96, 640] }", "nearest": "{ nearest = [0.0, 9.4] }"}
+
+
+def with_face_of(text, few):
+    """A held face of single points, beside what the scene has."""
+    text = with_face(text).replace('set = "all"\nface = "-x"', 'set = "few"\nface = "-x"', 1)
+    return text.replace("[sets]\n", "[sets]\nfew = %s\n" % few)
+
+
 def periodic_all_around(text):
     """Nothing holds it any more."""
     return text[:text.index("[[boundary]]")] + text[text.index("[[load]]"):] + '[[periodic]]\naxis = "x"\n[[periodic]]\naxis = "y"\n'
@@ -270,11 +280,15 @@ def planes_of_parts(everything):
         yield OWN_PART + "%s, hole at a plane, traction" % name, drawn(text.replace("[sets]", hole), 2, "high", "+x") + SYMMETRY
         part = with_face(text).replace('set = "all"\nface = "-x"', 'set = "lower"\nface = "-x"', 1).replace("[sets]\n", '[sets]\nlower = "y < 13"\n')
         yield OWN_PART + "%s, face of a part" % name, part
+        for kind, few in FEW.items() if everything else (("listed", FEW["listed"]),):
+            yield OWN_PART + "%s, face of %s points" % (name, kind), with_face_of(text, few)
     for name in ("conventional", "silling", "baqp", "bond_based", "projection") if everything else ("bond_based",):
         cloud = scene(KINEMATICS[name], 2, True, brief, cells=[32, 38])
         for plane in BEYOND if everything else ("face and symmetry",):
             yield OWN_PART + "%s, %s, cloud" % (name, plane), BEYOND[plane](cloud)
         yield OWN_PART + "%s, periodic along both axes, cloud" % name, periodic_all_around(cloud)
+        for kind, few in FEW.items() if everything else (("nearest", FEW["nearest"]),):
+            yield OWN_PART + "%s, face of %s points, cloud" % (name, kind), with_face_of(cloud, few)
         thin = scene(KINEMATICS[name], 2, True, brief, cells=[400, 3])
         yield OWN_PART + "%s, thin between planes, cloud" % name, thin + BETWEEN
     for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
@@ -282,6 +296,8 @@ def planes_of_parts(everything):
             if everything or plane == "periodic":
                 yield OWN_PART + "%s, torn, %s" % (name, plane), BEYOND[plane](torn(KINEMATICS[name], DAMAGE["critical_stretch"], False))
             yield OWN_PART + "%s, 3D, %s" % (name, plane), BEYOND[plane](scene(KINEMATICS[name], 3, False, brief))
+    for cloud in (False, True) if everything else (True,):
+        yield OWN_PART + "bond_based, torn, face of listed points, %s" % ("cloud" if cloud else "lattice"), with_face_of(torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], cloud), FEW["listed"])
     for name, cloud in itertools.product(("ordinary", "projection"), (False, True)) if everything else (("ordinary", True), ("projection", False)):
         text = with_regions(scene(KINEMATICS[name], 2, cloud, brief, cells=[32, 38]), "x > 11 + 0.3*y && x < 21", "x - y > 17") + CRACK
         for plane in BEYOND if everything else ("two planes of symmetry", "periodic"):

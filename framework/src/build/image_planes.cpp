@@ -9,6 +9,7 @@
 
 #include "body/image_list.hpp"
 #include "build/conditions.hpp"
+#include "build/sets.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -201,6 +202,8 @@ class PlaneBuilder {
     const BoundaryDescription& boundary = scene_.boundaries[k];
     const std::string key = fmt::format("boundary.{}.face", k);
     Side side{boundary.face[1] - 'x', boundary.face[0] == '+' ? 1.0 : -1.0, 0};
+    if (std::isinf(outermost(boundary.set, side.axis, side.outward)))
+      refuse_empty_set(*std::ranges::find(scene_.sets, boundary.set, &SetDescription::name));
     side.at = boundary.at ? given(*boundary.at, side.axis, boundary.face_position, fmt::format("boundary.{}.at", k))
                           : end_of(boundary.set, side.axis, side.outward, boundary.face_position, fmt::format("boundary.{}.at", k));
     ImagePlane& plane = plane_at(side, boundary.set, key, boundary.face_position, true);

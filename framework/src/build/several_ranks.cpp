@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "build/sets.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -22,24 +21,12 @@ bool has_images(const Scene& scene) {
          std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); });
 }
 
-namespace {
-
-/// Whether planes are asked of single points of a lattice, which only their owners know.
-bool faces_of_single_points(const Scene& scene) {
-  return std::ranges::any_of(scene.boundaries, [&](const BoundaryDescription& boundary) {
-    return !boundary.face.empty() && boundary.set != "all" && !set_expression(scene, boundary.set);
-  });
-}
-
-}  // namespace
-
 std::string needs_whole_body(const Scene& scene, bool quasi_static) {
   if (scene.body.voronoi) return "Voronoi cells are found of all points together";
   if (quasi_static) return "pieces that nothing holds are looked for";
   if (!has_images(scene)) return {};
   if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); }))
     return "there are images beyond held surfaces";
-  if (faces_of_single_points(scene)) return "a face of a set of single points is held";
   return {};
 }
 
