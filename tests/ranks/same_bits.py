@@ -73,6 +73,12 @@ def with_surface(text):
     return with_face(text).replace('set = "all"\nface = "-x"', 'surface = "200 - sqrt((x + 200.2)^2 + (y - 12)^2)"', 1)
 
 
+def with_rim(text):
+    """The rim of a hole is held, beside what the scene has."""
+    text = text.replace("[sets]", 'inside = "(x - 14)^2 + (y - 18)^2 > 81"\n[sets]', 1)
+    return text + '[[boundary]]\nsurface = "9 - sqrt((x - 14)^2 + (y - 18)^2)"\ndisplacement = ["0.01*sin(t)", 0]\n'
+
+
 SYMMETRY = '[[symmetry]]\naxis = "y"\n'
 BEYOND = {
     "face": with_face,
@@ -289,6 +295,10 @@ def planes_of_parts(everything):
         yield OWN_PART + "%s, periodic along both axes, cloud" % name, periodic_all_around(cloud)
         for kind, few in FEW.items() if everything else (("nearest", FEW["nearest"]),):
             yield OWN_PART + "%s, face of %s points, cloud" % (name, kind), with_face_of(cloud, few)
+        yield OWN_PART + "%s, surface and periodic, cloud" % name, BEYOND["periodic"](with_surface(cloud))
+        cut = scene(KINEMATICS[name], 2, False, brief, cells=[32, 38]).replace("[family]\n", "[family]\npartial_volume = true\n")
+        yield OWN_PART + "%s, held rim of cut cells" % name, with_rim(cut)
+        yield OWN_PART + "%s, surface, 3D" % name, with_surface(scene(KINEMATICS[name], 3, True, brief))
         thin = scene(KINEMATICS[name], 2, True, brief, cells=[400, 3])
         yield OWN_PART + "%s, thin between planes, cloud" % name, thin + BETWEEN
     for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
@@ -296,6 +306,8 @@ def planes_of_parts(everything):
             if everything or plane == "periodic":
                 yield OWN_PART + "%s, torn, %s" % (name, plane), BEYOND[plane](torn(KINEMATICS[name], DAMAGE["critical_stretch"], False))
             yield OWN_PART + "%s, 3D, %s" % (name, plane), BEYOND[plane](scene(KINEMATICS[name], 3, False, brief))
+    for name in ("bond_based", "silling", "projection") if everything else ("bond_based",):
+        yield OWN_PART + "%s, torn, surface" % name, with_surface(torn(KINEMATICS[name], DAMAGE["critical_stretch"], True))
     for cloud in (False, True) if everything else (True,):
         yield OWN_PART + "bond_based, torn, face of listed points, %s" % ("cloud" if cloud else "lattice"), with_face_of(torn(KINEMATICS["bond_based"], DAMAGE["critical_stretch"], cloud), FEW["listed"])
     for name, cloud in itertools.product(("ordinary", "projection"), (False, True)) if everything else (("ordinary", True), ("projection", False)):

@@ -135,7 +135,8 @@ inline void compare(const std::string& text, int ranks, const Partition::Reach& 
     Body whole_body = build_body(scene);
     Images images;
     if (has_images(scene)) {
-      images = make_images(whole_body, build_planes(scene, placed_points(whole_body), false).planes);
+      const ScenePlanes planes = build_planes(scene, placed_points(whole_body), false);
+      images = make_images(whole_body, planes.planes, planes.surfaces);
       whole_body = Body(whole_body, images, image_material);
     }
     Partition whole(std::move(whole_body), reach, images.source);

@@ -54,7 +54,7 @@ LocalPlaces placed(std::unique_ptr<Partition> partition, std::uint16_t far_mater
   return {std::move(partition), std::move(body)};
 }
 
-/// The planes of a cloud, and what makes images behind them.
+/// The planes and surfaces of a cloud, and what makes images behind them.
 struct CloudPlanes {
   ScenePlanes scene;
   ImageMaker maker;
@@ -63,7 +63,7 @@ struct CloudPlanes {
 /// points: of this rank. The frame gets images of its cracks.
 CloudPlanes planes_of_cloud(const Scene& scene, const PointStream& points, BodyFrame& frame) {
   ScenePlanes planes = build_planes(scene, placed_points(scene, frame, points), false);
-  ImageMaker maker(dimension(frame.space), halo(frame.horizon), planes.planes);
+  ImageMaker maker(frame, planes.planes, planes.surfaces);
   frame.cracks = maker.cracks(std::move(frame.cracks));
   return {std::move(planes), std::move(maker)};
 }

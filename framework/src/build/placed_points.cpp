@@ -1,6 +1,7 @@
 #include "build/placed_points.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "build/scene_lattice.hpp"
@@ -14,11 +15,14 @@ namespace {
 class SinglePoints {
  public:
   /// All ranks must call it.
-  SinglePoints(const Scene& scene, const ShownPoints& points) {
+  SinglePoints(const Scene& scene, const PointStream& points) {
+    const ShownPoints shown = [&](const auto& visit) {
+      points([&](const CloudShares::OnePoint& point) { visit(point.x, point.number); });
+    };
     for (const BoundaryDescription& boundary : scene.boundaries) {
       const auto set = std::ranges::find(scene.sets, boundary.set, &SetDescription::name);
       if (boundary.face.empty() || set == scene.sets.end() || set->expression || of_set_.contains(set->name)) continue;
-      of_set_[set->name] = single_points(*set, points);
+      of_set_[set->name] = single_points(*set, shown);
     }
   }
   /// Ascending; null for other sets.
@@ -33,14 +37,15 @@ class SinglePoints {
 
 class PointsOfBody final : public PlacedPoints {
  public:
-  explicit PointsOfBody(const Body& body)
-      : PlacedPoints({body.space(), body.section(), body.spacing(), body.horizon(), body.cracks()}), body_(body) {}
+  explicit PointsOfBody(const Body& body) : PlacedPoints(body.frame()), body_(body) {}
 
   const Lattice* lattice() const noexcept override { return body_.lattice(); }
   bool shared() const noexcept override { return false; }
   void over(const std::string& set, const Visit& visit) const override {
-    for (const std::int32_t p : body_.set(set))
-      visit(body_.position(static_cast<std::size_t>(p)), body_.number(static_cast<std::size_t>(p)));
+    for (const std::int32_t index : body_.set(set)) {
+      const auto p = static_cast<std::size_t>(index);
+      visit({body_.position(p), body_.volume(p), body_.number(p)});
+    }
   }
   std::int64_t at(const std::array<std::int64_t, 3>& k, const std::string& set) const override {
     for (std::size_t a = 0; a < 3; ++a)
@@ -84,7 +89,7 @@ class PointsOfLattice final : public PlacedPoints {
       std::array<std::int64_t, 3> k{};
       for (std::size_t a = 0; a < 3; ++a)
         if (corner >> lattice_.axis[a] & 1) k[a] = lattice_.extent[a] - 1;
-      visit(lattice_.centre(k), lattice_.input_number(k));
+      visit(point(k));
     }
   }
   std::int64_t at(const std::array<std::int64_t, 3>& k, const std::string& set) const override {
@@ -105,8 +110,11 @@ class PointsOfLattice final : public PlacedPoints {
     const Run run = own_run(lattice_.extent[0] * lattice_.extent[1] * lattice_.extent[2]);
     for (std::int64_t number = run.first; number < run.last; ++number) {
       const std::array<std::int64_t, 3> k = lattice_.cell_of_input(number);
-      if (at(k, set) >= 0) visit(lattice_.centre(k), number);
+      if (at(k, set) >= 0) visit(point(k));
     }
+  }
+  OnePoint point(const std::array<std::int64_t, 3>& k) const {
+    return {lattice_.centre(k), std::pow(lattice_.spacing, lattice_.dimension) * frame().section, lattice_.input_number(k)};
   }
 
   const Scene& scene_;
@@ -129,8 +137,7 @@ class PointsOfCloud final : public PlacedPoints {
     const Expression* const condition = set_expression(scene_, set);
     const std::vector<std::int64_t>* const single = set == "all" ? nullptr : single_.of(set);
     points_([&](const CloudShares::OnePoint& point) {
-      if (condition ? (*condition)(point.x) != 0.0 : !single || std::ranges::binary_search(*single, point.number))
-        visit(point.x, point.number);
+      if (condition ? (*condition)(point.x) != 0.0 : !single || std::ranges::binary_search(*single, point.number)) visit(point);
     });
   }
   std::int64_t at(const std::array<std::int64_t, 3>&, const std::string&) const override { return -1; }

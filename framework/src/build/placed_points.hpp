@@ -15,7 +15,8 @@ namespace perikit {
 
 class PlacedPoints {
  public:
-  using Visit = std::function<void(const Point& x, std::int64_t number)>;
+  using OnePoint = CloudShares::OnePoint;
+  using Visit = std::function<void(const OnePoint& point)>;
 
   virtual ~PlacedPoints() = default;
   const BodyFrame& frame() const noexcept { return frame_; }

@@ -10,7 +10,6 @@
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
 #include "build/gradient_order.hpp"
-#include "build/held_surfaces.hpp"
 #include "build/image_planes.hpp"
 #include "build/interfaces.hpp"
 #include "build/local_body.hpp"
@@ -41,7 +40,6 @@ struct Beyond {
 
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   ScenePlanes planes = build_planes(scene, placed_points(body), quasi_static);
-  add_surfaces(scene, body, quasi_static, planes);
   if (planes.planes.empty() && planes.surfaces.empty()) return {};
   Images images = make_images(body, planes.planes, planes.surfaces);
   try {

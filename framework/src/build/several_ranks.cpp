@@ -24,9 +24,6 @@ bool has_images(const Scene& scene) {
 std::string needs_whole_body(const Scene& scene, bool quasi_static) {
   if (scene.body.voronoi) return "Voronoi cells are found of all points together";
   if (quasi_static) return "pieces that nothing holds are looked for";
-  if (!has_images(scene)) return {};
-  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); }))
-    return "there are images beyond held surfaces";
   return {};
 }
 
