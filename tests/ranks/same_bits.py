@@ -351,8 +351,13 @@ def on_points(text, table):
     return text[:begin] + table + text[end:]
 
 
+def with_cells(text):
+    """Volumes are those of Voronoi cells."""
+    return text.replace("jitter = 0.2\n", 'jitter = 0.2\nvolume = "voronoi"\n', 1)
+
+
 def other_clouds(everything, work):
-    """Clouds of files, and of cells that a surface cuts, of which each rank places its own part."""
+    """Clouds of files, of cells that a surface cuts, and of Voronoi cells, of which each rank places its own part."""
     brief = 'type = "verlet"\nend_time = 1.0\ntime_step = 0.02'
     for name in ("conventional", "baqp", "bond_based", "ordinary", "projection") if everything else ("bond_based",):
         for dimension, binary in itertools.product((2, 3), (False, True)) if everything else ((2, True), (3, False)):
@@ -364,6 +369,18 @@ def other_clouds(everything, work):
     for name in ("conventional", "baqp", "bond_based", "ordinary", "projection") if everything else ("projection",):
         text = scene(KINEMATICS[name], 2, False, brief, cells=[32, 38]).replace("[family]\n", "[family]\npartial_volume = true\n")
         yield OWN_PART + "%s, cut cells" % name, text.replace("[sets]", "inside = \"(x - 14)^2 + (y - 18)^2 > 47 && x + 1.3*y > 6\"\n[sets]", 1)
+    for name in ("conventional", "baqp", "bond_based", "ordinary", "projection") if everything else ("bond_based",):
+        for dimension in (2, 3) if everything else (2,):
+            kind = OWN_PART + "%s, Voronoi cells, %dD" % (name, dimension)
+            text = scene(KINEMATICS[name], dimension, True, brief, cells=[32, 38] if dimension == 2 else None)
+            if everything:
+                yield kind, with_cells(text)
+            yield kind + ", hole", with_cells(text.replace("[sets]", 'inside = "%s"\n[sets]' % {2: "(x - 14)^2 + (y - 18)^2 > 47", 3: "x^2 + y^2 + z^2 > 30"}[dimension], 1))
+            yield kind + ", file", on_points(text, points_file(work, dimension, dimension == 3) + 'volume = "voronoi"\n')
+        if name != "ordinary":
+            yield OWN_PART + "%s, Voronoi cells, torn" % name, with_cells(torn(KINEMATICS[name], DAMAGE["critical_stretch"], True))
+        if name not in PAIRS or everything:
+            yield OWN_PART + "%s, Voronoi cells, surface and symmetry" % name, with_surface(with_cells(scene(KINEMATICS[name], 2, True, brief, cells=[32, 38]))) + SYMMETRY
     if everything:
         yield OWN_PART + "conventional, 1D, CSV file", on_points(scene(KINEMATICS["conventional"], 1, True, brief), points_file(work, 1, False))
 

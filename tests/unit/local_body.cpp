@@ -9,7 +9,6 @@
 #include <cmath>
 #include <fstream>
 #include <mutex>
-#include <random>
 
 #include "body/input_numbers.hpp"
 #include "body/point_share.hpp"
@@ -17,10 +16,10 @@
 #include "build/image_planes.hpp"
 #include "build/scene_lattice.hpp"
 #include "build/several_ranks.hpp"
-#include "files/hdf5_file.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/memory.hpp"
 #include "perikit/core/serial_communicator.hpp"
+#include "unit/cloud_files.hpp"
 #include "unit/part_comparison.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -163,50 +162,6 @@ TEST_CASE("local bodies: cells that a surface cuts are those of the whole body")
                            fmt::format(fmt::runtime(cloud_sets), shape.place), "horizon_ratio = 2.015\npartial_volume = true"));
   }
 }
-
-namespace {
-
-/// Points at random places of a box, which are not far from being evenly spread.
-PointCloud random_points(std::size_t count, const Point& size, unsigned seed) {
-  std::mt19937_64 random(seed);
-  const auto number = [&] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
-  PointCloud cloud;
-  for (std::size_t n = 0; n < count; ++n) {
-    cloud.position.push_back({size[0] * number(), size[1] * number(), size[2] * number()});
-    cloud.volume.push_back(0.5 + number());
-  }
-  return cloud;
-}
-
-std::string csv(const PointCloud& cloud, int dimension) {
-  std::string text =
-      "\xEF\xBB\xBF# points\n\n" + std::string("volume,x,y,z").substr(0, 6 + 2 * static_cast<std::size_t>(dimension)) + "\r\n";
-  for (std::size_t n = 0; n < cloud.volume.size(); ++n) {
-    text += fmt::format("{}", cloud.volume[n]);
-    for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) text += fmt::format(", {}", cloud.position[n][c]);
-    text += n % 7 == 0 ? "  # and so on, which is longer than other lines\r\n\n" : "\n";
-  }
-  text.pop_back();
-  return text;
-}
-
-void write_hdf5(const std::filesystem::path& file, const PointCloud& cloud, int dimension) {
-  hdf5::StoredFile out(file);
-  out.dataset("volume", cloud.volume);
-  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) {
-    std::vector<double> values;
-    for (const Point& x : cloud.position) values.push_back(x[c]);
-    // Of any shape.
-    out.dataset(std::string(1, "xyz"[c]), values, c == 1 ? 2 : 1);
-  }
-  out.keep();
-}
-
-std::string file_body(const std::filesystem::path& file) {
-  return fmt::format("[body.points]\nfile = \"{}\"\n", file.string());
-}
-
-}  // namespace
 
 TEST_CASE("local bodies: clouds of files are those of the whole body, in whatever format") {
   const TemporaryFolder folder;

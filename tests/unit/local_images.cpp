@@ -85,7 +85,7 @@ TEST_CASE("local bodies: images beyond held surfaces are those of the whole body
                                         shape.keys == partial ? cut : "horizon_ratio = 2.015") +
                              held_surface(shape.dimension, shape.level) + shape.beyond;
     compare(text, 2, {3, true});
-    compare(text, 5, {2, false, true});
+    compare(text, 3, {2, false, true});
   }
 }
 

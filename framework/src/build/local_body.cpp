@@ -88,7 +88,8 @@ LocalPlaces place_stream(const Scene& scene, const CloudOutline& cloud, const Pa
 }
 
 LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material) {
-  if (!communicator().complete())
+  // Cells are found of all points that a rank without others has.
+  if (!communicator().complete() && !scene.body.voronoi)
     if (const CloudOutline cloud = cloud_outline(scene); !lone_rank_orders(static_cast<double>(cloud.extent.points)))
       return place_stream(scene, cloud, reach, far_material);
   CloudPoints cloud = cloud_points(scene, WhichPoints::run);

@@ -21,8 +21,7 @@ bool has_images(const Scene& scene) {
          std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); });
 }
 
-std::string needs_whole_body(const Scene& scene, bool quasi_static) {
-  if (scene.body.voronoi) return "Voronoi cells are found of all points together";
+std::string needs_whole_body(const Scene&, bool quasi_static) {
   if (quasi_static) return "pieces that nothing holds are looked for";
   return {};
 }
