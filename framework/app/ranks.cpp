@@ -48,7 +48,7 @@ class FrameAfterStep final : public Observer {
 
 struct Share {
   double points = 0, near = 0, ghosts = 0, bytes = 0, peak = 0, of_all = 0;
-  bool placed_whole = false, cloud = false;
+  bool cloud = false;
 };
 
 Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks) {
@@ -67,7 +67,6 @@ Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks
               static_cast<double>(simulation.problem().bytes()),
               peak.bytes(),
               static_cast<double>(body.points_of_all_ranks()),
-              !simulation.problem().placed_whole().empty(),
               body.lattice() == nullptr};
   share.ghosts = static_cast<double>(body.points()) - share.points;
   const std::size_t materials = scene.regions.size() + 1;  // far points have one more
@@ -124,8 +123,6 @@ std::string predict_ranks(const Scene& scene, const Registry& registry, int rank
               busiest = most([](const Share&share) { return share.points + share.near; });
   const std::string by_all =
       heaviest_alone ? std::string() : fmt::format(", {:.3g} MB by all", 8e-6 * scene.body.dimension * exchanged);
-  const std::string whole =
-      largest.placed_whole ? fmt::format(", and about {:.3g} MB of where all points are", 30e-6 * points) : std::string();
   const double peak = most(&Share::peak).peak;
   const std::string in_all = peak > 0 ? fmt::format(", about {:.3g} MB a process at most", peak / 1e6) : std::string();
   const std::string parts =
@@ -142,10 +139,10 @@ std::string predict_ranks(const Scene& scene, const Registry& registry, int rank
                      "exchange      at most {:.3g} MB a rank and step{}\n"
                      "work          {:.0f} points evaluated on the busiest rank: {:.2f} of the speed of {} ranks without ghosts, "
                      "at best\n"
-                     "memory        at most {:.3g} MB of arrays of its part on a rank{}{}\n",
+                     "memory        at most {:.3g} MB of arrays of its part on a rank{}\n",
                      ranks, largest.points, largest.points / mean, deepest.ghosts, deepest.ghosts / mean,
                      8e-6 * scene.body.dimension * deepest.ghosts, by_all, busiest.points + busiest.near,
-                     mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, in_all, whole);
+                     mean / (busiest.points + busiest.near), ranks, heaviest.bytes / 1e6, in_all);
 }
 
 }  // namespace perikit::app

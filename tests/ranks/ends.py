@@ -111,6 +111,13 @@ def loose_pieces():
             said.append(found[0] if len(found) == 1 and done.returncode == 2 else "status %d, %s" % (done.returncode, done.stderr))
         check(said[0].startswith("a piece of") and len(set(said)) == 1, "%s: %s" % (what, said[0] if len(set(said)) == 1 else said))
 
+    # A part that nothing holds is none of a whole body that something does.
+    text = without_velocity(scene('type = "conventional"', integrator='type = "jfnk"\npreconditioner = "companion"')).replace('low = "x < 2"', 'low = "x > 30"')
+    with open(WORK + "/loose.toml", "w") as out:
+        out.write(text)
+    done = subprocess.run([PROGRAM, "check", WORK + "/loose.toml", "--ranks", "4"], capture_output=True, text=True, timeout=60)
+    check(done.returncode == 0, "check --ranks of a body that is held at one end: %s" % done.stderr)
+
 
 def other_commands():
     done = subprocess.run(["mpirun", "--oversubscribe", "-np", "2", PROGRAM, "study", "none.toml"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)

@@ -57,13 +57,9 @@ std::int64_t most_images(const ImageMaker& maker, const PointStream& points, Clo
 }
 
 CloudImages::Finder finder_of_run(CloudShares::Points points_with_images, std::int64_t first) {
-  std::vector<std::int64_t> firsts = told_to_all(gathered<std::int64_t>({&first, 1}));
-  return [firsts, points = std::move(points_with_images)](const std::vector<std::int64_t>& numbers) {
+  return [runs = RunOwners(first), points = std::move(points_with_images)](const std::vector<std::int64_t>& numbers) {
     std::vector<std::vector<std::int64_t>> asked(static_cast<std::size_t>(communicator().size()));
-    for (const std::int64_t number : numbers) {
-      const auto rank = communicator().complete() ? std::ranges::upper_bound(firsts, number) - firsts.begin() - 1 : communicator().rank();
-      asked[static_cast<std::size_t>(rank)].push_back(number);
-    }
+    for (const std::int64_t number : numbers) asked[runs.owner(number)].push_back(number);
     std::vector<CloudShares::Points> answers;
     for (const std::vector<std::int64_t>& of_rank : exchanged(asked)) {
       CloudShares::Points& found = answers.emplace_back();

@@ -24,7 +24,6 @@ class ImageList {
   /// Of the point, which planes are asked for; its input number.
   const Point& point() const { return position_.front(); }
   std::int64_t number() const noexcept { return number_; }
-  std::int32_t source() const noexcept { return source_; }
 
   /// The image of place n. odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
   void add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
@@ -57,7 +56,7 @@ class Mirror;
 class TurningMirrors {
  public:
   /// Periodic planes are left out.
-  TurningMirrors(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces);
+  TurningMirrors(const BodyFrame& frame, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces);
   ~TurningMirrors();
   void add_images(ImageList& list) const;
 

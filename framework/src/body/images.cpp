@@ -53,10 +53,10 @@ ImageMaker::ImageMaker(int dimension, double reach, std::vector<ImagePlane> plan
   }
 }
 
-ImageMaker::ImageMaker(const Body& body, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces)
-    : ImageMaker(body.dimension(), halo(body.horizon()), std::move(planes)) {
+ImageMaker::ImageMaker(const BodyFrame& frame, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces)
+    : ImageMaker(perikit::dimension(frame.space), halo(frame.horizon), std::move(planes)) {
   if (surfaces.empty()) return;
-  turning_ = std::make_unique<TurningMirrors>(body, planes_, surfaces);
+  turning_ = std::make_unique<TurningMirrors>(frame, planes_, surfaces);
   for (std::vector<std::size_t>& across : across_)
     std::erase_if(across, [&](std::size_t k) { return planes_[k].period == 0; });
 }
@@ -87,7 +87,7 @@ std::vector<Crack> ImageMaker::cracks(std::vector<Crack> cracks) const {
 Images make_images(const Body& body, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces) {
   Images images;
   if (body.lattice()) images.lattice = with_images(*body.lattice(), body.horizon(), planes);
-  const ImageMaker maker(body, std::move(planes), surfaces);
+  const ImageMaker maker(body.frame(), std::move(planes), surfaces);
   images.cracks = maker.cracks(body.cracks());
   for (std::size_t n = 0; n < body.points(); ++n)
     maker.add(body.position(static_cast<std::size_t>(body.internal()[n])), static_cast<std::int64_t>(n), static_cast<std::int32_t>(n),

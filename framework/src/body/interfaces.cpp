@@ -58,41 +58,4 @@ Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> mate
   return found;
 }
 
-Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known) {
-  Interfaces found;
-  found.notes = known.notes;
-  if (known.empty()) return found;
-  found.length = known.length;
-  found.material.assign(part.stride(), 0);
-  found.source.assign(part.stride(), -1);
-  std::vector<std::int32_t> here(whole.stride(), -1);  // by internal index of the whole body
-  for (const std::int32_t index : part.internal()) {
-    const auto p = static_cast<std::size_t>(index);
-    const auto original = static_cast<std::size_t>(whole.internal()[static_cast<std::size_t>(part.number(p))]);
-    here[original] = index;
-    found.material[p] = known.material[original];
-  }
-  for (const std::int32_t index : part.internal()) {
-    const auto original = static_cast<std::size_t>(whole.internal()[static_cast<std::size_t>(part.number(static_cast<std::size_t>(index)))]);
-    found.source[static_cast<std::size_t>(index)] = here[static_cast<std::size_t>(known.source[original])];
-  }
-  for (const Interface& from : known.all) {
-    std::vector<std::pair<std::int32_t, std::size_t>> points;
-    for (std::size_t at = 0; at < from.point.size(); ++at)
-      if (const std::int32_t p = here[static_cast<std::size_t>(from.point[at])]; p >= 0) points.push_back({p, at});
-    if (points.empty()) continue;
-    std::ranges::sort(points);
-    Interface& to = found.all.emplace_back();
-    to.first = from.first;
-    to.second = from.second;
-    for (const auto& [p, at] : points) {
-      to.point.push_back(p);
-      to.distance.push_back(from.distance[at]);
-      // -1 where it lies on another rank: there constants are those of the material.
-      to.counterpart.push_back(here[static_cast<std::size_t>(from.counterpart[at])]);
-    }
-  }
-  return found;
-}
-
 }  // namespace perikit

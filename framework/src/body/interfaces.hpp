@@ -46,7 +46,4 @@ Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> mate
 Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
                                  double reach);
 
-/// The same on a rank's part of a body that it has as a whole.
-Interfaces interfaces_of_part(const Body& part, const Body& whole, const Interfaces& known);
-
 }  // namespace perikit

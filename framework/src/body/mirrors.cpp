@@ -3,13 +3,13 @@
 // image is found on two ways, each way has its half; at sharper ones images of images of images fill the rest.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
 
 #include "body/image_list.hpp"
 #include "body/level_surface.hpp"
-#include "body/points_at_surface.hpp"
 
 namespace perikit {
 
@@ -58,11 +58,11 @@ class PlaneMirror final : public Mirror {
 
 class SurfaceMirror final : public Mirror {
  public:
-  SurfaceMirror(const Body& body, const ImageSurface& surface, double reach)
+  SurfaceMirror(const BodyFrame& frame, const ImageSurface& surface, double reach)
       : Mirror({true, true, true}, surface.motion),
-        surface_(surface.level, body.dimension(), body.spacing()),
-        points_(body, surface_),
-        spacing_(body.spacing()),
+        surface_(surface.level, dimension(frame.space), frame.spacing),
+        nearest_(surface.nearest),
+        spacing_(frame.spacing),
         reach_(reach) {}
 
   std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
@@ -80,7 +80,7 @@ class SurfaceMirror final : public Mirror {
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) square += (back->at[c] - foot->at[c]) * (back->at[c] - foot->at[c]);
     if (square > same * same * spacing_ * spacing_) return std::nullopt;
-    return Reflected{{image, foot->at, foot->stretch, points_.nearest(foot->at, list.source())}, foot->depth};
+    return Reflected{{image, foot->at, foot->stretch, nearest_(foot->at, list.number())}, foot->depth};
   }
   double behind(const Point& x) const override {
     if (!(surface_.level(x) > 0)) return 0;
@@ -95,16 +95,16 @@ class SurfaceMirror final : public Mirror {
   static constexpr double far = 3;
 
   LevelSurface surface_;
-  PointsAtSurface points_;
+  std::function<std::int64_t(const Point&, std::int64_t)> nearest_;
   double spacing_, reach_;
 };
 
 }  // namespace
 
-TurningMirrors::TurningMirrors(const Body& body, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces)
-    : even_(1e-6 * body.spacing()) {
-  const double reach = halo(body.horizon());
-  for (const ImageSurface& surface : surfaces) mirrors_.push_back(std::make_unique<SurfaceMirror>(body, surface, reach));
+TurningMirrors::TurningMirrors(const BodyFrame& frame, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces)
+    : even_(1e-6 * frame.spacing) {
+  const double reach = halo(frame.horizon);
+  for (const ImageSurface& surface : surfaces) mirrors_.push_back(std::make_unique<SurfaceMirror>(frame, surface, reach));
   for (const ImagePlane& plane : planes)
     if (plane.period == 0) mirrors_.push_back(std::make_unique<PlaneMirror>(plane, reach));
 }

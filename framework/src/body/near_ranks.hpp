@@ -13,6 +13,12 @@ namespace perikit {
 /// A box around points.
 struct Bounds {
   Point low{}, high{};
+  void add(const Point& x) noexcept {
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], x[a]);
+      high[a] = std::max(high[a], x[a]);
+    }
+  }
   bool near(const Point& x, double distance) const noexcept {
     for (std::size_t a = 0; a < 3; ++a)
       if (x[a] < low[a] - distance || x[a] > high[a] + distance) return false;

@@ -315,6 +315,12 @@ PointCloud read_all(const std::filesystem::path& file, const Wanted& wanted) {
   return cloud;
 }
 
+PointCloud read_run(const std::filesystem::path& file, const Wanted& wanted) {
+  PointCloud cloud = agreed([&] { return read(file, wanted, own_run); });
+  refuse_empty(file, counted(std::ssize(cloud.volume)).all);
+  return cloud;
+}
+
 }  // namespace
 
 PointCloud read_points(const std::filesystem::path& file, int dimension) {
@@ -326,9 +332,11 @@ PointCloud read_positions(const std::filesystem::path& file, int dimension) {
 }
 
 PointCloud read_run_of_points(const std::filesystem::path& file, int dimension) {
-  PointCloud cloud = agreed([&] { return read(file, {dimension, true}, own_run); });
-  refuse_empty(file, counted(std::ssize(cloud.volume)).all);
-  return cloud;
+  return read_run(file, {dimension, true});
+}
+
+PointCloud read_run_of_positions(const std::filesystem::path& file, int dimension) {
+  return read_run(file, {dimension, false});
 }
 
 void over_points_of_file(const std::filesystem::path& file, int dimension, const std::function<void(const PointCloud&)>& use) {

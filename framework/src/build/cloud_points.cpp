@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "body/point_share.hpp"
@@ -46,19 +48,35 @@ void check_cloud(const Scene& scene, double points, double ratio, WhichPoints wh
   check_memory(scene, of_rank, ratio, true, part);
 }
 
-/// Voronoi cells of all points.
-std::vector<double> cells_of_jittered(const Scene& scene, const Lattice& lattice, const std::vector<Point>& positions) {
+/// Whether points are shared out to ranks that are there.
+bool shared(WhichPoints which) {
+  return which == WhichPoints::run && communicator().complete() && communicator().size() > 1;
+}
+
+/// Makes a box as large as all points of it need, on whatever rank.
+void extend(const std::vector<Point>& positions, WhichPoints which, Point& lower, Point& upper) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const Point& x : positions) {
+      lower[c] = std::min(lower[c], x[c]);
+      upper[c] = std::max(upper[c], x[c]);
+    }
+    if (!shared(which)) continue;
+    lower[c] = -communicator().largest(-lower[c]);
+    upper[c] = communicator().largest(upper[c]);
+  }
+}
+
+/// Voronoi cells of the points.
+std::vector<double> cells_of_jittered(const Scene& scene, const Lattice& lattice, const std::vector<Point>& positions,
+                                      WhichPoints which) {
   const LatticeDescription& description = *scene.body.lattice;
   // The box of the cells that there are: jittered points may leave it by no more than half a spacing.
   Point lower = description.lower, upper = lattice.lower;
   const std::array<std::int64_t, 3> counts = input_cells(lattice);
   for (std::size_t c = 0; c < 3; ++c) upper[c] = description.lower[c] + static_cast<double>(counts[c]) * description.spacing;
-  for (const Point& x : positions)
-    for (std::size_t c = 0; c < 3; ++c) {
-      lower[c] = std::min(lower[c], x[c]);
-      upper[c] = std::max(upper[c], x[c]);
-    }
-  return voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr);
+  extend(positions, which, lower, upper);
+  return voronoi_volumes(positions, scene.body.dimension, lower, upper, description.inside ? &*description.inside : nullptr,
+                         shared(which));
 }
 
 /// One point in each of these cells, moved at random by at most `jitter` spacings along each axis; without volumes.
@@ -92,7 +110,7 @@ PointCloud jittered(const Scene& scene, const Lattice& lattice, std::span<const 
   if (description.jitter > 0)
     random.discard(static_cast<std::uint64_t>(points.before) * static_cast<std::uint64_t>(scene.body.dimension));
   PointCloud cloud = moved(scene, lattice, kept, random);
-  cloud.volume = scene.body.voronoi ? cells_of_jittered(scene, lattice, cloud.position)
+  cloud.volume = scene.body.voronoi ? cells_of_jittered(scene, lattice, cloud.position, which)
                                     : std::vector<double>(kept.size(), cell_volume(scene));
   for (double& volume : cloud.volume) volume *= scene.body.section;
   return cloud;
@@ -136,23 +154,33 @@ CloudPoints points_of_lattice(const Scene& scene, WhichPoints which) {
           description.spacing};
 }
 
+void refuse_empty_cell(const Scene& scene, const PointCloud& cloud) {
+  const auto empty = std::ranges::find_if_not(cloud.volume, [](double volume) { return volume > 0; });
+  if (empty == cloud.volume.end()) return;
+  const Point& x = cloud.position[static_cast<std::size_t>(empty - cloud.volume.begin())];
+  throw InputError(
+      scene.body.volume_position, "body.points.inside",
+      fmt::format(
+          "found nothing inside around the point at ({:.6g}, {:.6g}, {:.6g}); allowed: points inside, at different places", x[0],
+          x[1], x[2]));
+}
+
 /// Points of a file with the volumes of their Voronoi cells.
-PointCloud cells_of_points(const Scene& scene) {
+PointCloud cells_of_points(const Scene& scene, WhichPoints which) {
   const BodyDescription& body = scene.body;
-  PointCloud cloud = read_positions(*body.points_file, body.dimension);
-  Point lower = cloud.position.front(), upper = lower;
-  for (const Point& x : cloud.position)
-    for (std::size_t c = 0; c < 3; ++c) {
-      lower[c] = std::min(lower[c], x[c]);
-      upper[c] = std::max(upper[c], x[c]);
-    }
+  PointCloud cloud = which == WhichPoints::all ? read_positions(*body.points_file, body.dimension)
+                                               : read_run_of_positions(*body.points_file, body.dimension);
+  const auto points = static_cast<double>(counted_of(cloud.position.size(), which).all);
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Point lower{infinity, infinity, infinity}, upper{-infinity, -infinity, -infinity};
+  extend(cloud.position, which, lower, upper);
   const Point first = lower, last = upper;
   // The spacing that the points have in the box that is larger than they by half of it.
   double spacing = 0;
   for (int step = 0; step < 50; ++step) {
     double size = 1;
     for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) size *= last[c] - first[c] + spacing;
-    spacing = std::pow(size / static_cast<double>(cloud.position.size()), 1.0 / body.dimension);
+    spacing = std::pow(size / points, 1.0 / body.dimension);
   }
   for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) {
     lower[c] = body.points_lower ? (*body.points_lower)[c] : lower[c] - 0.5 * spacing;
@@ -163,17 +191,13 @@ PointCloud cells_of_points(const Scene& scene) {
                                    lower[c] > first[c] ? lower[c] : upper[c], "xyz"[c], first[c], last[c]));
     }
   }
-  cloud.volume =
-      voronoi_volumes(cloud.position, body.dimension, lower, upper, body.points_inside ? &*body.points_inside : nullptr);
-  for (std::size_t n = 0; n < cloud.volume.size(); ++n) {
-    if (cloud.volume[n] > 0) continue;
-    const Point& x = cloud.position[n];
-    throw InputError(
-        body.volume_position, "body.points.inside",
-        fmt::format(
-            "found nothing inside around the point at ({:.6g}, {:.6g}, {:.6g}); allowed: points inside, at different places",
-            x[0], x[1], x[2]));
-  }
+  cloud.volume = voronoi_volumes(cloud.position, body.dimension, lower, upper,
+                                 body.points_inside ? &*body.points_inside : nullptr, shared(which));
+  const auto check = [&] {
+    refuse_empty_cell(scene, cloud);
+    return true;
+  };
+  shared(which) ? agreed(check) : check();
   for (double& volume : cloud.volume) volume *= body.section;
   return cloud;
 }
@@ -181,7 +205,7 @@ PointCloud cells_of_points(const Scene& scene) {
 CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
   const std::filesystem::path& file = *scene.body.points_file;
   const int dimension = scene.body.dimension;
-  PointCloud cloud = scene.body.voronoi          ? cells_of_points(scene)
+  PointCloud cloud = scene.body.voronoi          ? cells_of_points(scene, which)
                      : which == WhichPoints::all ? read_points(file, dimension)
                                                  : read_run_of_points(file, dimension);
   ExactSum volumes;

@@ -14,7 +14,7 @@ void keep_off_surfaces(const Scene& scene, double spacing, std::vector<Point>& p
 
 /// The surfaces of a scene; their motions are appended to those of the planes. Throws InputError for lattices, surfaces that no
 /// points touch, points behind a surface, bodies that are too thin or bent for mirror images, cracks that come near, and surfaces
-/// held twice.
-void add_surfaces(const Scene& scene, const Body& body, bool quasi_static, ScenePlanes& planes);
+/// held twice. All ranks must call it.
+void add_surfaces(const Scene& scene, const PlacedPoints& points, bool quasi_static, ScenePlanes& planes);
 
 }  // namespace perikit

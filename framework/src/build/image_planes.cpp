@@ -9,6 +9,8 @@
 
 #include "body/image_list.hpp"
 #include "build/conditions.hpp"
+#include "build/held_surfaces.hpp"
+#include "build/sets.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -37,8 +39,8 @@ class PointsAtSide {
   /// All ranks must call it.
   PointsAtSide(const PlacedPoints& points, const Side& side, const std::string& set) : side_(side), spacing_(points.frame().spacing) {
     const auto over = [&](const std::string& name, auto&& visit) {
-      points.over(name, [&](const Point& x, std::int64_t number) {
-        if (const double d = side_.depth(x); d >= 0 && d < layer_at(points)) visit(x, number);
+      points.over(name, [&](const PlacedPoints::OnePoint& point) {
+        if (const double d = side_.depth(point.x); d >= 0 && d < layer_at(points)) visit(point.x, point.number);
       });
     };
     std::vector<Outermost> found;
@@ -100,7 +102,9 @@ class PlaneBuilder {
   /// The coordinate of the outermost of these points, on all ranks.
   double outermost(const std::string& set, int axis, double outward) const {
     double extreme = -std::numeric_limits<double>::infinity();
-    points_->over(set, [&](const Point& x, std::int64_t) { extreme = std::max(extreme, outward * x[static_cast<std::size_t>(axis)]); });
+    points_->over(set, [&](const PlacedPoints::OnePoint& point) {
+      extreme = std::max(extreme, outward * point.x[static_cast<std::size_t>(axis)]);
+    });
     return outward * communicator().largest(extreme);
   }
 
@@ -130,8 +134,8 @@ class PlaneBuilder {
   /// Whether one of the points of a set, on whatever rank, lies at a side.
   bool touched(const Side& side, const std::string& set) const {
     double found = 0;
-    points_->over(set, [&](const Point& x, std::int64_t) {
-      if (const double d = side.depth(x); d >= 0 && d < layer_at(*points_)) found = 1;
+    points_->over(set, [&](const PlacedPoints::OnePoint& point) {
+      if (const double d = side.depth(point.x); d >= 0 && d < layer_at(*points_)) found = 1;
     });
     return communicator().largest(found) > 0;
   }
@@ -170,8 +174,9 @@ class PlaneBuilder {
       std::int64_t number;
     };
     std::vector<Beyond> mine;   // the one farthest behind, the first of several
-    points_->over("all", [&](const Point& x, std::int64_t number) {
-      if (const double d = side.depth(x); d < 0 && (mine.empty() || d < mine.front().depth)) mine.assign(1, {d, x, number});
+    points_->over("all", [&](const PlacedPoints::OnePoint& point) {
+      const double d = side.depth(point.x);
+      if (d < 0 && (mine.empty() || d < mine.front().depth)) mine.assign(1, {d, point.x, point.number});
     });
     const std::vector<Beyond> all = told_to_all(gathered<Beyond>(mine));
     if (all.empty()) return;
@@ -201,6 +206,8 @@ class PlaneBuilder {
     const BoundaryDescription& boundary = scene_.boundaries[k];
     const std::string key = fmt::format("boundary.{}.face", k);
     Side side{boundary.face[1] - 'x', boundary.face[0] == '+' ? 1.0 : -1.0, 0};
+    if (std::isinf(outermost(boundary.set, side.axis, side.outward)))
+      refuse_empty_set(*std::ranges::find(scene_.sets, boundary.set, &SetDescription::name));
     side.at = boundary.at ? given(*boundary.at, side.axis, boundary.face_position, fmt::format("boundary.{}.at", k))
                           : end_of(boundary.set, side.axis, side.outward, boundary.face_position, fmt::format("boundary.{}.at", k));
     ImagePlane& plane = plane_at(side, boundary.set, key, boundary.face_position, true);
@@ -269,7 +276,9 @@ class PlaneBuilder {
 }  // namespace
 
 ScenePlanes build_planes(const Scene& scene, const std::shared_ptr<const PlacedPoints>& points, bool quasi_static) {
-  return PlaneBuilder(scene, points, quasi_static).build();
+  ScenePlanes planes = PlaneBuilder(scene, points, quasi_static).build();
+  add_surfaces(scene, *points, quasi_static, planes);
+  return planes;
 }
 
 void refuse_overlap(const ScenePlanes& planes, const OverlappingImage& error) {

@@ -22,7 +22,8 @@ struct ScenePlanes {
   std::vector<FaceMotion> motions;       ///< what ImagePlane::motion and ImageSurface::motion number
 };
 
-/// Throws InputError for faces without points, planes through the body, faces held twice. All ranks must call it.
+/// Throws InputError for faces without points, planes through the body, faces held twice, and as add_surfaces. All ranks must
+/// call it.
 ScenePlanes build_planes(const Scene& scene, const std::shared_ptr<const PlacedPoints>& points, bool quasi_static);
 
 /// Says which side has something beyond it that is in the way of images.

@@ -54,7 +54,7 @@ LocalPlaces placed(std::unique_ptr<Partition> partition, std::uint16_t far_mater
   return {std::move(partition), std::move(body)};
 }
 
-/// The planes of a cloud, and what makes images behind them.
+/// The planes and surfaces of a cloud, and what makes images behind them.
 struct CloudPlanes {
   ScenePlanes scene;
   ImageMaker maker;
@@ -63,7 +63,7 @@ struct CloudPlanes {
 /// points: of this rank. The frame gets images of its cracks.
 CloudPlanes planes_of_cloud(const Scene& scene, const PointStream& points, bool quasi_static, BodyFrame& frame) {
   ScenePlanes planes = build_planes(scene, placed_points(scene, frame, points), quasi_static);
-  ImageMaker maker(dimension(frame.space), halo(frame.horizon), planes.planes);
+  ImageMaker maker(frame, planes.planes, planes.surfaces);
   frame.cracks = maker.cracks(std::move(frame.cracks));
   return {std::move(planes), std::move(maker)};
 }
@@ -88,7 +88,8 @@ LocalPlaces place_stream(const Scene& scene, const CloudOutline& cloud, const Pa
 }
 
 LocalPlaces place_cloud(const Scene& scene, const Partition::Reach& reach, std::uint16_t far_material, bool quasi_static) {
-  if (!communicator().complete())
+  // Cells are found of all points that a rank without others has.
+  if (!communicator().complete() && !scene.body.voronoi)
     if (const CloudOutline cloud = cloud_outline(scene); !lone_rank_orders(static_cast<double>(cloud.extent.points)))
       return place_stream(scene, cloud, reach, far_material, quasi_static);
   CloudPoints cloud = cloud_points(scene, WhichPoints::run);

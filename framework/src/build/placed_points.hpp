@@ -15,7 +15,8 @@ namespace perikit {
 
 class PlacedPoints {
  public:
-  using Visit = std::function<void(const Point& x, std::int64_t number)>;
+  using OnePoint = CloudShares::OnePoint;
+  using Visit = std::function<void(const OnePoint& point)>;
 
   virtual ~PlacedPoints() = default;
   const BodyFrame& frame() const noexcept { return frame_; }
@@ -38,12 +39,13 @@ class PlacedPoints {
 /// Of a body that every rank has as a whole, which must outlive them; their numbers are those of the input.
 std::shared_ptr<const PlacedPoints> placed_points(const Body& whole);
 
-/// Of a lattice that no rank has as a whole: their numbers are those of the cells of the input, x fastest. inside: empty where all cells
-/// have a point. The scene must outlive them. Sets are those of expressions, and "all".
+/// Of a lattice that no rank has as a whole: their numbers are those of the cells of the input, x fastest. inside: empty where
+/// all cells have a point. The scene must outlive them. Sets are those that faces are of, and "all". All ranks must call it.
+/// Throws InputError for listed points that do not exist.
 std::shared_ptr<const PlacedPoints> placed_points(const Scene& scene, const Lattice& lattice, const Inside& inside);
 
-/// Of a cloud that no rank has as a whole: this rank's run of its points, or all of them; their numbers are those of the input. The
-/// scene must outlive them. Sets are those of expressions, and "all".
+/// The same of a cloud that no rank has as a whole: this rank's run of its points, or all of them; their numbers are those of the
+/// input.
 std::shared_ptr<const PlacedPoints> placed_points(const Scene& scene, const BodyFrame& frame, PointStream points);
 
 }  // namespace perikit

@@ -10,7 +10,6 @@
 #include "build/conditions.hpp"
 #include "build/damage.hpp"
 #include "build/gradient_order.hpp"
-#include "build/held_surfaces.hpp"
 #include "build/image_planes.hpp"
 #include "build/interfaces.hpp"
 #include "build/local_body.hpp"
@@ -32,15 +31,13 @@ std::uint16_t far_material(const Scene& scene, bool images) { return static_cast
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
-  Images images;
-  Images here;   ///< of several ranks: what this one has of them
+  Images images;  ///< of several ranks: what this one has of them
   std::vector<FaceMotion> motions;
   std::shared_ptr<const Interfaces> interfaces;   ///< null: no laminates
 };
 
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   ScenePlanes planes = build_planes(scene, placed_points(body), quasi_static);
-  add_surfaces(scene, body, quasi_static, planes);
   if (planes.planes.empty() && planes.surfaces.empty()) return {};
   Images images = make_images(body, planes.planes, planes.surfaces);
   try {
@@ -48,7 +45,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   } catch (const OverlappingImage& error) {
     refuse_overlap(planes, error);
   }
-  return {std::move(images), {}, std::move(planes.motions), nullptr};
+  return {std::move(images), std::move(planes.motions), nullptr};
 }
 
 /// How far the forces of a formulation reach (partition.hpp).
@@ -66,49 +63,28 @@ Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulat
     parts.partition = std::move(local.partition);
     Beyond beyond;
     if (local.images) {
-      beyond.here = std::move(*local.images);
+      beyond.images = std::move(*local.images);
       beyond.motions = std::move(local.motions);
-      parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);
+      parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     }
     beyond.interfaces = std::make_shared<const Interfaces>(
-        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.here.source));
+        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.images.source));
     return beyond;
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
   }
 }
 
-/// The bodies of this rank and, where there are several, of all of them.
+/// The body, on several ranks the part of this one.
 Beyond place_points(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
-  if (communicator().size() > 1) {
-    parts.placed_whole = needs_whole_body(scene);
-    if (parts.placed_whole.empty()) return place_part(scene, factory, formulation, parts, quasi_static);
-  }
-  Body whole = build_body(scene);
-  std::vector<std::uint16_t> material = materials_of_points(whole);
-  Beyond beyond = place_images(scene, whole, quasi_static);
-  beyond.interfaces = std::make_shared<const Interfaces>(
-      build_interfaces(scene, factory, formulation, whole, std::move(material), beyond.images.source));
-  if (communicator().size() == 1) {
-    parts.body = std::make_unique<const Body>(std::move(whole));
-    if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
-    return beyond;
-  }
-  std::unique_ptr<Partition> partition;
-  try {
-    partition = std::make_unique<Partition>(std::move(whole), reach_of(scene, formulation), beyond.images.source);
-  } catch (const std::domain_error& error) {
-    throw InputError(scene.body.position, "body", error.what());
-  }
-  const bool images = beyond.images.size() > 0;
-  parts.body = std::make_unique<const Body>(partition->make_part(far_material(scene, images)));
-  parts.partition = std::move(partition);
-  if (images) {
-    beyond.here = images_of_part(beyond.images, *parts.body);
-    parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.here);
-  }
+  if (communicator().size() > 1) return place_part(scene, factory, formulation, parts, quasi_static);
+  Body body = build_body(scene);
+  std::vector<std::uint16_t> material = materials_of_points(body);
+  Beyond beyond = place_images(scene, body, quasi_static);
   beyond.interfaces =
-      std::make_shared<const Interfaces>(interfaces_of_part(*parts.body, *parts.partition->whole(), *beyond.interfaces));
+      std::make_shared<const Interfaces>(build_interfaces(scene, factory, formulation, body, std::move(material), beyond.images.source));
+  parts.body = std::make_unique<const Body>(std::move(body));
+  if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
   return beyond;
 }
 
@@ -239,7 +215,6 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   Beyond beyond = place_points(scene, factory, of_terms.formulation, parts, quasi_static);
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
-  const Images& images = partition ? beyond.here : beyond.images;
   refuse_stress(scene, body, of_terms.formulation);
   steps.begin("laws");
   parts.laws = build_laws(scene, factory, body, parts.images != nullptr);
@@ -265,14 +240,13 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.materials.resize(parts.laws->records().size(), scene.material->type);
 
   steps.begin("boundaries and loads");
-  Constraints constraints = build_constraints(scene, body, images, std::move(beyond.motions), quasi_static);
+  Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
   Loads loads = build_loads(scene, of_terms, parts.images.get(), quasi_static);
   Masses masses(body, *parts.laws, missing_density(scene, body, *parts.laws));
-  if (partition) parts.partition->forget_whole();
   ProblemValues values{body, *parts.laws, std::move(state), std::move(masses), std::move(constraints), std::move(loads), parts.images.get()};
   return std::make_unique<BodyProblem>(std::move(parts), std::move(values));
 }

@@ -42,21 +42,19 @@ std::int32_t nearest_point(const Point& place, const Body& body) {
   return point;
 }
 
-/// The same of all ranks: the input number. All of them must call it.
-std::int64_t nearest_of_all(const Point& place, const Body& body) {
+/// The same of all ranks: its number. All of them must call it.
+std::int64_t nearest_of_all(const Point& place, const ShownPoints& points) {
   struct Near {
     std::int64_t number;
     double squared;
   };
   double least = std::numeric_limits<double>::infinity();
-  for (const std::int32_t p : body.owned())
-    least = std::min(least, squared_distance(body.position(static_cast<std::size_t>(p)), place));
+  points([&](const Point& x, std::int64_t) { least = std::min(least, squared_distance(x, place)); });
   least = -communicator().largest(-least);
   std::vector<Near> mine;  // all that may count as equally near
-  for (const std::int32_t p : body.owned())
-    if (const double squared = squared_distance(body.position(static_cast<std::size_t>(p)), place);
-        squared <= least * (1 + 1e-11))
-      mine.push_back({body.number(static_cast<std::size_t>(p)), squared});
+  points([&](const Point& x, std::int64_t number) {
+    if (const double squared = squared_distance(x, place); squared <= least * (1 + 1e-11)) mine.push_back({number, squared});
+  });
   std::vector<Near> near = told_to_all(gathered<Near>(mine));
   std::ranges::sort(near, {}, &Near::number);
   Near first{-1, std::numeric_limits<double>::infinity()};
@@ -65,12 +63,17 @@ std::int64_t nearest_of_all(const Point& place, const Body& body) {
   return first.number;
 }
 
-void check_listed(const SetDescription& description, const std::string& key, const Body& body) {
+std::string key_of(const SetDescription& description) {
+  return "sets." + description.name;
+}
+
+/// points: of the body, on all ranks.
+void check_listed(const SetDescription& description, std::int64_t points) {
+  const std::string key = key_of(description);
   std::set<std::int64_t> seen;
   for (const std::int64_t p : description.points) {
-    if (p < 0 || static_cast<std::size_t>(p) >= body.points_of_all_ranks())
-      throw InputError(description.position, key,
-                       fmt::format("found the point {}; allowed: 0 to {}", p, body.points_of_all_ranks() - 1));
+    if (p < 0 || p >= points)
+      throw InputError(description.position, key, fmt::format("found the point {}; allowed: 0 to {}", p, points - 1));
     if (!seen.insert(p).second)
       throw InputError(description.position, key, fmt::format("found the point {} twice; allowed: each point once", p));
   }
@@ -81,6 +84,13 @@ std::vector<std::int32_t> with_numbers(const std::vector<std::int64_t>& numbers,
   for (const std::int64_t number : numbers)
     if (const std::int32_t p = body.find(number); p >= 0) members.push_back(p);
   return members;
+}
+
+ShownPoints own_points(const Body& body) {
+  return [&body](const auto& visit) {
+    for (const std::int32_t p : body.owned())
+      visit(body.position(static_cast<std::size_t>(p)), body.number(static_cast<std::size_t>(p)));
+  };
 }
 
 /// Whether a set has a point on any rank. All of them must call it.
@@ -97,26 +107,42 @@ const Expression* set_expression(const Scene& scene, const std::string& name) {
   return set != scene.sets.end() && set->expression ? &*set->expression : nullptr;
 }
 
+std::vector<std::int64_t> single_points(const SetDescription& description, const ShownPoints& points) {
+  if (description.nearest) return {nearest_of_all(*description.nearest, points)};
+  std::int64_t mine = 0;
+  points([&](const Point&, std::int64_t) { ++mine; });
+  const Counted count = counted(mine);
+  check_listed(description, count.all);
+  std::vector<std::int64_t> listed = description.points, found;
+  std::ranges::sort(listed);
+  std::int64_t input = count.before;
+  points([&](const Point&, std::int64_t number) {
+    if (std::ranges::binary_search(listed, input++)) found.push_back(number);
+  });
+  return told_to_all(gathered<std::int64_t>(found));
+}
+
+void refuse_empty_set(const SetDescription& description) {
+  throw InputError(description.position, key_of(description),
+                   "found a condition that holds at no point; allowed: one that holds at one point or more");
+}
+
 SetMembers add_sets(const std::vector<SetDescription>& sets, Body& body) {
   SetMembers of_all;
   for (const SetDescription& description : sets) {
-    const std::string key = "sets." + description.name;
     std::vector<std::int32_t>& members = of_all[description.name];
     if (description.expression)
       members = where_true(*description.expression, body);
     else if (description.nearest)
-      members = body.part() ? with_numbers({nearest_of_all(*description.nearest, body)}, body)
+      members = body.part() ? with_numbers({nearest_of_all(*description.nearest, own_points(body))}, body)
                             : std::vector{nearest_point(*description.nearest, body)};
     else {
-      check_listed(description, key, body);
+      check_listed(description, static_cast<std::int64_t>(body.points_of_all_ranks()));
       members = with_numbers(description.points, body);
     }
     std::vector<std::int32_t> own = members;
     std::erase_if(own, [&](std::int32_t p) { return !body.owns(static_cast<std::size_t>(p)); });
-    if (!any_of_all(own)) {
-      throw InputError(description.position, key,
-                       "found a condition that holds at no point; allowed: one that holds at one point or more");
-    }
+    if (!any_of_all(own)) refuse_empty_set(description);
     const bool own_order = body.part() && !std::ranges::is_sorted(description.points);
     body.add_set(description.name, std::move(own), own_order ? description.points : std::vector<std::int64_t>());
   }

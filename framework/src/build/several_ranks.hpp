@@ -14,8 +14,4 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator);
 /// Whether anything lies beyond planes or surfaces of the body.
 bool has_images(const Scene& scene);
 
-/// Why every rank places the whole body of the scene, in words; empty where each of them places its own part alone. All
-/// ranks must call it.
-std::string needs_whole_body(const Scene& scene);
-
 }  // namespace perikit

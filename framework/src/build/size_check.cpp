@@ -37,9 +37,11 @@ const char* key_of(const Scene& scene) {
 
 void check_index(const Scene& scene, double cells) {
   if (cells > most_points) {
-    throw InputError(scene.body.position, key_of(scene),
-                     fmt::format("found about {:.3g} points; allowed: at most {:.3g} on a rank{}", cells, most_points,
-                                 scene.body.voronoi ? "" : "; explicit runs share it out (mpirun -np N perikit run)"));
+    throw InputError(
+        scene.body.position, key_of(scene),
+        fmt::format(
+            "found about {:.3g} points; allowed: at most {:.3g} on a rank; explicit runs share it out (mpirun -np N perikit run)",
+            cells, most_points));
   }
 }
 

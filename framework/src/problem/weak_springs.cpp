@@ -29,7 +29,8 @@ WeakSprings::WeakSprings(const Families& families, Problem& problem, double shar
       anchor_(share > 0 ? problem.state().declare("weak_spring_anchor") : FieldView{}) {}
 
 void WeakSprings::find(ConstFieldView u, bool fresh) {
-  pieces_ = find_loose_pieces(families_, problem_, u);
+  // A rank without others does not know what holds its part beyond it.
+  if (communicator().complete()) pieces_ = find_loose_pieces(families_, problem_, u);
   points_ = points_of(pieces_);
   any_ = communicator().largest(pieces_.empty() ? 0 : 1) > 0;
   std::vector<std::uint8_t> now(loose_.size(), 0);

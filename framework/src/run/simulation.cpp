@@ -125,12 +125,10 @@ std::string ranks_summary(const BodyProblem& problem) {
       "balance       {} points on the largest rank, {:.3f} of the mean\n"
       "ghosts        at most {:.0f} points a rank, {:.2f} of the mean number of its own\n"
       "exchange      at most {:.3g} MB a rank and step\n"
-      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n"
-      "placed        {}\n",
+      "memory        at most {:.3g} MB a rank ({:.0f} bytes a point of all)\n",
       points.size(), thread_count(), *std::ranges::max_element(points),
       static_cast<double>(*std::ranges::max_element(points)) / mean, most_ghosts, most_ghosts / mean, sent / 1e6,
-      most_bytes / 1e6, most_bytes / mean,
-      problem.placed_whole().empty() ? "by each rank its own part" : "the whole body by each rank: " + problem.placed_whole());
+      most_bytes / 1e6, most_bytes / mean);
 }
 
 }  // namespace

@@ -116,6 +116,7 @@ class Body {
   /// Of a part of a cloud: the colours that its blocks have in the whole body.
   void set_block_colours(std::vector<std::int32_t> colours) { colours_ = std::move(colours); }
 
+  const BodyFrame& frame() const noexcept { return frame_; }
   int dimension() const noexcept { return perikit::dimension(frame_.space); }
   Space space() const noexcept { return frame_.space; }
   double section() const noexcept { return frame_.section; }

@@ -33,6 +33,8 @@ struct ImagePlane {
 struct ImageSurface {
   std::function<double(const Point&)> level;   ///< zero on the surface
   std::array<int, 3> motion{-1, -1, -1};       ///< which motion each component has there
+  /// Of a place of the surface: the number of the point next to it that is nearest; `otherwise` where none is near.
+  std::function<std::int64_t(const Point& foot, std::int64_t otherwise)> nearest;
 };
 
 /// A share of an image's displacement: factor times the motion at a place of a plane (-1: 0). What the image exerts on the plane counts for the
@@ -74,8 +76,8 @@ class TurningMirrors;
 /// lies deepest has it; periodic sides come last. Each point has its images by itself.
 class ImageMaker {
  public:
-  /// surfaces: of a cloud, the body, which must outlive the maker.
-  ImageMaker(const Body& body, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
+  /// surfaces: of a cloud.
+  ImageMaker(const BodyFrame& frame, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
   /// Without surfaces; reach: the halo.
   ImageMaker(int dimension, double reach, std::vector<ImagePlane> planes);
   ~ImageMaker();

@@ -27,7 +27,8 @@ class Partition {
     bool blocks = false;
     bool sources = false;  ///< evaluation of an image asks for more of its source than the displacement
   };
-  /// All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
+  /// Of a body that each rank has as a whole, for which nobody has to ask others: what the parts below must be like, and what tests compare them
+  /// with. All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
   /// images, and whoever owns a block has them. Throws std::domain_error where the body has too few blocks for the ranks.
   Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
   /// Of a lattice that no rank has as a whole: `inside` (empty: true) is asked at the cells that the rank is to have and no others.
@@ -42,8 +43,6 @@ class Partition {
 
   /// Null where no rank has it.
   const Body* whole() const noexcept { return whole_ ? &*whole_ : nullptr; }
-  /// Where nobody refers to it any more.
-  void forget_whole() noexcept { whole_.reset(); }
   /// The points of this rank and its ghosts; far ones have the material number `far_material`. Once: it lets go of what it takes.
   /// All ranks must call it.
   Body make_part(std::uint16_t far_material);

@@ -98,6 +98,19 @@ inline Run own_run(std::int64_t count) {
   return {first(rank), first(rank + 1)};
 }
 
+/// Whose run holds which number, where each rank's begins at `first`. All ranks must make one.
+class RunOwners {
+ public:
+  explicit RunOwners(std::int64_t first) : firsts_(told_to_all(gathered<std::int64_t>({&first, 1}))) {}
+  std::size_t owner(std::int64_t number) const {
+    if (!communicator().complete()) return static_cast<std::size_t>(communicator().rank());
+    return static_cast<std::size_t>(std::ranges::upper_bound(firsts_, number) - firsts_.begin() - 1);
+  }
+
+ private:
+  std::vector<std::int64_t> firsts_;
+};
+
 /// Does the work, and throws on all ranks what the lowest of those that failed at it has thrown: an InputError. All ranks must
 /// call it.
 template <class Work>

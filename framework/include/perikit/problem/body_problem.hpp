@@ -26,7 +26,6 @@ struct ProblemParts {
   ProblemParts(ProblemParts&&) noexcept;
   ~ProblemParts();
   std::unique_ptr<Partition> partition;         ///< null where one rank has the whole body
-  std::string placed_whole;                     ///< why each of several ranks placed the whole body; empty: it did not
   std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
   std::unique_ptr<const ImageMap> images;       ///< null without
   std::unique_ptr<Laws> laws;
@@ -91,8 +90,6 @@ class BodyProblem final : public Problem {
   const Terms& terms() const noexcept { return *parts_.terms; }
   /// Null where one rank has the whole body.
   const Partition* partition() const noexcept { return parts_.partition.get(); }
-  /// Why each of several ranks placed the whole body, in words; empty where each has placed its part alone.
-  const std::string& placed_whole() const noexcept { return parts_.placed_whole; }
   const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
   std::string fracture_summary() const {
     const Energies& e = values_.state.energies;
