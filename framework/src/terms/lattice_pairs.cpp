@@ -19,6 +19,10 @@ namespace {
 
 constexpr int slots_at_once = batch_points / chunk_points;
 
+/// What a loop over the bonds of a chunk has to do beside springs. any: whatever there is of energies, weakened bonds, interfaces
+/// and dilatations; the other loops, which most chunks take in steps without energies, are compiled without branches for these.
+enum class Extras { none, dilatation, any };
+
 template <int D>
 class LatticePairs final : public PairLoop {
  public:
@@ -93,8 +97,22 @@ class LatticePairs final : public PairLoop {
     }
   }
 
+  /// Whether the energies of bonds are asked for.
+  template <PairWork work>
+  static bool stores(const PairPass& pass) noexcept {
+    return work == PairWork::energy || (work == PairWork::force && (pass.screen || pass.energies));
+  }
+
   /// Returns the first lane with a bond of zero or non-finite length, or -1.
   template <PairWork work, bool half>
+  int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept {
+    const bool crosses = dilatation_ && fields_.crosses(static_cast<std::size_t>(chunk.first));
+    if (stores<work>(pass) || crosses || !families_.pattern(chunk).integrity.empty())
+      return run_chunk<work, half, Extras::any>(chunk, pass, energy);
+    if (dilatation_) return run_chunk<work, half, Extras::dilatation>(chunk, pass, energy);
+    return run_chunk<work, half, Extras::none>(chunk, pass, energy);
+  }
+  template <PairWork work, bool half, Extras extras>
   int run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& energy) const noexcept;
 
   void moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept;
@@ -182,7 +200,7 @@ void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern
 }
 
 template <int D>
-template <PairWork work, bool half>
+template <PairWork work, bool half, Extras extras>
 int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, double& total) const noexcept {
   constexpr bool sums = work == PairWork::dilatation || work == PairWork::dilatation_rate;
   constexpr bool rate = work == PairWork::dilatation_rate || work == PairWork::tangent;
@@ -190,17 +208,19 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   const LatticePattern& pattern = families_.pattern(chunk);
   const std::int64_t p = chunk.first;
   const std::size_t slots = half ? families_.slots.half : families_.slots.offsets.size();
-  const bool screened = work == PairWork::force && pass.screen, uniform = fields_.modulus.size() == 0,
-             energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
+  constexpr bool any = extras == Extras::any;
+  const bool energies = any && stores<work>(pass), screened = energies && work == PairWork::force && pass.screen,
+             uniform = fields_.modulus.size() == 0;
   // Locals: packs that are stored may be any member, as far as the compiler knows.
-  const bool crosses = dilatation_ && fields_.crosses(static_cast<std::size_t>(p));
-  const bool weakened = !pattern.integrity.empty(), dilatation = dilatation_;   // weakened: a b between 0 and 1 weighs all that its bond does
+  const bool dilatation = any ? dilatation_ : extras == Extras::dilatation;
+  const bool crosses = any && dilatation && fields_.crosses(static_cast<std::size_t>(p));
+  const bool weakened = any && !pattern.integrity.empty();  // a b between 0 and 1 weighs all that its bond does
   const double volume = families_.volume, squared_volume = squared_volume_, *const lengths = length_.data(), *const omegas = omega_.data();
   const auto* const xis = families_.slots.xi.data();
   const auto* const shifts = families_.slots.shifts.data();
   const auto* const masks = &pattern.mask[0];
   const double *u[D], *w[D] = {};
-  const double *const q = dilatation_ && !sums ? pass.q.data + p : nullptr, *const dq = dilatation_ && rate && !sums ? pass.dq.data + p : nullptr;
+  const double *const q = dilatation && !sums ? pass.q.data + p : nullptr, *const dq = dilatation && rate && !sums ? pass.dq.data + p : nullptr;
   double* out[results];
   for (int c = 0; c < D; ++c) {
     u[c] = pass.u.component(c) + p;
@@ -253,7 +273,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         const Stretch<D> bond(xi, Pack(length), du);
         good &= bond.e == bond.e;
         if constexpr (sums) {
-          Pack term = Pack(omegas[at * chunk_points] * length * volume) * (rate ? bond.along(dw) : bond.e);
+          // multiply_add: fused with its sum in no copy of the loop.
+          Pack term = multiply_add(Pack(omegas[at * chunk_points] * length * volume), rate ? bond.along(dw) : bond.e, Pack(0.0));
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           if (crosses) {
             const auto [of_own, of_far] = own_strains(p + l, p + far, bits);
@@ -302,7 +323,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         std::array<Pack, 2> strain;
         if (crosses) strain = own_strains(p + l, p + far, bits);
         const auto of_ends = [&](Pack own_value, Pack far_value) { return crosses ? strain[0] * own_value + strain[1] * far_value : own_value + far_value; };
-        if (dilatation) T += weight * of_ends(own_q, Pack::load(q + far));
+        if (dilatation) T = multiply_add(weight, of_ends(own_q, Pack::load(q + far)), T);
         if constexpr (work == PairWork::force) {
           T = T * Pack(squared_volume);
           for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
