@@ -172,12 +172,12 @@ def cases(everything, work):
         for cloud in (False, True) if everything else (False,):
             text = with_inclusion(scene(KINEMATICS[name], 2, cloud))
             yield "%s, inclusion and pre-crack, %s" % (name, "cloud" if cloud else "lattice"), text + CRACK, ranks, threads
-    for name in KINEMATICS if everything else ("bond_based", "baqp"):
+    for name in KINEMATICS if everything else ("bond_based", "baqp", "silling"):
         if "order" in name or "sub_horizon" in name or "selective" in name:
             criteria = ("critical_stretch",)
         else:
-            criteria = DAMAGE if everything else ("critical_stretch",)
-        for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name == "baqp",)):
+            criteria = DAMAGE if everything else ("critical_energy",) if name == "silling" else ("critical_stretch",)
+        for criterion, cloud in itertools.product(criteria, (False, True) if everything else (name != "bond_based",)):
             if criterion == "max_stress" and name in PAIRS:
                 continue
             text = torn(KINEMATICS[name], DAMAGE[criterion], cloud)

@@ -274,10 +274,16 @@ TEST_CASE("bonds whose failure would raise the energy stay: none is created from
 }
 
 TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
-  for (const char* kinematics : {"bond_based", "ordinary", "conventional", "baqp", "projection", "{type=\"selective\",base={type=\"baqp\"}}"}) {
-    INFO(kinematics);
+  struct Block {
+    std::string kinematics;
+    bool cloud = false;
+  };
+  for (const auto& [kinematics, cloud] : {Block{"bond_based"}, Block{"ordinary"}, Block{"conventional"}, Block{"baqp"}, Block{"projection"},
+                                          Block{"{type=\"selective\",base={type=\"baqp\"}}"}, Block{"conventional", true}, Block{"baqp", true},
+                                          Block{"{type=\"conventional\",stabilization={type=\"silling\",coefficient=0.5}}", true}}) {
+    INFO(kinematics, std::string(cloud ? ", cloud" : ", lattice"));
     // Every length grows by 2 % a microsecond, on top of a flight to the right.
-    const auto simulation = load("partmann/boundary_tension.toml", {fmt::format("kinematics={}", kinematics), "family.influence=cubic_spline", "body.lattice.spacing=2e-3", "constants.dx=2e-3",
+    const auto simulation = load("partmann/boundary_tension.toml", {fmt::format("kinematics={}", kinematics), "family.influence=cubic_spline", fmt::format("body.lattice.jitter={}", cloud ? 0.1 : 0.0), "body.lattice.spacing=2e-3", "constants.dx=2e-3",
                                                                     "integrator.end_time=4e-6", "damage.no_fail=[]", "load=[]",
                                                                     "initial={velocity=[\"300 + 2e4*(x - 0.05)\", \"2e4*y\", \"2e4*z\"]}"});
     BodyProblem& problem = simulation->problem();
@@ -287,11 +293,10 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
       for (const std::int32_t p : body.internal()) sum += problem.masses().by_point()[static_cast<std::size_t>(p)] * problem.state().velocity().component(c)[p];
       return sum;
     };
-    const Balance balance = run(*simulation);
     const double scale = 300 * 2440 * 0.1 * 0.04 * 0.004;
-    CHECK(momentum(0) == doctest::Approx(scale).epsilon(1e-10));
-    CHECK(std::abs(momentum(1)) <= 1e-10 * scale);
-    CHECK(std::abs(momentum(2)) <= 1e-10 * scale);
+    const std::array<double, 3> before = cloud ? std::array{momentum(0), momentum(1), momentum(2)} : std::array{scale, 0.0, 0.0};
+    const Balance balance = run(*simulation);
+    for (int c = 0; c < 3; ++c) CHECK(std::abs(momentum(c) - before[static_cast<std::size_t>(c)]) <= 1e-10 * scale);
     const Field damage = problem.terms().damage();
     std::size_t fragments = 0;
     for (const std::int32_t p : body.internal()) {

@@ -318,14 +318,14 @@ void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double 
   double before = 0;
   const auto settle = [&] {
     if (marks.empty()) return;
-    const double after = body.forces(at, marks, -owed, part);
+    const double after = body.forces(at, marks, -1, part);
     marks.clear();
     if (!std::isfinite(before) || !std::isfinite(after)) {
       ++update.inside_out;
       return;
     }
     update.dissipated += before - after;
-    if (impulse.data) combine(1, impulse, 1, part, impulse);
+    if (impulse.data) combine(1, impulse, owed, part, impulse);
   };
   while (on_any_rank(!changes.empty())) {
     std::vector<std::int32_t> ends;
@@ -341,7 +341,7 @@ void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double 
       settle();
       marks = widened(std::move(of_these), ends);
       if (impulse.data) fill(0.0, part);
-      before = body.forces(at, marks, owed, part);
+      before = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit
     }
     families_.lower(changes);
     body.changed(ends);

@@ -293,12 +293,13 @@ void CloudBonds<D>::pressures(std::size_t b, const Pass& pass) noexcept {
 template <int D>
 void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
   over_points(b, [&](std::size_t p) {
+    // Of other points, too: what was left of them depends on what was evaluated before.
+    std::fill_n(&flux_[D * p], D, Row{});
+    if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
     if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
     gradient_of_.at(p, u_, &gradient_[D * p]);
     if (pass.work.tangent()) gradient_of_.at(p, w_, &direction_[D * p]);
     force_[p] = Row{};
-    for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = Row{};
-    if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
     if (selective_) pressure_[p] = Row{};
   });
   if (selective_) volumes(b, pass);
@@ -356,7 +357,7 @@ void CloudBonds<D>::run(Pass& pass) {
   parallel_for(blocks_.count(), [&](std::size_t b) {
     const bool gather = !gradient_of_.stored() && quiet_.awake(b, last);
     over_points(b, [&](std::size_t p) {
-      if (!pass.wanted(static_cast<std::int64_t>(p))) return;
+      if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;  // also what others than `only` feel of these
       const Row f = gather ? gradient_of_.divergence(p, flux_, stress_, force_[p]) : force_[p];
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     });

@@ -86,14 +86,21 @@ void CloudPoints<D>::run(Pass& pass) {
     quiet_.look(2, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   sequence_.for_each(
       [&](std::size_t b) {
-        if (quiet_.begins(b)) block(b, pass);
+        if (!quiet_.begins(b)) return;
+        block(b, pass);
+        // What was left of other points depends on what was evaluated before.
+        for (std::size_t p = blocks_.begin(b); p < blocks_.end(b) && pass.only && !pass.alone(); ++p) {
+          if (pass.wanted(static_cast<std::int64_t>(p))) continue;
+          std::fill_n(&flux_[D * p], D, Row{});
+          if (gradient_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
+        }
       },
       &arrival);
   if (pass.bad >= 0 || pass.alone()) return;
   parallel_for(blocks_.count(), [&](std::size_t b) {
     if (!quiet_.awake(b, 2)) return;
     for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) {
-      if (!pass.wanted(static_cast<std::int64_t>(p))) continue;
+      if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) continue;  // also what others than `only` feel of these
       const Row f = gradient_.divergence(p, flux_, stress_);
       for (int c = 0; c < D; ++c) pass.out.component(c)[p] += f[c];
     }

@@ -32,22 +32,26 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     over_points(everywhere, [&](std::size_t p) { set_matrix(p); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only) override {
+  /// Points beyond `only` have no flux: what was left of them depends on what was evaluated before.
+  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t* near) override {
     mirror(u);
     if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return blocks_.moves(u, b); });
-    const auto meant = [&](std::size_t p) { return !only || only[p / padding]; };
+    const auto marked = [](const std::uint8_t* groups, std::size_t p) { return !groups || groups[p / padding]; };
     over_points([&](std::size_t b) { return quiet_.begins(b); },
                 [&](std::size_t p) {
-                  if (!meant(p)) return;
+                  if (!marked(only, p)) {
+                    std::fill_n(&flux_[D * p], D, Row{});
+                    return;
+                  }
                   gradient_.at(p, u_, &flux_[D * p]);
                   if (wanted.any()) take(p, energy_of_point(p, &flux_[D * p]), wanted);
                   for (std::size_t e = 0; e < D; ++e) flux_[D * p + e] = times(p, flux_[D * p + e]);
                 });
     over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
                 [&](std::size_t p) {
-                  if (!meant(p)) return;
+                  if (!marked(near, p)) return;
                   const Row f = factor * position_[p][3] * force_of_point(p);
                   for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
                 });

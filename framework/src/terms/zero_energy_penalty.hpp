@@ -17,21 +17,21 @@ class ZeroEnergyPenalty : public Term {
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
-  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum* energy) final {
+  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, ExactSum* energy) final {
     std::vector<double> energies;
-    apply(u, 1.0, force, {energy ? &energies : nullptr}, only.data());
+    apply(u, 1.0, force, {energy ? &energies : nullptr}, only.data(), near.data());
     if (energy) add_owned(parts_.families.body(), energies, *energy);
     return -1;
   }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks&, FieldView force, ExactSum& energy) final {
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, ExactSum& energy) final {
     std::vector<double> renewed;
-    apply(u, 1.0, force, {&renewed}, only.data());
+    apply(u, 1.0, force, {&renewed}, only.data(), near.data());
     replace(only, renewed, energies_);
     add_owned(parts_.families.body(), energies_, energy);
     return -1;
   }
-  std::int64_t add_tangent_of(ConstFieldView, ConstFieldView w, const GroupMarks& only, const GroupMarks&, FieldView Kw) final {
-    apply(w, -1.0, Kw, {}, only.data());
+  std::int64_t add_tangent_of(ConstFieldView, ConstFieldView w, const GroupMarks& only, const GroupMarks& near, FieldView Kw) final {
+    apply(w, -1.0, Kw, {}, only.data(), near.data());
     return -1;
   }
   void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
@@ -53,8 +53,9 @@ class ZeroEnergyPenalty : public Term {
     BondScreen* screen = nullptr;              ///< groups with a point that holds too much are marked
     bool any() const noexcept { return energies || screen; }
   };
-  /// force += -factor dE/du [N]. only: what add_forces_of says; null: all.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only = nullptr) = 0;
+  /// force += -factor dE/du [N]. only, near: what add_forces_of says; null: all.
+  virtual void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only = nullptr,
+                     const std::uint8_t* near = nullptr) = 0;
   /// Takes the energy of point p.
   void take(std::size_t p, double energy, const Wanted& wanted) const;
   /// density[p] += energy of point p per volume [J/m^3]. only: by group of eight points, where it is needed; null: everywhere.
