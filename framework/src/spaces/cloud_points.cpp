@@ -34,8 +34,12 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     const int n = static_cast<int>(std::min<std::size_t>(batch_points, end - first));
     const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
     if (pass.only && std::none_of(pass.only + first / padding, pass.only + (first + static_cast<std::size_t>(lanes)) / padding,
-                                  [](std::uint8_t m) { return m != 0; }))
+                                  [](std::uint8_t m) { return m != 0; })) {
+      // As that of single points that are not wanted, whose weight is 0: what was left depends on what was evaluated before.
+      std::fill_n(&flux_[D * first], D * static_cast<std::size_t>(n), Row{});
+      if (gradient_.shifted()) std::fill_n(&stress_[D * first], D * static_cast<std::size_t>(n), Row{});
       continue;
+    }
     std::fill_n(s.far, lanes, -1);
     for (int l = 0; l < lanes; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
@@ -86,14 +90,7 @@ void CloudPoints<D>::run(Pass& pass) {
     quiet_.look(2, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   sequence_.for_each(
       [&](std::size_t b) {
-        if (!quiet_.begins(b)) return;
-        block(b, pass);
-        // What was left of other points depends on what was evaluated before.
-        for (std::size_t p = blocks_.begin(b); p < blocks_.end(b) && pass.only && !pass.alone(); ++p) {
-          if (pass.wanted(static_cast<std::int64_t>(p))) continue;
-          std::fill_n(&flux_[D * p], D, Row{});
-          if (gradient_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
-        }
+        if (quiet_.begins(b)) block(b, pass);
       },
       &arrival);
   if (pass.bad >= 0 || pass.alone()) return;
