@@ -15,6 +15,7 @@
 #include "build/several_ranks.hpp"
 #include "perikit/build/body.hpp"
 #include "tests/thread_ranks.hpp"
+#include "unit/cut_part.hpp"
 #include "unit/fake_catalogue.hpp"
 
 namespace perikit::test {
@@ -128,27 +129,26 @@ inline void compare(const std::string& text, int ranks, const Partition::Reach& 
   INFO(ranks, " ranks, ", reach.bonds, " bonds", std::string(reach.blocks ? ", whole blocks" : ""));
   std::mutex one;
   std::int64_t points = 0, all = 0;
-  std::size_t images_of_all = 0;
-  on_ranks(ranks, [&](ThreadRank&) {
-    constexpr std::uint16_t image_material = 3, far = 7;
+  constexpr std::uint16_t image_material = 3, far = 7;
+  const Scene of_whole = parsed(text);
+  Body whole = build_body(of_whole);
+  Images images;
+  if (has_images(of_whole)) {
+    const ScenePlanes planes = build_planes(of_whole, placed_points(whole), false);
+    images = make_images(whole, planes.planes, planes.surfaces);
+    whole = Body(whole, images, image_material);
+  }
+  const Cut all_parts(whole, ranks, reach, images.source);
+  on_ranks(ranks, [&](ThreadRank& rank) {
     const Scene scene = parsed(text);
-    Body whole_body = build_body(scene);
-    Images images;
-    if (has_images(scene)) {
-      const ScenePlanes planes = build_planes(scene, placed_points(whole_body), false);
-      images = make_images(whole_body, planes.planes, planes.surfaces);
-      whole_body = Body(whole_body, images, image_material);
-    }
-    Partition whole(std::move(whole_body), reach, images.source);
-    const Body expected = whole.make_part(far);
+    const CutPart cut = all_parts.part(rank.rank(), far);
+    const Body& expected = cut.body;
     const LocalBody local = build_local_body(scene, reach, far, image_material);
     const std::lock_guard lock(one);
     CHECK(local.images.has_value() == has_images(scene));
     CHECK(local.partition->images() == images.size());
     if (local.images) compare_images(*local.images, images_of_part(images, expected));
-    images_of_all = images.size();
     const Body& found = local.body;
-    CHECK(local.partition->whole() == nullptr);
     CHECK(same(found.internal(), expected.internal()));
     CHECK(found.stride() == expected.stride());
     CHECK(found.stride_of_all_ranks() == expected.stride_of_all_ranks());
@@ -159,12 +159,12 @@ inline void compare(const std::string& text, int ranks, const Partition::Reach& 
     CHECK(same(found.places().place, expected.places().place));
     CHECK(found.sets() == expected.sets());
     for (const auto& [name, members] : found.sets()) CHECK(same(found.order_of(name), expected.order_of(name)));
-    CHECK(local.partition->points() == whole.points());
-    CHECK(local.partition->lent() == whole.lent());
-    CHECK(local.partition->borrowed() == whole.borrowed());
+    CHECK(local.partition->points() == cut.points);
+    CHECK(local.partition->lent() == cut.lent);
+    CHECK(local.partition->borrowed() == cut.borrowed);
     CHECK(found.spacing() == expected.spacing());
     CHECK(found.horizon() == expected.horizon());
-    if (!found.lattice()) compare_colours(found, *whole.whole());
+    if (!found.lattice()) compare_colours(found, whole);
     const bool same_points = std::ranges::all_of(found.internal(), [&](std::int32_t index) {
       const auto p = static_cast<std::size_t>(index);
       // Numbers of images ascend as they do in the whole body, and leave some out.
@@ -178,7 +178,7 @@ inline void compare(const std::string& text, int ranks, const Partition::Reach& 
     all = static_cast<std::int64_t>(found.points_of_all_ranks());
   });
   CHECK(points == all);
-  CHECK((images_of_all > 0) == has_images(parsed(text)));
+  CHECK((images.size() > 0) == has_images(of_whole));
 }
 
 constexpr const char* cloud_sets =

@@ -24,60 +24,6 @@ Body::Body(BodyFrame frame, const std::vector<Point>& positions, const std::vect
   points_of_all_ranks_ = points();
 }
 
-Body::Body(const Body& whole, const BodyPart& part, std::uint16_t far_material)
-    : frame_(whole.frame_),
-      margin_(whole.margin_),
-      points_of_all_ranks_(whole.points_of_all_ranks_),
-      stride_of_whole_(whole.stride_) {
-  const auto role = [&](std::int64_t number) { return part.roles[static_cast<std::size_t>(number)]; };
-  for (std::size_t n = 0; n < whole.points(); ++n)
-    if (part.roles[n] != Role::absent) numbers_.push_back(static_cast<std::int64_t>(n));
-  internal_.resize(numbers_.size());
-  std::vector<std::int32_t> place(whole.stride_, -1);  // by internal index of the whole body: those that keep their material
-  if (whole.lattice_) {
-    const Lattice lattice = box_of(*whole.lattice_, part.first, part.last, frame_.horizon);
-    for (std::size_t n = 0; n < numbers_.size(); ++n) {
-      const auto k = whole.lattice_->cell(whole.internal_[static_cast<std::size_t>(numbers_[n])]);
-      internal_[n] = static_cast<std::int32_t>(lattice.index(k[0] - part.first[0], k[1] - part.first[1], k[2] - part.first[2]));
-    }
-    number_lattice(lattice, whole.uniform_volume_);
-  } else {
-    std::vector<std::int32_t> order(numbers_.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::ranges::sort(order, {}, [&](std::int32_t n) {
-      return whole.internal_[static_cast<std::size_t>(numbers_[static_cast<std::size_t>(n)])];
-    });
-    stride_ = padded(order.size());
-    positions_.assign(4 * stride_, 0.0);
-    for (std::size_t p = 0; p < order.size(); ++p) {
-      const auto n = static_cast<std::size_t>(order[p]);
-      internal_[n] = static_cast<std::int32_t>(p);
-      std::copy_n(&whole.positions_[4 * static_cast<std::size_t>(whole.internal_[static_cast<std::size_t>(numbers_[n])])], 4,
-                  &positions_[4 * p]);
-    }
-    number_cloud();
-  }
-  whole_lattice_ = whole.lattice_;
-  std::vector<std::int64_t> places;
-  std::vector<Role> roles;
-  for (const std::int64_t number : numbers_) {
-    places.push_back(whole.internal_[static_cast<std::size_t>(number)]);
-    roles.push_back(role(number));
-  }
-  keep_places(places, roles);
-  for (std::size_t n = 0; n < numbers_.size(); ++n)
-    if (roles[n] >= Role::near) place[static_cast<std::size_t>(places[n])] = internal_[n];
-  copy_sets(whole, place, far_material);
-  const auto foreign = [&](std::int32_t p) { return !own_[static_cast<std::size_t>(p)]; };
-  std::erase_if(owned_, foreign);
-  for (auto& [name, members] : sets_) std::erase_if(members, foreign);
-  for (const auto& [name, members] : whole.sets_) {
-    std::vector<std::int64_t> order;
-    for (const std::int32_t p : members) order.push_back(whole.input_of(static_cast<std::size_t>(p)));
-    if (!std::ranges::is_sorted(order)) orders_[name] = std::move(order);
-  }
-}
-
 Body::Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_t far_material)
     : frame_(std::move(frame)),
       points_of_all_ranks_(static_cast<std::size_t>(part.points_of_all_ranks)),

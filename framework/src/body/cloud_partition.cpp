@@ -120,7 +120,7 @@ Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Re
     points_[static_cast<std::size_t>(communicator().rank())] = std::ssize(shares.own()) - own_images;
     communicator().sum(points_);
   }
-  refuse_idle(static_cast<std::size_t>(images ? images->points() : pieces.points()));
+  check_shares(static_cast<std::size_t>(images ? images->points() : pieces.points()));
   images_ = static_cast<std::size_t>(counted(own_images).all);
   KeptBlocks blocks(frame, shares);
   KeptBlocks::Marks reached(blocks.points(), 1);

@@ -115,27 +115,4 @@ Lattice with_images(const Lattice& lattice, double horizon, std::vector<ImagePla
   return regrown(lattice, input_low, input_high, horizon);
 }
 
-Images images_of_part(const Images& images, const Body& part) {
-  const auto real = static_cast<std::int32_t>(part.points_of_all_ranks());
-  std::vector<std::int32_t> here(static_cast<std::size_t>(real) + images.size(), -1);  // input numbers by those of the whole body
-  for (std::size_t n = 0; n < part.points(); ++n)
-    here[static_cast<std::size_t>(part.number(static_cast<std::size_t>(part.internal()[n])))] = static_cast<std::int32_t>(n);
-  Images found;
-  found.cracks = images.cracks;
-  std::vector<std::int32_t> kept(images.size(), -1);
-  for (std::size_t k = 0; k < images.size(); ++k) {
-    if (here[static_cast<std::size_t>(real) + k] < 0) continue;
-    kept[k] = static_cast<std::int32_t>(found.size());
-    found.position.push_back(images.position[k]);
-    found.source.push_back(here[static_cast<std::size_t>(images.source[k])]);
-    found.volume.push_back(images.volume[k]);
-    found.sign.push_back(images.sign[k]);
-  }
-  for (ImageTerm term : images.terms) {
-    term.image = kept[static_cast<std::size_t>(term.image)];
-    if (term.image >= 0) found.terms.push_back(term);
-  }
-  return found;
-}
-
 }  // namespace perikit

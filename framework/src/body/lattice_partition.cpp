@@ -172,7 +172,7 @@ Partition::Partition(const BodyFrame& frame, const Lattice& lattice, const Latti
     : frame_(frame), lattice_(lattice), points_(shares.points()) {
   std::int64_t all = 0;
   for (const std::int64_t points : points_) all += points;
-  refuse_idle(static_cast<std::size_t>(all));
+  check_shares(static_cast<std::size_t>(all));
   const CellBox own = shares.box(communicator().rank());
   const KeptCells kept(lattice, own, inside);
   const NeededCells needed(lattice, frame.horizon, own, kept, reach, images);

@@ -43,12 +43,6 @@ struct Images;
 /// an image of one of its own, whose force it needs in full; its own.
 enum class Role : std::uint8_t { absent, far, near, image, own };
 
-/// A rank's part of a body that the rank has as a whole.
-struct BodyPart {
-  std::vector<Role> roles;                      ///< by input number
-  std::array<std::int64_t, 3> first{}, last{};  ///< lattices: the box of cells that holds all but absent points
-};
-
 /// A rank's part of a body that no rank has as a whole. By point:
 struct LocalPart {
   std::vector<std::int64_t> places;  ///< in the fields of the whole body
@@ -92,9 +86,8 @@ class Body {
   Body(BodyFrame frame, const Lattice& lattice, std::vector<std::int32_t> cells);
   /// A cloud: positions and volumes [m^3] in input order; not empty.
   Body(BodyFrame frame, const std::vector<Point>& positions, const std::vector<double>& volumes);
-  /// A rank's part of another body, in the same order. Far points have a material of their own; sets keep the rank's own points.
-  Body(const Body& whole, const BodyPart& part, std::uint16_t far_material);
-  /// The same of a body that no rank has as a whole; without sets, and near points have the material 0.
+  /// A rank's part of a body that no rank has as a whole, in the same order, without sets. Far points have a material of their own, others
+  /// the material 0.
   Body(BodyFrame frame, const Lattice& whole, LatticePart part, std::uint16_t far_material);
   Body(BodyFrame frame, CloudPart part, std::uint16_t far_material);
 

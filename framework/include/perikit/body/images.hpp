@@ -105,7 +105,4 @@ Images make_images(const Body& body, std::vector<ImagePlane> planes, std::span<c
 /// The lattice that has places for the cells of another one and for all images that these may have behind planes.
 Lattice with_images(const Lattice& lattice, double horizon, std::vector<ImagePlane> planes);
 
-/// Those of the images of the whole body that a part of it has, by the numbers of the part.
-Images images_of_part(const Images& images, const Body& part);
-
 }  // namespace perikit

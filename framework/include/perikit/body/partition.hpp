@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,22 +26,16 @@ class Partition {
     bool blocks = false;
     bool sources = false;  ///< evaluation of an image asks for more of its source than the displacement
   };
-  /// Of a body that each rank has as a whole, for which nobody has to ask others: what the parts below must be like, and what tests compare them
-  /// with. All ranks of the communicator must call it with the same body; sources: of its images (images.hpp). Blocks hold points and
-  /// images, and whoever owns a block has them. Throws std::domain_error where the body has too few blocks for the ranks.
-  Partition(Body whole, const Reach& reach, std::vector<std::int32_t> sources = {});
   /// Of a lattice that no rank has as a whole: `inside` (empty: true) is asked at the cells that the rank is to have and no others.
   /// shares: what ranks own. images: of the points, where the lattice is one with images; it then says what is inside. All ranks
-  /// must call it. Throws std::domain_error as above, where a part has more cells than indices can tell apart, and where an image
-  /// lies on a point.
+  /// must call it. Throws std::domain_error where the body has too few blocks for the ranks, where a part has more cells than indices
+  /// can tell apart, and where an image lies on a point.
   Partition(const BodyFrame& frame, const Lattice& lattice, const LatticeShares& shares,
             const std::function<bool(const Point&)>& inside, const Reach& reach, const LatticeImages* images = nullptr);
   /// Of a cloud that no rank has as a whole. images: of its points, which are among the shares (null: none). All ranks must call it.
-  /// Throws std::domain_error as above.
+  /// Throws std::domain_error where the body has too few blocks for the ranks.
   Partition(const BodyFrame& frame, const CloudShares& shares, const Reach& reach, const CloudImages* images = nullptr);
 
-  /// Null where no rank has it.
-  const Body* whole() const noexcept { return whole_ ? &*whole_ : nullptr; }
   /// The points of this rank and its ghosts; far ones have the material number `far_material`. Once: it lets go of what it takes.
   /// All ranks must call it.
   Body make_part(std::uint16_t far_material);
@@ -56,30 +49,18 @@ class Partition {
   std::size_t images() const noexcept { return images_; }
 
  private:
-  void refuse_idle(std::size_t real) const;
-  void share_lattice(int size);
-  void share_cloud(int size);
-  void choose_images();
-  void keep_cells(const Reach& reach);
-  void keep_families(const Reach& reach);
+  void check_shares(std::size_t real) const;
   std::size_t owner(const Body& part, std::int32_t p) const;
   void exchange_borders(const Body& part);
   void exchange_numbers(Body& part) const;
   Body finished(Body part);
 
-  /// visit(input number, input number of the source) of the images.
-  template <class Visit>
-  void over_images(Visit&& visit) const;
-
-  std::optional<Body> whole_;
-  std::vector<std::int32_t> sources_;
   std::size_t images_ = 0;
-  BodyPart part_;    ///< of the whole body
-  BodyFrame frame_;  ///< where there is none
+  BodyFrame frame_;
   Lattice lattice_;
   LatticePart lattice_part_;
   CloudPart cloud_part_;
-  std::vector<std::uint16_t> owner_;  ///< by input number of the whole body, else of the part of a lattice
+  std::vector<std::uint16_t> owner_;  ///< of a lattice, by input number of the part
   std::vector<std::int64_t> points_;
   std::vector<std::vector<std::int32_t>> lent_, borrowed_;
 };

@@ -13,7 +13,7 @@ namespace perikit {
 
 class ImageMap {
  public:
-  /// `body` has these images; of the image points of a part of a body, images_of_part.
+  /// `body`, or the part of one, has these images, by its own input numbers.
   ImageMap(const Body& body, const Images& images);
 
   std::size_t size() const noexcept { return image_.size(); }
