@@ -112,30 +112,43 @@ std::span<const LatticeRow> LatticePoints<D>::rows_from(std::size_t& first, std:
   return std::span(tiles_.rows).subspan(begin, first - begin);
 }
 
-/// Where Q of the live chunks of rows that follow each other goes, and zeros around them; `next` is the first chunk of the rows,
-/// and then the one after their last.
+/// Zero before, between and behind the chunks that `place` has listed, as far as `end`.
 template <int D>
-void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
-  const auto zero = [&](std::int64_t from, std::int64_t to) {
+void LatticePoints<D>::clear_gaps(std::int64_t end, Rows& r) const noexcept {
+  std::int64_t from = 0;
+  const auto zero = [&](std::int64_t to) {
     for (int c = 0; c < D * D && to > from; ++c) std::memset(r.flux.component(c) + from, 0, sizeof(double) * static_cast<std::size_t>(to - from));
   };
+  for (const std::int64_t at : r.at) {
+    zero(at);
+    from = at + chunk_points;
+  }
+  zero(end);
+}
+
+/// Where Q of the live chunks of rows that follow each other goes; `next` is the first chunk of the rows, and then the one after
+/// their last.
+template <int D>
+void LatticePoints<D>::place(std::span<const LatticeRow> rows, std::size_t& next, std::size_t end, Rows& r) const {
   r.index.clear();
   r.at.clear();
+  bool alike = true;  // whole rows of so many chunks
   std::int64_t start = gap_;
   for (const LatticeRow& row : rows) {
     while (next < end && tiles_.chunks[next].first < row.first) ++next;  // of rows that were left out
-    std::int64_t filled = start - gap_;
     for (; next < end && row.holds(tiles_.chunks[next].first); ++next) {
-      const std::int64_t to = start + tiles_.chunks[next].first - row.first;
-      zero(filled, to);
-      filled = to + chunk_points;
       r.index.push_back(static_cast<std::int32_t>(next));
-      r.at.push_back(to);
+      r.at.push_back(start + tiles_.chunks[next].first - row.first);
     }
     start += width(row);
-    zero(filled, start - gap_);
+    alike = alike && row.chunks == rows.front().chunks && row.before == 0 && row.after == 0;
   }
   r.own = r.index.size();
+  const std::int32_t chunks = alike && !rows.empty() && r.own == rows.size() * static_cast<std::size_t>(rows.front().chunks) ? rows.front().chunks : 0;
+  if (chunks == 0 || chunks != r.clear_between) r.clear_to = 0;
+  r.clear_between = chunks;
+  if (r.clear_to < start - gap_) clear_gaps(start - gap_, r);
+  r.clear_to = std::max(r.clear_to, start - gap_);
   // Where a row goes on in another block, families reach into Q of its chunks: computed here, too.
   start = gap_;
   for (const LatticeRow& row : rows) {

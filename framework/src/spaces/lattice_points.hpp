@@ -29,6 +29,9 @@ class LatticePoints final : public EvaluationSpace {
     std::vector<std::int32_t> index;   ///< of the chunks: `own` of the block, then those beyond the ends of its rows
     std::vector<std::int64_t> at;      ///< where their Q is
     std::size_t own = 0;
+    /// Whole rows of so many chunks find zeros between them as far as that cell; 0: rows that differ have been there.
+    std::int32_t clear_between = 0;
+    std::int64_t clear_to = 0;
   };
   void one_by_one(std::size_t b, Pass& pass);
   void by_rows(std::size_t b, Pass& pass);
@@ -36,6 +39,7 @@ class LatticePoints final : public EvaluationSpace {
   bool wanted(const LatticeRow& row, const Pass& pass) const noexcept;
   std::span<const LatticeRow> rows_from(std::size_t& first, std::size_t end, const Pass& pass) const;
   void place(std::span<const LatticeRow> rows, std::size_t& chunk, std::size_t end, Rows& r) const;
+  void clear_gaps(std::int64_t end, Rows& r) const noexcept;
   void gradients(const std::int32_t* index, int n, ConstFieldView u, double* H) const noexcept;
   std::int64_t width(const LatticeRow& row) const noexcept;
   const LatticeChunk& chunk(std::int32_t index) const noexcept { return tiles_.chunks[static_cast<std::size_t>(index)]; }
