@@ -234,6 +234,8 @@ def own_parts(everything):
         if cloud:  # before points are turned inside out
             pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
         yield kind + "traction", drawn(text, dimension, "high", "+x")
+        if not cloud and (everything or dimension == 2):
+            yield kind + "traction on two materials", drawn(with_regions(text, *regions[dimension]), dimension, "all", "+y")
         yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
 
 

@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "perikit/plugin/registry.hpp"
@@ -10,15 +11,16 @@ using namespace perikit;
 
 namespace {
 
-std::unique_ptr<Simulation> plate(const std::string& set, double jitter, const std::string& load) {
+std::unique_ptr<Simulation> plate(const std::string& set, double jitter, const std::string& load, const std::string& kinematics = "type = \"conventional\"",
+                                  const std::string& further = "") {
   static Registry registry;
   if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
   const std::string text = fmt::format(
       "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\nthickness = 2.0\n[body.lattice]\nspacing = 0.5\nlower = [0, 0]\nupper = [6, 5]\njitter = {}\n"
-      "[sets]\nright = \"{}\"\n[family]\nhorizon_ratio = 3.015\n[kinematics]\ntype = \"conventional\"\n"
+      "[sets]\nright = \"{}\"\n[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n"
       "[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25\n"
-      "[[load]]\nset = \"right\"\n{}\n[integrator]\ntype = \"evaluate\"\n",
-      jitter, set, load);
+      "[[load]]\nset = \"right\"\n{}\n{}[integrator]\ntype = \"evaluate\"\n",
+      jitter, set, kinematics, load, further);
   return std::make_unique<Simulation>(parse_scene(text, "plate.toml", registry), registry);
 }
 
@@ -59,6 +61,26 @@ TEST_CASE("traction: exact total on a jittered cloud, with one layer or two in t
     CHECK(r.fx == doctest::Approx(30.0).epsilon(1e-12));
     CHECK(r.fy == doctest::Approx(10.0).epsilon(1e-12));
   }
+}
+
+TEST_CASE("traction: the forces on a face are the same whatever materials meet there") {
+  const std::string regions =
+      "[[region]]\nset = \"right\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 3.0, bulk_modulus = 900.0 }\n"
+      "[[region]]\nset = \"low\"\nmaterial = { type = \"saint_venant_kirchhoff\", youngs_modulus = 7.0, poisson_ratio = 0.1 }\n";
+  for (const char* kinematics :
+       {"type = \"conventional\"", "type = \"baqp\"", "type = \"projection\"", "type = \"bond_augmented\"", "type = \"sub_horizon\"",
+        "type = \"bond_associated\"", "type = \"non_spherical\"", "type = \"selective\"\nbase = { type = \"baqp\" }", "type = \"ordinary\""})
+    for (const double jitter : {0.0, 0.15})
+      for (const char* beyond : {"", "[[symmetry]]\naxis = \"y\"\n"}) {
+        INFO(kinematics, ", jitter ", jitter, " ", beyond);
+        const std::string set = "x > 4.5\"\nlow = \"x > 3 && y < 2", load = "traction = [3, 1]\nface = \"+x\"";
+        const auto one = plate(set, jitter, load, kinematics, beyond), several = plate(set, jitter, load, kinematics, beyond + regions);
+        resultant(*one);
+        resultant(*several);
+        const FieldView a = one->problem().state().external_force(), b = several->problem().state().external_force();
+        REQUIRE(a.size() == b.size());
+        CHECK(std::equal(a.data, a.data + a.size(), b.data));
+      }
 }
 
 TEST_CASE("force and body force: shared by volume") {
