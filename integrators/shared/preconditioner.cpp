@@ -138,6 +138,17 @@ double largest_bulk_ratio(const Problem& problem) {
   return communicator().largest(largest);
 }
 
+/// Largest over smallest shear modulus. All ranks must call it.
+double shear_contrast(const Problem& problem) {
+  double largest = 0, largest_inverse = 0;
+  for (const std::int32_t p : problem.body().owned()) {
+    const double mu = problem.laws().moduli(static_cast<std::size_t>(p)).mu;
+    largest = std::max(largest, mu);
+    if (mu > 0) largest_inverse = std::max(largest_inverse, 1 / mu);
+  }
+  return communicator().largest(largest) * communicator().largest(largest_inverse);
+}
+
 /// Whether the factors of the tangent are made in the time of some tens of tangent actions, or the companion, which knows nothing of stiffness
 /// against changes of volume, would need too many of them (measured: framework/docs/performance.md). Not on several ranks: the assembled tangent
 /// needs the whole body on one.
@@ -196,7 +207,9 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
   const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
-  return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && !factorisation_pays(problem);
+  // Where a soft material shares evaluation points with one that is far stiffer, springs between nearest neighbours do not stand for them.
+  constexpr double most_contrast = 30;
+  return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && shear_contrast(problem) <= most_contrast && !factorisation_pays(problem);
 }
 
 bool needs_one_rank(const std::string& preconditioner) noexcept {

@@ -232,7 +232,7 @@ def own_parts(everything):
             yield kind + "hole, regions and pre-crack", with_regions(holed, *regions[dimension]) + crack[dimension]
         pulled = with_regions(holed, *regions[dimension]).replace("[[boundary]]", 'velocity = [%s]\n[[boundary]]' % ", ".join(['"0.1*(x - 8)"', '"0.05*sin(x/3)*(y - 6)"', '"0.05*z"'][:dimension]), 1)
         if cloud:  # before points are turned inside out
-            pulled = pulled.replace("end_time = 2.0", "end_time = 1.2")
+            pulled = pulled.replace("end_time = 2.0", "end_time = 0.4" if name == "bond_associated" else "end_time = 1.2")
         yield kind + "traction", drawn(text, dimension, "high", "+x")
         if not cloud and (everything or dimension == 2):
             yield kind + "traction on two materials", drawn(with_regions(text, *regions[dimension]), dimension, "all", "+y")

@@ -126,6 +126,60 @@ TEST_CASE("auto takes mixed systems where they are faster: in 3D from a ratio of
     }
 }
 
+/// The half x > 0.5 of another material, whose moduli are these, and how the two meet.
+std::string two_materials(const std::string& text, double shear, double bulk, const std::string& interfaces) {
+  std::string both = text;
+  both.replace(both.find("[family]\n"), 9, fmt::format("other = \"x > 0.5\"\n[family]\ninterfaces = \"{}\"\n", interfaces));
+  const std::string region = fmt::format("[[region]]\nset = \"other\"\nmaterial = {{ type = \"neo_hookean\", shear_modulus = {}, bulk_modulus = {} }}\n", shear, bulk);
+  return both.insert(both.find("[[boundary]]"), region);
+}
+
+TEST_CASE("two materials, of which one or both hardly change their volume: hardly more iterations, and newton's solution") {
+  for (const char* interfaces : {"laminate", "parallel"})
+    for (const char* jitter : {"0", "0.1"})
+      for (const auto& [shear, bulk] : {std::pair{1.0, 1.5}, {1.0, 100.0}, {8.0, 16.0}, {0.2, 2000.0}}) {
+        INFO(interfaces, ", jitter ", jitter, ", shear modulus ", shear, ", bulk modulus ", bulk);
+        const std::string text = scene(3, 4, 1e4, jfnk("mixed", 1e-9), jitter);
+        const auto exact = make(two_materials(scene(3, 4, 1e4, newton, jitter), shear, bulk, interfaces)), found = make(two_materials(text, shear, bulk, interfaces));
+        run(*exact);
+        const Protocol protocol = run(*found);
+        CHECK(distance(*exact, *found) < 1e-7);
+        CHECK(krylov_iterations(protocol) <= 300);
+      }
+}
+
+TEST_CASE("auto leaves mixed systems where one material is far stiffer than the other") {
+  for (const double shear : {20.0, 1 / 20.0, 50.0, 1 / 50.0}) {
+    INFO("shear modulus ", shear);
+    const std::string text = two_materials(scene(3, 4, 1e4, "type = \"jfnk\"\nsteps = 1\ntolerance = 0.9"), shear, 2 * shear, "parallel");
+    CHECK((run(*make(text)).text.find("preconditioner mixed") != std::string::npos) == (shear > 1.0 / 30 && shear < 30));
+  }
+}
+
+TEST_CASE("the stiffness of volumes is that of the energy where the whole body grows, laminates too") {
+  for (const char* interfaces : {"laminate", "parallel"})
+    for (const char* jitter : {"0", "0.1"}) {
+      INFO(interfaces, ", jitter ", jitter);
+      const auto simulation = make(two_materials(scene(3, 5, 100, jfnk("mixed"), jitter), 0.5, 3.0, interfaces));
+      BodyProblem& problem = simulation->problem();
+      const std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part();
+      Field u = problem.make_field(), force = problem.make_field();
+      REQUIRE(volumes->linearise(u).ok());
+      double sum = 0;
+      for (const std::int32_t p : problem.body().internal()) sum += volumes->stiffness().data[p];
+      const auto energy_at = [&](double growth) {  // F = exp(growth/3) I
+        for (const std::int32_t p : problem.body().internal())
+          for (int c = 0; c < 3; ++c)
+            u.component(c)[p] = std::expm1(growth / 3) * problem.body().position(static_cast<std::size_t>(p))[static_cast<std::size_t>(c)];
+        double energy = 0;
+        REQUIRE(problem.evaluate_forces(u, force, &energy).ok());
+        return energy;
+      };
+      constexpr double t = 1e-3;
+      CHECK(sum == doctest::Approx((energy_at(t) + energy_at(-t)) / (t * t)).epsilon(1e-5));
+    }
+}
+
 TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D, with differences too") {
   struct Variant {
     int dimension, cells;

@@ -166,11 +166,32 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   return -1;
 }
 
+/// dH <- F: the rate of ln J is 3.
+void BatchWork::set_growth(int n, BatchScratch& s) const noexcept {
+  const int d = dimension(laws_.space()), components = tensor_components(laws_.space());
+  for (int c = 0; c < components; ++c) {
+    const double own = c >= d * d || c % (d + 1) == 0 ? 1.0 : 0.0;
+    for (int l = 0; l < n; ++l) s.dH[c * batch_points + l] = own + s.H[c * batch_points + l];
+  }
+}
+
+/// psi <- (F : A : F + P : F)/9, with dH = F and other = A : F.
+void BatchWork::put_volume_stiffness(int n, BatchScratch& s) const noexcept {
+  for (int l = 0; l < n; ++l) {
+    double sum = 0;
+    for (int c = 0; c < tensor_components(laws_.space()); ++c)
+      sum += s.dH[c * batch_points + l] * (s.other[c * batch_points + l] + s.P[c * batch_points + l]);
+    s.psi[l] = std::max(0.0, sum / 9);
+  }
+}
+
 int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   const bool tangent = work_ == Work::tangent;
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
   selective_map(laws_.space(), batch, s.H, s.dH);
+  if (volume_stiffness_) set_growth(lanes, s);
+  double* const rate = tangent || volume_stiffness_ ? s.other : nullptr;
   const bool one_law = this->one_law(s);
   if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
   if (ends == 2 && history_) {
@@ -180,14 +201,14 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* ene
     }
     s.first_number = -1;
   }
-  int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, tangent ? s.other : nullptr);
+  int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, rate);
   if (bad >= 0) return bad % lanes;
   if (laminates_ && s.one_law < 0) {
     // What is mapped for either end is a laminate of its own: their owners' volumes differ.
     LaminateLanes laminates;
     find_laminates(n, s, true, laminates);
     repeat_for_ends(lanes, s, ends, laminates);
-    if (laminates.n > 0) bad = evaluate_laminates(s, s.P, tangent ? s.other : nullptr, laminates);
+    if (laminates.n > 0) bad = evaluate_laminates(s, s.P, rate, laminates);
     if (bad >= 0) return bad % lanes;
   }
   if (!one_law) {
@@ -201,6 +222,7 @@ int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* ene
     tidy(s.growth, ends * lanes);
     tidy(s.inverse, lanes);
   }
+  if (volume_stiffness_) put_volume_stiffness(n, s);
   add_energies(n, s.weight, s, 0, energy);
   if (ends == 2) add_energies(n, s.far_weight, s, lanes, energy);
   if (work_ == Work::sample && !pulled_back_) return -1;

@@ -120,6 +120,9 @@ class BatchWork {
 
   /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
   void pull_back() noexcept { pulled_back_ = true; }
+  /// With Work::sample, after the selective map: what is sampled as the energy is its second derivative by ln J, where F grows alike in all
+  /// directions.
+  void sample_volume_stiffness() noexcept { volume_stiffness_ = true; }
 
   Work work() const noexcept { return work_; }
   bool selective() const noexcept { return selective_; }
@@ -170,6 +173,8 @@ class BatchWork {
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept;
+  void set_growth(int n, BatchScratch& s) const noexcept;
+  void put_volume_stiffness(int n, BatchScratch& s) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
@@ -179,7 +184,7 @@ class BatchWork {
   const Laws& laws_;
   Work work_;
   bool energy_;
-  bool selective_, pulled_back_ = false;
+  bool selective_, pulled_back_ = false, volume_stiffness_ = false;
   LawHistory* history_;
   const Balance* balance_;
   BondScreen* screen_;

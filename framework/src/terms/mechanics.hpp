@@ -54,8 +54,8 @@ class Mechanics final : public Term {
   void history_restored() { space_->history_restored(); }
   /// The evaluation points here that keep a history, ascending.
   std::vector<HistoryPlace> history_points();
-  /// Null where volumes are not those of point gradients.
-  std::unique_ptr<VolumetricRows> make_volumetric_rows() const;
+  /// Null where volumes are not those of point gradients. The rows must not outlive this.
+  std::unique_ptr<VolumetricRows> make_volumetric_rows();
 
  private:
   std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival);
@@ -63,6 +63,10 @@ class Mechanics final : public Term {
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
   void find_laminates(GroupMarks marks, bool again);
+  class LaminateVolumes;
+  /// stiffness <- that of the volumes of points whose evaluation points may be laminates (VolumetricRows), where it is not 0. Field index of
+  /// an inadmissible point, or -1.
+  std::int64_t stiffness_near_laminates(ConstFieldView u, FieldView stiffness);
   std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near);
   /// Room for the energies of all groups, zero.
   std::vector<GroupEnergy> no_energies() const { return std::vector<GroupEnergy>(parts_.families.body().stride() / padding); }
