@@ -8,7 +8,7 @@ class PeakMemory {
   PeakMemory();
   /// What it took so far does not count.
   void forget();
-  /// With what a process takes that has the program, its libraries and nothing else [bytes]; 0 where the system does not tell.
+  /// With what one of as many processes as there are ranks takes that has the program, its libraries and nothing else [bytes]; 0 where the system does not tell.
   double bytes() const;
 
  private:

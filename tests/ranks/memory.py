@@ -12,7 +12,7 @@ import sys
 from scenes import ENVIRONMENT, need, run, scene
 
 PROGRAM, LIBRARY, WORK = sys.argv[1:]
-BOUND = 0.2
+BOUND = 0.15
 failed = []
 
 SCENES = {
