@@ -9,6 +9,7 @@
 #include "assembly/assembly.hpp"
 #include "assembly/row_roles.hpp"
 #include "assembly/volumetric_rows.hpp"
+#include "operators/volume_stiffness.hpp"
 #include "perikit/core/tensor.hpp"
 
 namespace perikit {
@@ -90,8 +91,7 @@ class VolumetricState : public VolumetricRows {
   mutable PerThread<Memory> memory_;
 
  private:
-  /// d^2/dt^2 of the energy of exp(t/3) Fbar at t = 0, (F : A : F + P : F)/9, times the weight that is left. Field index of a point
-  /// where the law has none, or -1.
+  /// That of the energy at Fbar, times the weight that is left. Field index of a point where the law has none, or -1.
   std::int64_t find_stiffness(std::span<const std::int32_t> batch_rows, Memory& m) {
     const int n = static_cast<int>(batch_rows.size());
     const auto row = [&](int l) { return static_cast<std::size_t>(batch_rows[static_cast<std::size_t>(l)]); };
@@ -112,11 +112,8 @@ class VolumetricState : public VolumetricRows {
     if (!status.ok()) return m.owner[status.inadmissible];
     for (int l = 0; l < n; ++l) {
       const std::size_t i = row(l), p = rows_.point(i);
-      double sum = 0;
-      for (int c = 0; c < S::components; ++c)
-        sum += m.F[c * batch_points + l] * (m.dP[c * batch_points + l] + m.P[c * batch_points + l]);
       const double weight = rows_.volume(i) * (1 - parts_.families.damage(p)), share = share_.data()[p];
-      stiffness_.data()[p] = weight * share * share * std::max(0.0, sum / 9);
+      stiffness_.data()[p] = weight * share * share * volume_stiffness(S::components, l, m.F, m.P, m.dP);
     }
     return -1;
   }

@@ -10,6 +10,7 @@
 
 #include "operators/bond_samples.hpp"
 #include "operators/lane_stresses.hpp"
+#include "operators/volume_stiffness.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -175,14 +176,9 @@ void BatchWork::set_growth(int n, BatchScratch& s) const noexcept {
   }
 }
 
-/// psi <- (F : A : F + P : F)/9, with dH = F and other = A : F.
+/// In place of the energies, with dH = F and other = A : F.
 void BatchWork::put_volume_stiffness(int n, BatchScratch& s) const noexcept {
-  for (int l = 0; l < n; ++l) {
-    double sum = 0;
-    for (int c = 0; c < tensor_components(laws_.space()); ++c)
-      sum += s.dH[c * batch_points + l] * (s.other[c * batch_points + l] + s.P[c * batch_points + l]);
-    s.psi[l] = std::max(0.0, sum / 9);
-  }
+  for (int l = 0; l < n; ++l) s.psi[l] = volume_stiffness(tensor_components(laws_.space()), l, s.dH, s.P, s.other);
 }
 
 int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept {
