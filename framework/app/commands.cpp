@@ -82,8 +82,10 @@ void run(const Options& options) {
   Simulation simulation(scene, *registry, [&](const std::string& step) { line->write(step); });
   line.reset();
   const double set_up = seconds_since(start);
+  const auto planning = std::chrono::steady_clock::now();
   const bool first = communicator().rank() == 0;     // which alone speaks
   const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  const double plan = seconds_since(planning);
   if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
@@ -110,7 +112,7 @@ void run(const Options& options) {
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
-  const std::string closing = recorder.closing(set_up);
+  const std::string closing = recorder.closing(set_up, plan);
   log_end(recorder, closing);
   if (!options.quiet && first)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());

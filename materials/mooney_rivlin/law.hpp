@@ -7,6 +7,7 @@
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/rubber_free_stress.hpp"
+#include "perikit/sdk/rubber_invariants.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
@@ -35,37 +36,37 @@ struct MooneyRivlin {
     return {k[2] - 2 * mu / 3, mu};
   }
 
-  template <class T, class S, class K>
-  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
-    const auto& [C1, C2, kappa] = k;
-    // I1* = 3 s and I2* = 3 s^2 + p with s = (1 + m) J^(-2/3), p = I2(d) J^(-4/3), q = det(d) J^-2, s^3 = 1 - p s - q;
-    // what is left after subtracting 3 is of second order in d, term by term.
-    const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root;
-    const T s = scale * (1.0 + trace(e) * (1.0 / 3.0));
-    const T p = second_invariant(d) * (scale * scale), q = determinant(d) * (scale * scale * scale);
-    const T first = -3.0 * (p * s + q), second = p * (1.0 - 2.0 * s * (1.0 + s)) - 3.0 * q * (1.0 + s);
-    return (C1 * first + C2 * second) / (1.0 + s * (1.0 + s)) + volumetric_energy(volumetric, kappa, j);
+  template <class T, class S>
+  static RubberInvariants<T> invariants(const Tensor<T, S>& H) noexcept {
+    return RubberInvariants<T>(H);
   }
 
   template <class T, class S, class K>
-  Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
+  T psi(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [C1, C2, kappa] = k;
+    const auto [first, second] = isochoric_strains(left_cauchy_green_minus_identity(H), of);
+    return C1 * first + C2 * second + volumetric_energy(volumetric, kappa, of.j);
+  }
+
+  template <class T, class S, class K>
+  Tensor<T, S> P(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
+    const auto& [C1, C2, kappa] = k;
+    const auto& [j, m, root] = of;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H);
-    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j));
     const T scale = root * root, inverse_J = scale * root;  // J^(-2/3), 1/J
     const T second = 2.0 * C2 * (scale * scale), both = 2.0 * C1 * scale + second;
     const T I2 = second_invariant_of_strain(e, j);
-    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - (both * trace(e) - second * I2) * (1.0 / 3.0);
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - (both * m - second * (I2 * (1.0 / 3.0)));
     return three_term_stress(both, second, pressure, e, I2, H, j, inverse_J);
   }
 
   /// dP = (dtau - P dF^T) F^-T, dtau from db = 2 sym(dF F^T) and dJ/J = F^-T : dF.
   template <class T, class S, class K>
-  auto tangent(const Tensor<T, S>& H, const K& k) const noexcept {
+  auto tangent(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [C1, C2, kappa] = k;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const T m = trace(e) * (1.0 / 3.0), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root;
+    const auto& [j, m, root] = of;
+    const T scale = root * root;
     const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale), on_d = first + second * (1.0 + m);
     const Tensor<T, S> square = second * deviator(gram(d));
     const Tensor<T, S> tau = add_diagonal(on_d * d - square, volumetric_kirchhoff(volumetric, kappa, j));

@@ -3,6 +3,7 @@
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/elastic_constants.hpp"
 #include "perikit/sdk/rubber_free_stress.hpp"
+#include "perikit/sdk/rubber_invariants.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
@@ -22,37 +23,32 @@ struct NeoHookean {
   }
   Moduli small_strain(const double* k) const noexcept { return {k[1] - 2 * k[0] / 3, k[0]}; }
 
-  /// tr(C)/3 - 1.
   template <class T, class S>
-  static T mean_strain(const Tensor<T, S>& H) noexcept {
-    return (2.0 * trace(H) + inner(H, H)) * (1.0 / 3.0);
+  static RubberInvariants<T> invariants(const Tensor<T, S>& H) noexcept {
+    return RubberInvariants<T>(H);
   }
 
   template <class T, class S, class K>
-  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+  T psi(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [mu, kappa] = k;
-    // tr C / J^(2/3) = 3 s with s = (1 + m) J^(-2/3), and s^-3 = 1 + w with w of second order in the deviator d of C - I:
-    // w = I2(d)/(1 + m)^2 + det(d)/(1 + m)^3. So 3 s - 3 = -3 w s^3 / (1 + s + s^2) keeps its digits.
-    const T m = mean_strain(H), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), scale = root * root, s = scale * (1.0 + m);
-    const Tensor<T, S> d = deviator(right_cauchy_green_minus_identity(H));
-    const T second = second_invariant(d) * (scale * scale), third = determinant(d) * (scale * scale * scale);
-    return -1.5 * mu * ((second * s + third) / (1.0 + s * (1.0 + s))) + volumetric_energy(volumetric, kappa, j);
+    return 0.5 * mu * isochoric_strains(right_cauchy_green_minus_identity(H), of).first + volumetric_energy(volumetric, kappa, of.j);
   }
 
   template <class T, class S, class K>
-  Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
+  Tensor<T, S> P(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [mu, kappa] = k;
-    const T j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), shear = mu * (root * root);
-    const T pressure = volumetric_kirchhoff(volumetric, kappa, j) - shear * mean_strain(H);
-    return two_term_stress(shear, pressure, H, cofactor_minus_identity(H), j, T(root * (root * root)));
+    const T square = of.root * of.root, shear = mu * square;
+    const T pressure = volumetric_kirchhoff(volumetric, kappa, of.j) - shear * of.m;
+    return two_term_stress(shear, pressure, H, cofactor_minus_identity(H), of.j, T(of.root * square));
   }
 
   /// With P = a F + c F^-T, a = mu J^(-2/3), c = J psi_vol' - a (1 + m):
   ///   dP = a dF - c F^-T dF^T F^-T + da F + dc F^-T,  da/a = -2/3 dJ/J,  dJ/J = F^-T : dF,  dm = 2/3 F : dF
   template <class T, class S, class K>
-  auto tangent(const Tensor<T, S>& H, const K& k) const noexcept {
+  auto tangent(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [mu, kappa] = k;
-    const T m = mean_strain(H), j = jacobian_minus_one(H), root = reciprocal_cbrt(T(1.0 + j)), a = mu * (root * root);
+    const auto& [j, m, root] = of;
+    const T a = mu * (root * root);
     const T c = volumetric_kirchhoff(volumetric, kappa, j) - a * (1.0 + m);
     const T c_by_volume = volumetric_kirchhoff_slope(volumetric, kappa, j) + (2.0 / 3) * a * (1.0 + m);  // dc for dJ/J = 1
     const Tensor<T, S> F = add_diagonal(H, T(1.0)),

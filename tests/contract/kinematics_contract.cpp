@@ -338,3 +338,58 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), Kw), "savings change the tangent by ", worst / largest(problem.body(), Kw));
   }
 }
+
+namespace {
+
+void check_same(const Body& body, ConstFieldView a, ConstFieldView b) {
+  REQUIRE(a.size() == b.size());
+  std::size_t differing = 0;
+  for (int c = 0; c < a.components; ++c)
+    for (const std::int32_t p : body.internal()) differing += a.component(c)[p] != b.component(c)[p];
+  CHECK(differing == 0);
+}
+
+void check_same(const Body& body, const PointSamples& a, const PointSamples& b) {
+  check_same(body, a.strain_energy_density, b.strain_energy_density);
+  check_same(body, a.H, b.H);
+  check_same(body, a.P, b.P);
+  check_same(body, a.cauchy, b.cauchy);
+  check_same(body, a.von_mises, b.von_mises);
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: samples that an evaluation of forces takes along are those of a pass of their own, bit for bit") {
+  for (const Case& c : cases())
+    for (const std::string plane : {"strain", "stress"}) {
+      if (plane == "stress" && (c.body.dimension == 3 || formulation_of(c.example).selective())) continue;
+      INFO(c.label(), ", plane ", plane);
+      BodyOptions options = c.body;
+      options.plane = plane;
+      const auto simulation = build(scene_text(options, kinematics_table(c.example)));
+      BodyProblem& problem = simulation->problem();
+      const FieldView u = problem.state().displacement();
+      deform(problem.body(), u, 21, 0.02);
+      double energy = 0, energy_along = 0;
+      const Field force = force_of(problem, u, &energy);
+      for (const Sampling asked : {Sampling::tensors, Sampling::energy, Sampling::von_mises}) {
+        PointSamples alone{.asked = asked}, along{.asked = asked};
+        REQUIRE(problem.terms().sample(u, alone).ok());
+        problem.sample_along(asked);
+        check_same(problem.body(), force_of(problem, u, &energy_along), force);
+        CHECK(energy_along == energy);
+        REQUIRE(problem.sample(along).ok());
+        check_same(problem.body(), along, alone);
+      }
+      // Those of other displacements, or other ones, are taken anew.
+      problem.sample_along(Sampling::von_mises);
+      force_of(problem, u);
+      deform(problem.body(), u, 22, 0.02);
+      for (const Sampling asked : {Sampling::von_mises, Sampling::energy}) {
+        PointSamples alone{.asked = asked}, later{.asked = asked};
+        REQUIRE(problem.terms().sample(u, alone).ok());
+        REQUIRE(problem.sample(later).ok());
+        check_same(problem.body(), later, alone);
+      }
+    }
+}

@@ -101,9 +101,14 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
   return out;
 }
 
-void PointFields::expect(std::span<const std::string> names) {
-  Sampling all = samples_ ? samples_->asked : Sampling::nothing;
+Sampling PointFields::samples_of(std::span<const std::string> names) {
+  Sampling all = Sampling::nothing;
   for (const std::string& name : names) all = all | find_point_field(name)->samples;
+  return all;
+}
+
+void PointFields::expect(std::span<const std::string> names) {
+  const Sampling all = samples_of(names) | (samples_ ? samples_->asked : Sampling::nothing);
   if (all == Sampling::nothing || (samples_ && samples_->asked == all)) return;
   problem_.sample(samples_.emplace(PointSamples{.asked = all}));
 }

@@ -58,11 +58,11 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   batch.H = s.H;
   batch.confined = confined();
   batch.points = points;
-  if (energy_ || screen_ || work_ == Work::sample) batch.psi = s.psi;
+  if (energy_ || screen_ || samples()) batch.psi = s.psi;
   batch.P = P;
   if (dP) batch.dH = s.dH;
   batch.dP = dP;
-  if (work_ == Work::sample) batch.lateral = s.lateral;
+  if (samples()) batch.lateral = s.lateral;
   if (dissipates()) batch.dissipated = s.dissipated;
   if (history_) batch.state = begin_state(n, s, numbers);
   const int bad = (s.one_law >= 0 ? laws_.evaluate_law(static_cast<std::size_t>(s.one_law), batch, s.law) : laws_.evaluate(batch, s.law)).inadmissible;
@@ -158,6 +158,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   if (laminates && laminates->n > 0) bad = evaluate_laminates(s, tangent ? nullptr : P, tangent ? P : nullptr, *laminates);
   if (bad >= 0) return bad;
   add_energies(n, weight, s, 0, energy);
+  if (along_) add_samples(n, s, s.own_weight, *along_, true);
   if (work_ == Work::sample) return -1;
   const double sign = tangent ? -1.0 : 1.0;
   for (int l = 0; l < n; l += pack_width) {
@@ -281,6 +282,7 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnerg
   if (!both_ends) return pass(n, s, owners, 0, s.weight, s.P, energy, laminates);
   // A bond between equal records carries both weights at once; one between different records is evaluated from both ends.
   bool differ = false;
+  if (along_) std::copy_n(s.weight, n, s.own_weight);
   if (one_law(s)) {
     for (int l = 0; l < n; ++l) s.weight[l] += s.far_weight[l];
   } else {
@@ -396,7 +398,7 @@ void add_lanes(std::span<const Sampled> all, int n, const std::int32_t* points, 
 
 }  // namespace
 
-void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept {
+void BatchWork::add_samples(int n, const BatchScratch& s, const double* weight, const SampleSums& sums, bool both_ends) const noexcept {
   static constexpr auto ones = [] {
     std::array<double, batch_points> all{};
     all.fill(1.0);
@@ -416,7 +418,7 @@ void BatchWork::add_samples(int n, const BatchScratch& s, const SampleSums& sums
   for (int c = 0; c < 9 && sums.cauchy; ++c) to(stresses->sigma[c], sums.cauchy, c);
   for (int c = 0; c < components && sums.H; ++c) to(stress_space && c >= d * d ? s.lateral : s.H + c * batch_points, sums.H, c);
   for (int c = 0; c < components && sums.P; ++c) to(s.P + c * batch_points, sums.P, c);
-  add_lanes({all, count}, n, s.owner, s.weight);
+  add_lanes({all, count}, n, s.owner, weight);
   if (both_ends) add_lanes({all, count}, n, s.far, s.far_weight);
 }
 

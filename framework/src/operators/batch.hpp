@@ -59,6 +59,7 @@ struct BatchScratch {
   alignas(64) double growth[batch_points];
   alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
   alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
+  alignas(64) double own_weight[batch_points];   ///< as `weight` came in, where samples are taken along
   alignas(64) double bond[3][3 * batch_points];  ///< xi, g and auxiliaries per lane
   std::int32_t owner[batch_points];
   std::int32_t far[batch_points];
@@ -124,7 +125,13 @@ class BatchWork {
   /// directions.
   void sample_volume_stiffness() noexcept { volume_stiffness_ = true; }
 
+  /// With Work::force, of evaluation points that belong to both ends of bonds of one law, without selective map, history and laminates: adds the
+  /// samples of the lanes here as well.
+  void sample_along(const SampleSums& sums) noexcept { along_ = &sums; }
+
   Work work() const noexcept { return work_; }
+  /// Samples are taken, alone or along with forces.
+  bool samples() const noexcept { return work_ == Work::sample || along_; }
   bool selective() const noexcept { return selective_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
   /// The evaluation ends a step in which laws dissipate.
@@ -150,7 +157,9 @@ class BatchWork {
   /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l], and of both_ends with far_weight to those of s.far[l].
-  void add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept;
+  void add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept {
+    add_samples(n, s, s.weight, sums, both_ends);
+  }
 
  private:
   /// The lanes of a batch that are laminates.
@@ -170,6 +179,7 @@ class BatchWork {
   bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
   int evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy, const LaminateLanes* laminates) const noexcept;
   void add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept;
+  void add_samples(int n, const BatchScratch& s, const double* weight, const SampleSums& sums, bool both_ends) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept;
@@ -190,6 +200,7 @@ class BatchWork {
   BondScreen* screen_;
   const Laminates* laminates_ = nullptr;
   LaminateFinder* finder_ = nullptr;
+  const SampleSums* along_ = nullptr;
 };
 
 /// One evaluation of a whole model: the fields that go in and come out, and the first inadmissible point.
@@ -216,7 +227,7 @@ struct Pass {
   /// Evaluation points are taken one by one and nothing is scattered.
   bool alone() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.
-  bool everywhere() const noexcept { return only || alone() || work.tangent() || work.balance(); }
+  bool everywhere() const noexcept { return only || alone() || work.samples() || work.tangent() || work.balance(); }
   bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
   bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
 

@@ -121,17 +121,7 @@ bool LaminateScratch::look(const LaminatePoint& laminate, int k, int iteration) 
   const int d = dimension_;
   const double share[2] = {laminate.share, 1 - laminate.share};
   const double energy = share[0] * side_[0].psi[k] + share[1] * side_[1].psi[k];
-  double gradient[3] = {}, K[3][3] = {}, trace = 0, slope = 0;
-  for (int i = 0; i < d; ++i) slope += search.gradient[i] * search.direction[i];
-  if (iteration > 0) {
-    const double noise = 1e-13 * (std::abs(energy) + std::abs(search.energy));
-    if (!(energy <= search.energy + 1e-4 * search.step * slope + noise)) {
-      search.step *= 0.5;
-      if (search.step < smallest_step) return false;
-      return true;
-    }
-    for (int i = 0; i < d; ++i) search.jump[i] += search.step * search.direction[i];
-  }
+  double gradient[3] = {}, K[3][3] = {}, trace = 0, slope = 0, new_slope = 0;
   for (int i = 0; i < d; ++i)
     for (int s = 0; s < 2; ++s)
       for (int e = 0; e < d; ++e) {
@@ -142,6 +132,21 @@ bool LaminateScratch::look(const LaminatePoint& laminate, int k, int iteration) 
             K[i][j] += g * laminate.direction[s][f] *
                        side_[s].A[static_cast<std::size_t>(((i * d + e) * components_ + j * d + f) * batch_points + k)];
       }
+  for (int i = 0; i < d; ++i) {
+    slope += search.gradient[i] * search.direction[i];
+    new_slope += gradient[i] * search.direction[i];
+  }
+  if (iteration > 0) {
+    // Energies of laws may have no digits left where strains are small: there the slopes tell, by the trapezoidal rule, how they differ.
+    const double noise = 1e-13 * (std::abs(energy) + std::abs(search.energy)), allowed = 1e-4 * search.step * slope;
+    const bool short_step = search.step * search.size < 1e-3;
+    if (!(energy <= search.energy + allowed + noise) && !(short_step && 0.5 * search.step * (slope + new_slope) <= allowed)) {
+      search.step *= 0.5;
+      if (search.step < smallest_step) return false;
+      return true;
+    }
+    for (int i = 0; i < d; ++i) search.jump[i] += search.step * search.direction[i];
+  }
   for (int i = 0; i < d; ++i) trace += std::abs(K[i][i]);
   double shift = 0;
   while (!factorise(d, K, shift, 1e-12 * trace, search.factor)) {

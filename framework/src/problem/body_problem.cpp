@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/fingerprint.hpp"
 #include "core/following_arrival.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
@@ -113,7 +114,23 @@ void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const
   images()->fold(full, K);
 }
 
-EvaluationStatus BodyProblem::sample(PointSamples& samples) { return terms().sample(seen(state().displacement(), seen_), samples); }
+namespace {
+
+std::uint64_t fingerprint_of(ConstFieldView u) {
+  Fingerprint fingerprint;
+  fingerprint.add(std::span(u.data, u.size()));
+  return fingerprint.value();
+}
+
+}  // namespace
+
+EvaluationStatus BodyProblem::sample(PointSamples& samples) {
+  const ConstFieldView u = state().displacement();
+  const bool there = kept_.asked != Sampling::nothing && kept_.asked == samples.asked && kept_at_ == fingerprint_of(u);
+  if (!there) return terms().sample(seen(u, seen_), samples);
+  samples = std::exchange(kept_, {.asked = Sampling::nothing});
+  return {};
+}
 
 void BodyProblem::describe(EvaluationStatus& status) const {
   if (status.ok()) return;
@@ -130,7 +147,14 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status;
-  if (!ghosts_) {
+  kept_ = {.asked = std::exchange(along_, Sampling::nothing)};
+  // Where histories go on or bonds fail between forces and samples these are others.
+  if (history || ghosts_ || parts_.fracture.damage()) kept_.asked = Sampling::nothing;
+  if (kept_.asked != Sampling::nothing) {
+    status = terms().forces_and_samples(seen(u, seen_), force, energy, kept_);
+    kept_at_ = fingerprint_of(u);
+    if (!status.ok()) kept_ = {.asked = Sampling::nothing};
+  } else if (!ghosts_) {
     status = terms().forces(seen(u, seen_), force, energy);
   } else if (!images()) {
     ghosts_->start(Seen::writable(u));

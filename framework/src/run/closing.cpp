@@ -26,12 +26,12 @@ std::string quiet_summary(const QuietCounts& counts) {
 
 }  // namespace
 
-std::string RunRecorder::closing(double set_up) const {
+std::string RunRecorder::closing(double set_up, double plan) const {
   BodyProblem& problem = simulation_.problem();
   const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(), steps_time = std::max(0.0, spent - output_seconds_);
   const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.body().points_of_all_ranks());
   std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
-  text += fmt::format("time          {:.2f} s set-up, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, steps_time,
+  text += fmt::format("time          {:.2f} s set-up, {:.2f} s plan, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, plan, steps_time,
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
   if (steps > 0) {

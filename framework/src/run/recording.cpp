@@ -227,7 +227,19 @@ bool RunRecorder::wants_sample(std::int64_t step, double time) {
   // Read once a step and before its end, so that the state that a stop keeps is a whole sample; a signal that comes later ends
   // the run after the next step.
   stopping_ = communicator().largest(stop_requested() ? 1 : 0) > 0;
-  return stopping_ || frame_due(step, time) || history_due(step);
+  const bool row = stopping_ || history_due(step), frame = stopping_ || frame_due(step, time);
+  // Steps of other runs evaluate forces many times.
+  if (simulation_.dynamic()) fields_.expect_after_step(fields_due(row, frame));
+  return row || frame;
+}
+
+/// What rows and frames hold: sampled once for all that is written.
+std::vector<std::string> RunRecorder::fields_due(bool row, bool frame) const {
+  std::vector<std::string> wanted;
+  for (const HistoryDescription& record : simulation_.scene().output.history)
+    if (row) wanted.push_back(record.quantity);
+  if (frame) wanted.insert(wanted.end(), frame_fields_.begin(), frame_fields_.end());
+  return wanted;
 }
 
 void RunRecorder::step_done(const StepReport& report) {
@@ -244,11 +256,7 @@ void RunRecorder::step_done(const StepReport& report) {
   // What only the stop asks for is written but not counted: the run that goes on writes what the run without a stop had written.
   const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
   if (row || frame || stopping_) watch_energies(report, row || frame);
-  std::vector<std::string> wanted;   // sampled once for all that is written
-  for (const HistoryDescription& record : simulation_.scene().output.history)
-    if (row || stopping_) wanted.push_back(record.quantity);
-  if (frame || stopping_) wanted.insert(wanted.end(), frame_fields_.begin(), frame_fields_.end());
-  fields_.expect(wanted);
+  fields_.expect(fields_due(row || stopping_, frame || stopping_));
   if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;

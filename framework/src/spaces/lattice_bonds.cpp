@@ -212,7 +212,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
       }
     }
   }
-  for (int k = 0; k < slots && (sample || (!laws_.single() && s.one_law < 0)); ++k)
+  for (int k = 0; k < slots && (pass.work.samples() || (!laws_.single() && s.one_law < 0)); ++k)
     for (int l = 0; l < chunk_points; ++l) {
       s.owner[k * chunk_points + l] = chunk.first + l;
       s.far[k * chunk_points + l] = static_cast<std::int32_t>((masks[k] >> l & 1) ? p + shifts[k] + l : p + l);

@@ -142,8 +142,9 @@ void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double Group
   perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
 }
 
-std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
-  const BatchWork work = this->work(Work::force, energy != nullptr, screen_);
+std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, const SampleSums* along) {
+  BatchWork work = this->work(Work::force, energy != nullptr, screen_);
+  if (along) work.sample_along(*along);
   const bool dissipates = work.dissipates(), wanted = energy || dissipates;
   if (wanted) energies_ = no_energies();
   Pass pass{work, u, {}, force, nullptr, wanted ? energies_.data() : nullptr, -1, {}};
@@ -194,30 +195,61 @@ void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const Group
   space_->run(pass);
 }
 
-std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& s) {
-  const Body& body = parts_.families.body();
-  const bool averages = any_of(s.asked, Sampling::H | Sampling::P | Sampling::cauchy | Sampling::von_mises);
-  const auto field = [&](Sampling of, int components) { return any_of(s.asked, of) ? body.make_field(components) : Field(); };
-  Field weight, energy = body.make_field(1);
-  if (averages) weight = body.make_field(1);
-  s.H = field(Sampling::H, parts_.laws.components());
-  s.P = field(Sampling::P, parts_.laws.components());
-  s.cauchy = field(Sampling::cauchy, 9);
-  s.von_mises = field(Sampling::von_mises, 1);
-  const auto to = [](Field& of) { return of.size() > 0 ? of.data() : nullptr; };
-  const SampleSums sums{to(weight), energy.data(), to(s.H), to(s.P), to(s.cauchy), to(s.von_mises), body.stride()};
+namespace {
+
+/// Weighted sums of what evaluation points hold -> averages at the points that they belong to.
+class Averages {
+ public:
+  /// Makes the fields that `samples` asks for.
+  Averages(const Body& body, const Laws& laws, PointSamples& samples) : body_(body), samples_(samples), energy_(body.make_field(1)) {
+    const auto field = [&](Sampling of, int components) { return any_of(samples.asked, of) ? body.make_field(components) : Field(); };
+    weight_ = field(Sampling::H | Sampling::P | Sampling::cauchy | Sampling::von_mises, 1);
+    samples.H = field(Sampling::H, laws.components());
+    samples.P = field(Sampling::P, laws.components());
+    samples.cauchy = field(Sampling::cauchy, 9);
+    samples.von_mises = field(Sampling::von_mises, 1);
+  }
+  SampleSums sums() {
+    const auto to = [](Field& of) { return of.size() > 0 ? of.data() : nullptr; };
+    return {to(weight_), energy_.data(), to(samples_.H), to(samples_.P), to(samples_.cauchy), to(samples_.von_mises), body_.stride()};
+  }
+  void finish() {
+    const bool averages = weight_.size() > 0;
+    for (const std::int32_t index : body_.internal()) {
+      const auto p = static_cast<std::size_t>(index);
+      samples_.strain_energy_density.data()[p] += energy_.data()[p] / body_.volume(p);
+      if (!averages) continue;
+      const double inverse = weight_.data()[p] > 0 ? 1.0 / weight_.data()[p] : 0.0;
+      for (Field* field : {&samples_.H, &samples_.P, &samples_.cauchy, &samples_.von_mises})
+        for (int c = 0; c < field->components(); ++c) field->component(c)[p] *= inverse;
+    }
+  }
+
+ private:
+  const Body& body_;
+  PointSamples& samples_;
+  Field weight_, energy_;
+};
+
+}  // namespace
+
+std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& samples) {
+  Averages averages(parts_.families.body(), parts_.laws, samples);
+  const SampleSums sums = averages.sums();
   const BatchWork work = this->work(Work::sample, false);
   Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
   space_->run(pass);
-  for (const std::int32_t index : body.internal()) {
-    const auto p = static_cast<std::size_t>(index);
-    s.strain_energy_density.data()[p] += energy.data()[p] / body.volume(p);
-    if (!averages) continue;
-    const double inverse = weight.data()[p] > 0 ? 1.0 / weight.data()[p] : 0.0;
-    for (Field* field : {&s.H, &s.P, &s.cauchy, &s.von_mises})
-      for (int c = 0; c < field->components(); ++c) field->component(c)[p] *= inverse;
-  }
+  averages.finish();
   return pass.bad;
+}
+
+std::int64_t Mechanics::add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) {
+  if (!space_->samples_along() || parts_.numbered()) return Term::add_forces_and_samples(u, force, energy, samples);
+  Averages averages(parts_.families.body(), parts_.laws, samples);
+  const SampleSums sums = averages.sums();
+  const std::int64_t bad = forces(u, force, energy, nullptr, &sums);
+  averages.finish();
+  return bad;
 }
 
 int Mechanics::steps() const noexcept {

@@ -14,11 +14,12 @@ class Mechanics final : public Term {
   explicit Mechanics(const SpaceParts& parts);
 
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, nullptr);
+    return forces(u, force, energy, nullptr, nullptr);
   }
   std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, &arrival);
+    return forces(u, force, energy, &arrival, nullptr);
   }
+  std::int64_t add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
     return tangent_of(u, w, Kw, nullptr, nullptr);
   }
@@ -58,7 +59,8 @@ class Mechanics final : public Term {
   std::unique_ptr<VolumetricRows> make_volumetric_rows();
 
  private:
-  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival);
+  /// along: samples that the evaluation takes along; null: none.
+  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, const SampleSums* along);
   std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.

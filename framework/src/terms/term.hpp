@@ -27,6 +27,11 @@ class Term {
     arrival.finish();
     return add_forces(u, force, energy);
   }
+  /// Forces and samples of the same displacements, each with the bits that it has alone.
+  virtual std::int64_t add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) {
+    const std::int64_t bad = add_forces(u, force, energy);
+    return bad < 0 ? add_samples(u, samples) : bad;
+  }
   /// Kw += -d(force)/du w [N].
   virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
   /// Adds to the energy density, and sets what else it knows.

@@ -158,19 +158,40 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   return status;
 }
 
-EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival) {
+/// add(term, energy) adds the forces of a term.
+template <class Add>
+EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, FieldView force, double* energy) {
   clear(force.data, force.size());
   ExactSum sum;
   if (criterion_) criterion_->begin_forces();
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) {
-    ExactSum* const to = energy ? &sum : nullptr;
-    bad =
-        arrival && arrival->pending() ? (*term)->add_forces_meanwhile(*arrival, u, force, to) : (*term)->add_forces(u, force, to);
-  }
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = add(**term, energy ? &sum : nullptr);
   if (criterion_ && bad < 0) criterion_->end_forces(u);
   if (energy) *energy = total_over_ranks(sum);
   return status(bad);
+}
+
+EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival) {
+  return forces_by(
+      [&](Term& term, ExactSum* to) {
+        return arrival && arrival->pending() ? term.add_forces_meanwhile(*arrival, u, force, to) : term.add_forces(u, force, to);
+      },
+      u, force, energy);
+}
+
+namespace {
+
+/// As asked, before terms add to them.
+void begin_samples(const Body& body, PointSamples& samples) {
+  samples = {.asked = samples.asked};
+  samples.strain_energy_density = body.make_field(1);
+}
+
+}  // namespace
+
+EvaluationStatus Terms::forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples) {
+  begin_samples(parts_.families->body(), samples);
+  return forces_by([&](Term& term, ExactSum* to) { return term.add_forces_and_samples(u, force, to, samples); }, u, force, energy);
 }
 
 EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
@@ -245,8 +266,7 @@ EvaluationStatus Terms::tangent_of(const GroupRings& groups, ConstFieldView u, C
 }
 
 EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
-  samples = {.asked = samples.asked};
-  samples.strain_energy_density = parts_.families->body().make_field(1);
+  begin_samples(parts_.families->body(), samples);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
   return status(bad);

@@ -31,10 +31,13 @@ class PointFields {
   OutputField at(const std::string& name, std::span<const std::int32_t> points);
   /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
   void expect(std::span<const std::string> names);
+  /// They are asked for at the end of the step whose forces are evaluated next.
+  void expect_after_step(std::span<const std::string> names) { problem_.sample_along(samples_of(names)); }
   /// Frees its memory until it is asked for again.
   void forget(const std::string& name) { cache_.erase(name), made_.erase(name); }
 
  private:
+  static Sampling samples_of(std::span<const std::string> names);
   friend const std::vector<PointField>& point_fields();   // the table computes by the functions below
 
   /// Of the whole body. Its memory stays when the state changes, for rows of history ask for it at every step.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "perikit/body/partition.hpp"
+#include "perikit/operators/samples.hpp"
 #include "perikit/problem/fracture_record.hpp"
 #include "perikit/problem/ghosts.hpp"
 #include "perikit/problem/problem.hpp"
@@ -18,7 +19,6 @@ class ByteReader;
 class Companion;
 class Families;
 class WeakSprings;
-struct PointSamples;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
 struct ProblemParts {
@@ -55,6 +55,9 @@ class BodyProblem final : public Problem {
   std::unique_ptr<VolumetricPart> volumetric_part() override;
   /// Of the present state.
   EvaluationStatus sample(PointSamples& samples);
+  /// The next evaluation of forces takes these samples along where it can, for a `sample` of the same displacements that asks for the same: most
+  /// of what either does is what the other does, too.
+  void sample_along(Sampling asked) noexcept { along_ = asked; }
   bool constant_stiffness() const noexcept override;
   bool advance(double time_step, FieldView velocity = {}) override;
   std::unique_ptr<WeakeningBonds> weakening_bonds() override;
@@ -147,6 +150,9 @@ class BodyProblem final : public Problem {
   Field seen_, seen_direction_;
   BondReaction reaction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
+  Sampling along_ = Sampling::nothing;   ///< with the next one
+  PointSamples kept_{.asked = Sampling::nothing};   ///< with the last one; nothing asked for: none
+  std::uint64_t kept_at_ = 0;            ///< fingerprint of their displacements
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
   std::unique_ptr<WeakSprings> weak_springs_;   ///< null unless pieces are watched

@@ -121,8 +121,9 @@ class RunRecorder final : public Observer {
   /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
-  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. set_up: seconds before the run.
-  std::string closing(double set_up) const;
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. Before the run set_up seconds
+  /// went by, and `plan` seconds until it was known which steps it would make.
+  std::string closing(double set_up, double plan) const;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
 
@@ -138,6 +139,7 @@ class RunRecorder final : public Observer {
   void keep_checkpoint(const StepReport& report);
   bool frame_due(std::int64_t step, double time) const;
   bool history_due(std::int64_t step) const;
+  std::vector<std::string> fields_due(bool row, bool frame) const;
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
   /// The frame that was begun, open for this rank to write a share of it; null where rank 0 writes all of it.

@@ -17,6 +17,9 @@
 /// law leaves out comes from forward differentiation. A law with P alone stores no energy: it declares hyperelastic = false, and
 /// its psi reads zero. Laws with history: perikit/sdk/history.hpp. Laws with traits.objective = false are small-strain laws and
 /// accept every finite H. Uniaxial stress needs an isotropic law (both free stretches are taken equal).
+///
+/// Faster, where a root or a division stands at the beginning of all of them: invariants(H), which psi, P and tangent then take as a third
+/// argument (perikit/sdk/differentiation.hpp; rubber_invariants.hpp has those of rubber).
 
 #include <algorithm>
 #include <array>
@@ -181,14 +184,17 @@ class LawMaterial final : public Material {
   }
 
   /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
-  template <class S>
-  static PackMask admissible(const Tensor<Pack, S>& H) noexcept {
+  template <class S, class Invariants>
+  static PackMask admissible(const Tensor<Pack, S>& H, const Invariants& of) noexcept {
     if constexpr (small_strain_law) {
       Pack total = H[0] * 0.0;
       PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
       return total == 0.0;
     } else {
-      const Pack j = jacobian_minus_one(H);  // not finite if any component is not
+      const Pack j = [&] {  // not finite if any component is not
+        if constexpr (requires { of.j; }) return of.j;
+        else return jacobian_minus_one(H);
+      }();
       return (j > -1.0) & (j < std::numeric_limits<double>::infinity());
     }
   }
@@ -199,6 +205,28 @@ class LawMaterial final : public Material {
       return contraction_ratio<S>(after<S>(std::array<Pack, state_size<Law, S>()>{}, time_step), k);
     else
       return contraction_ratio<S>(law_, k);
+  }
+
+  /// Invariants are found for so many packs at once: one waits for its roots while the next ones begin.
+  static constexpr int packs_ahead = 8;
+  template <class S, bool free_stretch>
+  static constexpr bool looks_ahead = !free_stretch && !HasHistory<Law> && HasInvariants<Law, Pack, S>;
+
+  template <class S, bool free_stretch>
+  static auto make_ahead() noexcept {
+    if constexpr (looks_ahead<S, free_stretch>)
+      return std::array<decltype(std::declval<const Law&>().invariants(Tensor<Pack, S>())), packs_ahead>();
+    else
+      return std::array<NoInvariants, 1>();
+  }
+
+  /// Those of the packs from point p on.
+  template <class S>
+  void find_invariants(const MaterialBatch& b, int p, auto& of) const noexcept {
+    for (auto& pack : of) {
+      if (p < b.n) pack = law_.invariants(load<S>(b.H, b.stride, p));
+      p += pack_width;
+    }
   }
 
   template <class S, bool own>
@@ -226,6 +254,7 @@ class LawMaterial final : public Material {
     Pack ratio = 0.0;
     [[maybe_unused]] decltype(zeros_of_batch<S, own_zeros>()) zeros;
     if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
+    [[maybe_unused]] auto ahead = make_ahead<S, free_stretch>();
     for (int p = 0; p < b.n; p += pack_width) {
       if (b.constant_stride != 0) {
         k = load_constants(b, p);
@@ -235,6 +264,7 @@ class LawMaterial final : public Material {
       Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
       PackMask good = Pack(0.0) == Pack(0.0);
       [[maybe_unused]] const int in_group = p / pack_width % free_zero_packs;
+      [[maybe_unused]] const auto at = static_cast<std::size_t>(p / pack_width) % ahead.size();
       if constexpr (own_zeros) {
         if (in_group == 0) find_zeros<S>(b, p, zeros);
         H = with_free_part(H, zeros.strain[in_group]);
@@ -244,7 +274,10 @@ class LawMaterial final : public Material {
           H = admissible_given_part<small_strain_law>(H, good);
           H = with_free_part(H, free_strain<small_strain_law>(law, H, k, ratio, good));
         }
-        good &= admissible(H);
+        if constexpr (looks_ahead<S, free_stretch>) {
+          if (at == 0) find_invariants<S>(b, p, ahead);
+        }
+        good &= admissible(H, ahead[at]);
       }
       if (b.lateral) H[S::components - 1].store(b.lateral + p);
 
@@ -271,19 +304,21 @@ class LawMaterial final : public Material {
         }
       } else {
         if (b.psi || b.P) {
-          // Stress first, and always: what the energy has in common with it, roots and invariants, is there by then.
+          // Stress first, and always: what the energy has in common with it is there by then.
           const Tensor<Pack, S> P = [&] {
             if constexpr (own_zeros) return zeros.equation[in_group].stress(H, zeros.root[in_group]);
+            else if constexpr (looks_ahead<S, free_stretch>) return stress(law, H, k, ahead[at]);
             else return stress(law, H, k);
           }();
           if (b.psi) {
-            if constexpr (HasEnergy<Law, Pack, S, Constants>) put_energy(law.psi(H, k));
-            else put_energy(0.0);
+            if constexpr (!HasEnergy<Law, Pack, S, Constants>) put_energy(0.0);
+            else if constexpr (looks_ahead<S, free_stretch>) put_energy(energy(law, H, k, ahead[at]));
+            else put_energy(energy(law, H, k));
           }
           if (b.P) put_stress(P);
         }
       }
-      if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k);
+      if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k, ahead[at]);
       good &= probe == 0.0;
       if (!all(good)) [[unlikely]]
         clear(b, S::components, state_size<Law, S>(), p, good, status);
@@ -291,12 +326,14 @@ class LawMaterial final : public Material {
     return status;
   }
 
-  template <class S, bool free_stretch, class StepLaw>
+  template <class S, bool free_stretch, class StepLaw, class Invariants>
   [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
-                                                       const Constants& k) noexcept {
+                                                       const Constants& k, [[maybe_unused]] const Invariants& of) noexcept {
     const auto action = [&] {
       if constexpr (free_stretch)
         return condensed_tangent(law, H, k);
+      else if constexpr (looks_ahead<S, free_stretch>)
+        return tangent(law, H, k, of);
       else
         return tangent(law, H, k);
     }();

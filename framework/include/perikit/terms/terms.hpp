@@ -61,6 +61,8 @@ class Terms {
   /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. arrival: of u at the
   /// points of other ranks, which has come when it returns; null: it is there.
   EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr);
+  /// `forces` and `sample` of the same displacements, bit for bit; where evaluation points are those of both, each is visited once.
+  EvaluationStatus forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples);
   /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds:
   /// what has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs.
   /// On one rank.
@@ -133,6 +135,8 @@ class Terms {
   BondChecks bond_checks() const;
 
  private:
+  template <class Add>
+  EvaluationStatus forces_by(Add&& add, ConstFieldView u, FieldView force, double* energy);
   struct Assemblies;
   struct Failing;
   void bonds_changed(std::span<const std::int32_t> points);
