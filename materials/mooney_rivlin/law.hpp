@@ -85,7 +85,7 @@ struct MooneyRivlin {
   template <class T, class S, class K>
   auto free_stress(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    return RubberFreeStress<T, S>(H, T(C1), T(C2), T(kappa), volumetric);
+    return RubberFreeStress<T, S, true>(H, T(C1), T(C2), T(kappa), volumetric);
   }
 };
 

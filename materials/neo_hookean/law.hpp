@@ -63,7 +63,7 @@ struct NeoHookean {
   template <class T, class S, class K>
   auto free_stress(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [mu, kappa] = k;
-    return RubberFreeStress<T, S>(H, T(0.5 * mu), T(0.0), T(kappa), volumetric);
+    return RubberFreeStress<T, S, false>(H, T(0.5 * mu), T(0.0), T(kappa), volumetric);
   }
 };
 

@@ -90,6 +90,11 @@ Dual<T> sqrt(Dual<T> x) noexcept {
   return {root, x.derivative * 0.5 / root};
 }
 template <class T>
+Dual<T> reciprocal(Dual<T> x) noexcept {
+  const T inverse = reciprocal(x.value);
+  return {inverse, -(x.derivative * (inverse * inverse))};
+}
+template <class T>
 Dual<T> cbrt(Dual<T> x) noexcept {
   const T root = cbrt(x.value);
   return {root, x.derivative * root / (3.0 * x.value)};

@@ -50,6 +50,10 @@ T cbrt(T x) noexcept {
   return std::cbrt(x);
 }
 template <std::floating_point T>
+T reciprocal(T x) noexcept {
+  return T(1) / x;
+}
+template <std::floating_point T>
 T reciprocal_cbrt(T x) noexcept {
   return T(1) / std::cbrt(x);
 }

@@ -162,12 +162,14 @@ class FreeZeros {
   std::array<Equation, packs> equation;
   Pack strain[packs], root[packs];  ///< strain: not a number where there is none
 
-  /// same_constants: as in the last call.
+  /// uniform: all packs have the same constants; begun: and had them in the last call.
   template <class Given>
-  void find(const Law& law, const std::array<K, packs>& k, bool same_constants, const Given& given) noexcept {
+  void find(const Law& law, const std::array<K, packs>& k, bool uniform, bool begun, const Given& given) noexcept {
     for (int i = 0; i < packs; ++i) equation[i] = law.free_stress(given(i), k[i]);
-    if (!same_constants)
+    if (!uniform)
       for (int i = 0; i < packs; ++i) rest_[i] = equation[i].rest();
+    else if (!begun)
+      rest_.fill(equation[0].rest());
     Equation::zeros(equation, rest_, strain, root);
     for (int i = 0; i < packs; ++i)
       if (!all(strain[i] == strain[i])) [[unlikely]]

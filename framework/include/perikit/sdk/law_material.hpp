@@ -243,7 +243,7 @@ class LawMaterial final : public Material {
     const auto first = [&](int i) { return p + i * pack_width < b.n ? p + i * pack_width : p; };
     std::array<Constants, FreeZeros<Law, S, Constants>::packs> k;
     for (std::size_t i = 0; i < k.size(); ++i) k[i] = load_constants(b, first(static_cast<int>(i)));
-    zeros.find(law_, k, p > 0 && b.constant_stride == 0, [&](int i) { return load<S>(b.H, b.stride, first(i)); });
+    zeros.find(law_, k, b.constant_stride == 0, p > 0, [&](int i) { return load<S>(b.H, b.stride, first(i)); });
   }
 
   template <class S, bool free_stretch>

@@ -14,8 +14,8 @@ namespace perikit {
 /// F F^T, e = b - 1, and of the given ones c = tr - 2, g = det - 1 (plane), or b1 = 1 + c (bar), s = J^(-2/3), it is
 ///   plane:  2 C1 s (2 e - c)/3 + 2 C2 s^2 (c + 2 e + c e - 2 g)/3 + J psi_vol'(J)
 ///   bar:    2 C1 s (e - c)/3   + 2 C2 s^2 b (e - c)/3             + J psi_vol'(J)
-/// every term of the order of the strains.
-template <class T, class S>
+/// every term of the order of the strains. has_second: C2 may be other than zero.
+template <class T, class S, bool has_second>
 class RubberFreeStress {
  public:
   RubberFreeStress() = default;
@@ -33,7 +33,7 @@ class RubberFreeStress {
   FreeStress<T> operator()(const T& h) const noexcept {
     const T e = h * (2.0 + h), b = 1.0 + e, volume = plane ? T(j_ + h * (1.0 + j_)) : T(j_ + e * (1.0 + j_));
     const T root = reciprocal_cbrt(T(1.0 + volume)), s = root * root;
-    const T first = C1_ * s, second = C2_ * (s * s), slope = volumetric_kirchhoff_slope(volumetric_, kappa_, volume);
+    const T first = C1_ * s, second = by_C2(s * s), slope = volumetric_kirchhoff_slope(volumetric_, kappa_, volume);
     const T pressure = volumetric_kirchhoff(volumetric_, kappa_, volume);
     if constexpr (plane) {
       const T on_first = 2.0 * e - c_, on_second = c_ + 2.0 * e + c_ * e - 2.0 * (j_ * (2.0 + j_));
@@ -75,11 +75,11 @@ class RubberFreeStress {
   ///   plane:  2 C1 s (b - b33 I) + 2 C2 s^2 ((1 + g) I - b33 cof b),   tau F^-T = a (F - F^-T) + p F^-T
   ///   bar:    (c - e) (2 C1 s + 2 C2 s^2 b)
   Tensor<T, S> stress(const Tensor<T, S>& H, const T& q) const noexcept {
-    const T h = H(2, 2), e = h * (2.0 + h), s = reciprocal(T(q * q)), first = 3.0 * C1_ * s, second = 3.0 * C2_ * (s * s);
-    const T on_F = first + second * (1.0 + e);
+    const T h = H(2, 2), e = h * (2.0 + h), s = reciprocal(T(q * q)), first = 3.0 * C1_ * s, second = 3.0 * by_C2(s * s);
+    const T on_F = has_second ? T(first + second * (1.0 + e)) : first;
     Tensor<T, S> P = with_free_part(H, T(0.0));
     if constexpr (plane) {
-      const T p = second * (j_ * (2.0 + j_) - c_ - e * (1.0 + c_)) - first * e;
+      const T p = has_second ? T(second * (j_ * (2.0 + j_) - c_ - e * (1.0 + c_)) - first * e) : T(-first * e);
       const T on_cofactor = (p - on_F) * inverse_, on_identity = (on_F * j_ + p) * inverse_;
       P(0, 0) = on_F * H(0, 0) + on_cofactor * H(1, 1) + on_identity;
       P(1, 1) = on_F * H(1, 1) + on_cofactor * H(0, 0) + on_identity;
@@ -137,13 +137,23 @@ class RubberFreeStress {
     const T on_pressure = M * (q2 * q2), bulk_slope = (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk), by_q = 3.0 * q2;
     if constexpr (plane) {
       const T sum = J0 + (1.0 + v), E = (v - j_) * sum, on_first = 2.0 * E - c, by_E = (2.0 + 2.0 * v) * by_q;  // E: e (1 + j)^2
-      const T on_second = (2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_)));
-      return {(C1_ * q2) * on_first + C2_ * on_second + on_pressure * pressure,
-              (2.0 * C1_) * (q * on_first + q2 * by_E) + (C2_ * (2.0 + c_)) * by_E + bulk_slope};
+      FreeStress<T> at{(C1_ * q2) * on_first + on_pressure * pressure, (2.0 * C1_) * (q * on_first + q2 * by_E) + bulk_slope};
+      if constexpr (has_second) {
+        at.value += C2_ * ((2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_))));
+        at.slope += (C2_ * (2.0 + c_)) * by_E;
+      }
+      return at;
     } else {
-      const T difference = (v - j_) - c, second = C2_ * inverse_, both = C1_ * q2 + second * (1.0 + v);
-      return {both * difference + on_pressure * pressure, (2.0 * C1_ * q + second * by_q) * difference + both * by_q + bulk_slope};
+      const T difference = (v - j_) - c, second = by_C2(inverse_), both = has_second ? T(C1_ * q2 + second * (1.0 + v)) : T(C1_ * q2);
+      const T slope = has_second ? T(2.0 * C1_ * q + second * by_q) : T(2.0 * C1_ * q);
+      return {both * difference + on_pressure * pressure, slope * difference + both * by_q + bulk_slope};
     }
+  }
+
+  /// C2 times x.
+  T by_C2([[maybe_unused]] const T& x) const noexcept {
+    if constexpr (has_second) return C2_ * x;
+    else return T(0.0);
   }
 
   T C1_, C2_, kappa_;  // C1, C2: times 2/3

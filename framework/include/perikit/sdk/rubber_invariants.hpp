@@ -21,19 +21,20 @@ struct RubberInvariants {
 
 template <class T>
 struct IsochoricStrains {
-  T first;   ///< J^(-2/3) I1 - 3
-  T second;  ///< J^(-4/3) I2 - 3
+  T first;   ///< J^(-2/3) I1(C) - 3
+  T second;  ///< J^(-4/3) I2(C) - 3
 };
 
 /// Of e = C - I or b - I, term by term of second order in its deviator d, so that they keep their digits where d is small. With
-/// s = (1 + m) J^(-2/3), p = I2(d) J^(-4/3), q = det(d) J^-2: J^(-2/3) I1 = 3 s and J^(-4/3) I2 = 3 s^2 + p, and det C = J^2 says that
-/// s^3 = 1 - p s - q.
+/// s = (1 + m) J^(-2/3) they are 3 s - 3 and 3 s^2 + I2(d) J^(-4/3) - 3, and det C = (1 + m)^3 + (1 + m) I2(d) + det(d) = J^2 says that
+/// s^3 - 1 = -((1 + m) I2(d) + det(d))/J^2.
 template <class T, class S>
 IsochoricStrains<T> isochoric_strains(const Tensor<T, S>& e, const RubberInvariants<T>& of) noexcept {
-  const T scale = of.root * of.root, s = scale * (1.0 + of.m);
+  const T scale = of.root * of.root, inverse_J = of.root * scale, s = scale * (1.0 + of.m);
   const Tensor<T, S> d = deviator(e);
-  const T p = second_invariant(d) * (scale * scale), q = determinant(d) * (scale * scale * scale), inverse = 1.0 / (1.0 + s * (1.0 + s));
-  return {-3.0 * (p * s + q) * inverse, (p * (1.0 - 2.0 * s * (1.0 + s)) - 3.0 * q * (1.0 + s)) * inverse};
+  const T I2 = second_invariant(d), cubes = (I2 * (1.0 + of.m) + determinant(d)) * (inverse_J * inverse_J);
+  const T first = -3.0 * cubes * reciprocal(T(1.0 + s * (1.0 + s)));
+  return {first, I2 * (scale * scale) + first * (1.0 + s)};
 }
 
 }  // namespace perikit
