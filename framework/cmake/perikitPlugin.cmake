@@ -11,6 +11,10 @@ function(perikit_compile_options target)
   endif()
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     target_compile_options(${target} PRIVATE -mprefer-vector-width=512)
+    # Tensors are copied in whole registers. The default for levels of the architecture is half of one: what was written in one piece and is read
+    # in two, or the other way about, makes the reader wait.
+    target_compile_options(${target} PRIVATE
+      $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_GREATER_EQUAL:$<CXX_COMPILER_VERSION>,12>>:-mmove-max=512;-mstore-max=512>)
   endif()
   if(PERIKIT_WERROR)
     target_compile_options(${target} PRIVATE -Werror)

@@ -16,9 +16,14 @@ Tensor<T, S> free_direction() noexcept {
   return Tensor<T, S>::build([](int i, int j) { return T(i == j && i >= S::dimension ? 1.0 : 0.0); });
 }
 
+/// a <- a with s along the free axes. In place where it is to stay in memory: a copy of a whole tensor goes through registers that are half as wide.
+template <class T, class S, class U>
+void put_free_part(Tensor<T, S>& a, const U& s) noexcept {
+  for (int i = S::dimension; i < 3; ++i) a(i, i) = s;
+}
 template <class T, class S, class U>
 Tensor<T, S> with_free_part(Tensor<T, S> a, const U& s) noexcept {
-  for (int i = S::dimension; i < 3; ++i) a(i, i) = s;
+  put_free_part(a, s);
   return a;
 }
 
@@ -115,7 +120,7 @@ Pack solve_free_equation(const Equation& equation, Pack y, Pack size, PackMask& 
 template <bool small_strain, class S>
 Tensor<Pack, S> admissible_given_part(Tensor<Pack, S> H, PackMask& good) noexcept {
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  H = with_free_part(H, Pack(0.0));
+  put_free_part(H, Pack(0.0));
   const Pack j = jacobian_minus_one(H);
   if constexpr (!small_strain) good &= (j > -1.0) & (j < infinity);
   good &= largest(H) < infinity;

@@ -267,12 +267,12 @@ class LawMaterial final : public Material {
       [[maybe_unused]] const auto at = static_cast<std::size_t>(p / pack_width) % ahead.size();
       if constexpr (own_zeros) {
         if (in_group == 0) find_zeros<S>(b, p, zeros);
-        H = with_free_part(H, zeros.strain[in_group]);
+        put_free_part(H, zeros.strain[in_group]);
         good = zeros.strain[in_group] == zeros.strain[in_group];
       } else {
         if constexpr (free_stretch) {
           H = admissible_given_part<small_strain_law>(H, good);
-          H = with_free_part(H, free_strain<small_strain_law>(law, H, k, ratio, good));
+          put_free_part(H, free_strain<small_strain_law>(law, H, k, ratio, good));
         }
         if constexpr (looks_ahead<S, free_stretch>) {
           if (at == 0) find_invariants<S>(b, p, ahead);
@@ -287,7 +287,7 @@ class LawMaterial final : public Material {
         probe += 0.0 * psi;
       };
       const auto put_stress = [&](Tensor<Pack, S> P) {
-        if constexpr (free_stretch) P = with_free_part(P, Pack(0.0));
+        if constexpr (free_stretch) put_free_part(P, Pack(0.0));
         store(P, b.P, b.stride, p);
         Pack total = P[0];
         PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += P[c];
