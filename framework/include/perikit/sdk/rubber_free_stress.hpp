@@ -47,22 +47,24 @@ class RubberFreeStress {
   }
 
   /// The polynomial of zeros() about rest, to second order: slope d - linear j + curvature d^2 + mixed d j - square j^2 - shear (c - 2 j).
-  /// Its zero is d = by_j j + by_square j^2 + by_shear (c - 2 j).
+  /// Its zero is d = by_j j + by_square j^2 + by_shear (c - 2 j). Divided by q^2 it has 2 (slope) less of curvature.
   struct Rest {
     T by_j, by_square, by_shear, curvature;
   };
   Rest rest() const noexcept {
     const double bulk = volumetric_ == Volumetric::quadratic ? 24 : 10.5;
-    const T linear = (plane ? 6.0 : 3.0) * (C1_ + C2_), inverse = reciprocal(T((plane ? 2.0 : 1.0) * linear + 3.0 * kappa_));
+    const T linear = (plane ? 6.0 : 3.0) * (C1_ + C2_), slope = (plane ? 2.0 : 1.0) * linear + 3.0 * kappa_, inverse = reciprocal(slope);
     const T curvature = plane ? T(54.0 * C1_ + 30.0 * C2_ + bulk * kappa_) : T(9.0 * C1_ + 12.0 * C2_ + bulk * kappa_);
     const T mixed = plane ? T(12.0 * (C2_ - C1_) + 6.0 * kappa_) : T(3.0 * kappa_ - 6.0 * C1_ - 12.0 * C2_);
     const T square = plane ? T(6.0 * C1_ + 12.0 * C2_) : T(3.0 * C1_), by_j = linear * inverse;
-    return {by_j, (square - by_j * (mixed + curvature * by_j)) * inverse, plane ? T((C1_ - C2_) * inverse) : T(0.0), curvature};
+    return {by_j, (square - by_j * (mixed + curvature * by_j)) * inverse, plane ? T((C1_ - C2_) * inverse) : T(0.0),
+            plane && !has_second ? T(curvature - 2.0 * slope) : curvature};
   }
 
   /// Where it vanishes, for several of these at once, so that they need not wait for each other: the free strains h, not a number where
   /// a few steps do not end at a zero that stress grows through, and the roots q = 1 + d of J = q^3 that go with them. The stress times
-  /// q^4 (1 + j)^2 in a plane, q^4 (1 + j) in a bar, is a polynomial of q and of the volumetric stress: no step needs a root or a power.
+  /// q^4 (1 + j)^2 in a plane (q^2 (1 + j)^2 without C2), q^4 (1 + j) in a bar, is a polynomial of q and of the volumetric stress: no step needs
+  /// a root or a power.
   template <std::size_t count>
   static void zeros(const std::array<RubberFreeStress, count>& of, const std::array<Rest, count>& rest, T* h, T* q) noexcept {
     if (of[0].volumetric_ == Volumetric::quadratic)
@@ -129,24 +131,23 @@ class RubberFreeStress {
     }
   }
 
-  /// The stress times q^4 (1 + j)^2, or (1 + j), over d = q - 1.
+  /// The stress times q^4 (1 + j)^2, q^2 (1 + j)^2 or q^4 (1 + j), over d = q - 1.
   template <Volumetric volumetric>
   FreeStress<T> polynomial(const T& d) const noexcept {
     const T J0 = 1.0 + j_, M = plane ? T(J0 * J0) : J0, c = c_ * M, q = 1.0 + d, q2 = q * q, v = d * (3.0 + d * (3.0 + d));  // v: J - 1
     const T pressure = volumetric_kirchhoff(volumetric, kappa_, v), bulk = volumetric_kirchhoff_slope(volumetric, kappa_, v);
-    const T on_pressure = M * (q2 * q2), bulk_slope = (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk), by_q = 3.0 * q2;
+    const T by_q = 3.0 * q2;
     if constexpr (plane) {
       const T sum = J0 + (1.0 + v), E = (v - j_) * sum, on_first = 2.0 * E - c, by_E = (2.0 + 2.0 * v) * by_q;  // E: e (1 + j)^2
-      FreeStress<T> at{(C1_ * q2) * on_first + on_pressure * pressure, (2.0 * C1_) * (q * on_first + q2 * by_E) + bulk_slope};
-      if constexpr (has_second) {
-        at.value += C2_ * ((2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_))));
-        at.slope += (C2_ * (2.0 + c_)) * by_E;
-      }
-      return at;
+      if constexpr (!has_second)
+        return {C1_ * on_first + (M * q2) * pressure, (2.0 * C1_) * by_E + (M * q) * (2.0 * pressure + 3.0 * bulk)};
+      const T on_second = (2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_)));
+      return {(C1_ * q2) * on_first + C2_ * on_second + (M * (q2 * q2)) * pressure,
+              (2.0 * C1_) * (q * on_first + q2 * by_E) + (C2_ * (2.0 + c_)) * by_E + (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk)};
     } else {
       const T difference = (v - j_) - c, second = by_C2(inverse_), both = has_second ? T(C1_ * q2 + second * (1.0 + v)) : T(C1_ * q2);
       const T slope = has_second ? T(2.0 * C1_ * q + second * by_q) : T(2.0 * C1_ * q);
-      return {both * difference + on_pressure * pressure, slope * difference + both * by_q + bulk_slope};
+      return {both * difference + (M * (q2 * q2)) * pressure, slope * difference + both * by_q + (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk)};
     }
   }
 
