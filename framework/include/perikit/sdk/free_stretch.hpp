@@ -16,7 +16,7 @@ Tensor<T, S> free_direction() noexcept {
   return Tensor<T, S>::build([](int i, int j) { return T(i == j && i >= S::dimension ? 1.0 : 0.0); });
 }
 
-/// a <- a with s along the free axes. In place where it is to stay in memory: a copy of a whole tensor goes through registers that are half as wide.
+/// a <- a with s along the free axes, without a copy of the tensor.
 template <class T, class S, class U>
 void put_free_part(Tensor<T, S>& a, const U& s) noexcept {
   for (int i = S::dimension; i < 3; ++i) a(i, i) = s;
