@@ -13,12 +13,6 @@ struct LaneStresses {
 
   /// sigma = P F^T / det F; not stored without `tensors`.
   LaneStresses(int n, Space space, const BatchScratch& s, bool tensors = true) noexcept {
-    tensors ? find<true>(n, space, s) : find<false>(n, space, s);
-  }
-
- private:
-  template <bool tensors>
-  void find(int n, Space space, const BatchScratch& s) noexcept {
     const int d = dimension(space), components = tensor_components(space);
     const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
     for (int l = 0; l < n; l += pack_width) {
@@ -37,10 +31,10 @@ struct LaneStresses {
       const Pack over_J = 1.0 / (F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) - F[0][1] * (F[1][0] * F[2][2] - F[1][2] * F[2][0]) +
                                  F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]));
       Pack t[3][3];
-      PERIKIT_UNROLL for (int a = 0; a < 3; ++a)
-        PERIKIT_UNROLL for (int b = tensors ? 0 : a; b < 3; ++b) {   // what is below the diagonal is for those who ask for it
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) {
           t[a][b] = (P[a][0] * F[b][0] + P[a][1] * F[b][1] + P[a][2] * F[b][2]) * over_J;
-          if constexpr (tensors) t[a][b].store(sigma[3 * a + b] + l);
+          if (tensors) t[a][b].store(sigma[3 * a + b] + l);
         }
       const Pack xy = t[0][1] * t[0][1] + t[1][2] * t[1][2] + t[0][2] * t[0][2];
       const Pack dx = t[0][0] - t[1][1], dy = t[1][1] - t[2][2], dz = t[2][2] - t[0][0];

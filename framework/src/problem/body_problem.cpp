@@ -126,9 +126,9 @@ std::uint64_t fingerprint_of(ConstFieldView u) {
 
 EvaluationStatus BodyProblem::sample(PointSamples& samples) {
   const ConstFieldView u = state().displacement();
-  const bool there = kept_.asked != Sampling::nothing && kept_.asked == samples.asked && kept_at_ == fingerprint_of(u);
+  const bool there = kept_ && kept_->asked == samples.asked && kept_at_ == fingerprint_of(u);
   if (!there) return terms().sample(seen(u, seen_), samples);
-  samples = std::exchange(kept_, {.asked = Sampling::nothing});
+  samples = *std::exchange(kept_, std::nullopt);
   return {};
 }
 
@@ -147,13 +147,14 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status;
-  kept_ = {.asked = std::exchange(along_, Sampling::nothing)};
+  kept_.reset();
+  const Sampling asked = std::exchange(along_, Sampling::nothing);
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (history || ghosts_ || parts_.fracture.damage()) kept_.asked = Sampling::nothing;
-  if (kept_.asked != Sampling::nothing) {
-    status = terms().forces_and_samples(seen(u, seen_), force, energy, kept_);
+  if (asked != Sampling::nothing && !history && !ghosts_ && !parts_.fracture.damage()) {
+    PointSamples samples{.asked = asked};
+    status = terms().forces_and_samples(seen(u, seen_), force, energy, samples);
+    if (status.ok()) kept_ = std::move(samples);
     kept_at_ = fingerprint_of(u);
-    if (!status.ok()) kept_ = {.asked = Sampling::nothing};
   } else if (!ghosts_) {
     status = terms().forces(seen(u, seen_), force, energy);
   } else if (!images()) {

@@ -151,7 +151,7 @@ class BodyProblem final : public Problem {
   BondReaction reaction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
   Sampling along_ = Sampling::nothing;   ///< with the next one
-  PointSamples kept_{.asked = Sampling::nothing};   ///< with the last one; nothing asked for: none
+  std::optional<PointSamples> kept_;     ///< with the last one
   std::uint64_t kept_at_ = 0;            ///< fingerprint of their displacements
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
