@@ -91,6 +91,7 @@ class ThreadsModel final : public Observer {
 struct Row {
   std::string kinematics, material;
   int dimension = 3;
+  std::string lateral = "strain";   ///< what is zero across planes and lines: "strain", "stress"
   bool cloud = false;
   std::size_t points = 0;
   double step = INFINITY, bytes = 0, set_up = INFINITY, tangent = INFINITY, assembly = NAN, operations = NAN;
@@ -116,9 +117,7 @@ std::string scene_of(const Row& row, const std::string& kinematics, const std::s
       "[family]\nhorizon_ratio = 3.015\n{}[kinematics]\n{}\n[material]\n{}\n"
       "[initial]\ndisplacement = {}\nvelocity = {}\n[integrator]\ntype = \"verlet\"\ntime_step = 1e-4\nend_time = {}\n",
       dimension,
-      dimension == 2   ? "plane = \"strain\"\n"
-      : dimension == 1 ? "line = \"strain\"\n"
-                       : "",
+      dimension == 3 ? "" : fmt::format("{} = \"{}\"\n", dimension == 2 ? "plane" : "line", row.lateral),
       vector({0}), vector(cells), row.cloud ? "jitter = 0.2\n" : "",
       row.cloud ? "consistent = false\n" : "",  // set-up is the search of families
       kinematics, material, words("1e-3 * sin(x)"), words("1e-3 * cos(x)"), 1e-4 * steps);
@@ -193,13 +192,27 @@ std::string json_of(const MachineLimits& limits, const std::vector<Row>& rows) {
       limits.threads, number(limits.triad_all), number(limits.multiply_add_all), number(limits.gather_all));
   for (const Row& row : rows)
     text += fmt::format(
-        "{}\n    {{\"kinematics\": \"{}\", \"material\": \"{}\", \"dimension\": {}, \"body\": \"{}\", \"points\": {}, \"step_ns\": {}, "
+        "{}\n    {{\"kinematics\": \"{}\", \"material\": \"{}\", \"dimension\": {}, \"body\": \"{}\", \"points\": {}, \"lateral\": {}, \"step_ns\": {}, "
         "\"bytes\": {}, \"operations\": {}, \"of_triad\": {}, \"of_multiply_add\": {}, \"set_up_ns\": {}, \"tangent_action_ns\": {}, \"assembly_ns\": {}}}",
-        &row == rows.data() ? "" : ",", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice", row.points, number(1e9 * row.step),
+        &row == rows.data() ? "" : ",", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice", row.points,
+        row.dimension == 3 ? "null" : fmt::format("\"{}\"", row.lateral), number(1e9 * row.step),
         number(row.bytes), number(row.operations), number(traffic(row) / limits.triad_all), number(arithmetic(row) / limits.multiply_add_all),
         number(1e9 * row.set_up), number(1e9 * row.tangent), number(1e9 * row.assembly));
   return text + "\n  ]\n}\n";
 }
+
+/// Dimensions, with what is zero across planes and lines.
+std::vector<std::pair<int, std::string>> spaces(const BenchOptions& options) {
+  std::vector<std::pair<int, std::string>> all;
+  for (const int dimension : options.dimensions) {
+    if (dimension == 3) all.emplace_back(dimension, "strain");
+    else for (const std::string& lateral : options.lateral) all.emplace_back(dimension, lateral);
+  }
+  return all;
+}
+
+/// "2", or "2 stress" in plane stress.
+std::string space_of(const Row& row) { return fmt::format("{}{}", row.dimension, row.lateral == "stress" ? " stress" : ""); }
 
 /// work(row, [kinematics], [material]) for every row that the options ask for; what it prints is shown as soon as it is there.
 template <class Work>
@@ -207,12 +220,12 @@ std::vector<Row> for_each_row(Registry& registry, const BenchOptions& options, W
   std::vector<Row> rows;
   for (const std::string& name : options.kinematics.empty() ? every_row(registry) : options.kinematics)
     for (const std::string& material : options.materials)
-      for (const int dimension : options.dimensions)
+      for (const auto& [dimension, lateral] : spaces(options))
         for (const bool cloud : {false, true}) {
           const std::size_t plus = name.find('+');
           const std::string part = name.substr(0, plus), example = registry.describe(Kind::kinematics, part).examples.front();
           const std::string stabilization = plus == name.npos ? "" : fmt::format("\nstabilization = \"{}\"", name.substr(plus + 1));
-          work(rows.emplace_back(Row{name, material, dimension, cloud}), fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
+          work(rows.emplace_back(Row{name, material, dimension, lateral, cloud}), fmt::format("type = \"{}\"\n{}{}", part, example, stabilization),
                fmt::format("type = \"{}\"\n{}", material, registry.describe(Kind::material, material).examples.front()));
           std::fflush(stdout);
         }
@@ -220,7 +233,7 @@ std::vector<Row> for_each_row(Registry& registry, const BenchOptions& options, W
 }
 
 void print_head(const Row& row) {
-  fmt::print("| {} | {} | {} | {} | ", row.kinematics, row.material, row.dimension, row.cloud ? "cloud" : "lattice");
+  fmt::print("| {} | {} | {} | {} | ", row.kinematics, row.material, space_of(row), row.cloud ? "cloud" : "lattice");
 }
 
 void model_threads(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
@@ -235,7 +248,7 @@ void model_threads(Registry& registry, Row& row, const std::string& kinematics, 
 }
 
 std::string key_of(const Row& row, const BenchOptions& options) {
-  return Operations::key(row.kinematics, row.material, row.dimension, row.cloud, sides(options.cells));
+  return Operations::key(row.kinematics, row.material, space_of(row), row.cloud, sides(options.cells));
 }
 
 void count(Registry& registry, const BenchOptions& options) {

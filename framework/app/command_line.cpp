@@ -72,6 +72,9 @@ void add_commands(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 3))
       ->allow_extra_args()
       ->capture_default_str();
+  bench_command->add_option("--plane", options.bench.lateral, "Planes and lines: zero strain or zero stress across them, or both in turn")
+      ->check(CLI::IsMember({"strain", "stress"}))
+      ->capture_default_str();
   bench_command->add_option("--cells", options.bench.cells, "Points along each side, or along x, y and z")
       ->check(CLI::Range(2, 100000000))
       ->expected(1, 3)

@@ -15,8 +15,8 @@ namespace {
 const std::string header = "kinematics,material,dimension,body,cells,operations";
 }
 
-std::string Operations::key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, const std::string& cells) {
-  return fmt::format("{},{},{},{},{}", kinematics, material, dimension, cloud ? "cloud" : "lattice", cells);
+std::string Operations::key(const std::string& kinematics, const std::string& material, const std::string& space, bool cloud, const std::string& cells) {
+  return fmt::format("{},{},{},{},{}", kinematics, material, space, cloud ? "cloud" : "lattice", cells);
 }
 
 Operations::Operations(const std::filesystem::path& file) {

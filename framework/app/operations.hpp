@@ -9,7 +9,8 @@ namespace perikit::app {
 /// with the header kinematics,material,dimension,body,cells,operations.
 class Operations {
  public:
-  static std::string key(const std::string& kinematics, const std::string& material, int dimension, bool cloud, const std::string& cells);
+  /// space: the dimension, "2 stress" and "1 stress" where stresses across the body are zero.
+  static std::string key(const std::string& kinematics, const std::string& material, const std::string& space, bool cloud, const std::string& cells);
 
   Operations() = default;
   /// Throws InputError naming file and line where it cannot be read.

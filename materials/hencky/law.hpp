@@ -52,11 +52,15 @@ struct Hencky {
 
   /// tau33 = 0 is linear in logarithms: ln(free stretch) = -lambda/(lambda + 2 mu) ln J over the plane, in a bar -lambda/(2
   /// (lambda + mu)) ln F11.
+  template <class S, class K>
+  K free_constants(const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    return {free_lambda<S>(lambda, mu), mu};
+  }
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;
-    const T plane = log1p(jacobian_minus_one(with_free_part(H, T(0.0))));
-    return expm1(-lambda / free_modulus<S>(lambda, mu) * plane);
+    return expm1(-lambda / free_modulus<S>(lambda, mu) * log1p(jacobian_minus_one(H)));
   }
 
  private:

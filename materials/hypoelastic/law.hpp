@@ -72,23 +72,17 @@ struct Hypoelastic {
     /// Derivative of the update at fixed state; not symmetric.
     template <class K>
     auto tangent(const Tensor<T, S>& H, const K& k) const noexcept {
-      const Stretch end(H);
-      const Tensor<T, S> change = increment(end), M = middle_inverse(end), s = stress + hooke(symmetric_part(change * M), k);
-      const T J = 1.0 + jacobian_minus_one(H);
-      const Tensor<T, S> second = J * rotate(end.inverse, s), cofactors = add_diagonal(cofactor_minus_identity(H), T(1.0));
-      return [=, lame = k](const Tensor<T, S>& dH) {
-        const Tensor<T, S> dC = T(2.0) * symmetric_part(dH + transpose_times(H, dH));
-        // dC = dU U + U dU in the principal axes of U
-        const Tensor<T, S> turned = rotate(transpose(end.axes), dC);
-        const Tensor<T, S> principal =
-            Tensor<T, S>::build_symmetric([&](int i, int j) { return turned(i, j) / (end.values[i] + end.values[j]); });
-        const Tensor<T, S> dU = rotate(end.axes, principal);
-        const Tensor<T, S> dstrain = symmetric_part(dU * M - T(0.5) * (change * rotate(M, dU)));
-        const Tensor<T, S> turning = end.inverse * dU * (end.inverse * s * end.inverse);
-        const Tensor<T, S> pulled = rotate(end.inverse, hooke(dstrain, lame)) - T(2.0) * symmetric_part(turning);
-        const Tensor<T, S> dsecond = (inner(cofactors, dH) / J) * second + J * pulled;
-        return dH * second + (dsecond + H * dsecond);
-      };
+      return derivative(H, k, k, [](const Tensor<T, S>&) { return T(0.0); });
+    }
+
+    /// Under s33 = 0: the strain along the free axes changes by -lambda/(lambda + 2 mu) tr (dstrain over the space), which leaves stresses there as
+    /// another lambda does, and stretches these axes by du/(1 + u) = de (2 + u0 + u)^2/(4 (1 + u0) (1 + u)).
+    template <class K>
+    auto free_tangent(const Tensor<T, S>& H, const K& k) const noexcept {
+      const auto& [lambda, mu] = k;
+      const T u0 = stretch(2, 2), u = H(2, 2), twice_middle = 2.0 + u0 + u;
+      const T by_trace = -((3 - S::dimension) * lambda) * (twice_middle * twice_middle) / (free_modulus<S>(lambda, mu) * (4.0 * (1.0 + u0) * (1.0 + u)));
+      return derivative(H, k, K{free_lambda<S>(lambda, mu), mu}, [by_trace](const Tensor<T, S>& dstrain) { return by_trace * trace(dstrain); });
     }
 
    private:
@@ -110,6 +104,28 @@ struct Hypoelastic {
         inverse = add_diagonal(compose(axes, inverse_less_one), T(1.0));
       }
     };
+
+    /// slope: constants of the increments of stress; volume(dstrain): what dJ/J is beside F^-T : dH.
+    template <class K, class Volume>
+    auto derivative(const Tensor<T, S>& H, const K& k, const K& slope, const Volume& volume) const noexcept {
+      const Stretch end(H);
+      const Tensor<T, S> change = increment(end), M = middle_inverse(end), s = stress + hooke(symmetric_part(change * M), k);
+      const T J = 1.0 + jacobian_minus_one(H);
+      const Tensor<T, S> second = J * rotate(end.inverse, s), cofactors = add_diagonal(cofactor_minus_identity(H), T(1.0));
+      return [=](const Tensor<T, S>& dH) {
+        const Tensor<T, S> dC = T(2.0) * symmetric_part(dH + transpose_times(H, dH));
+        // dC = dU U + U dU in the principal axes of U
+        const Tensor<T, S> turned = rotate(transpose(end.axes), dC);
+        const Tensor<T, S> principal =
+            Tensor<T, S>::build_symmetric([&](int i, int j) { return turned(i, j) / (end.values[i] + end.values[j]); });
+        const Tensor<T, S> dU = rotate(end.axes, principal);
+        const Tensor<T, S> dstrain = symmetric_part(dU * M - T(0.5) * (change * rotate(M, dU)));
+        const Tensor<T, S> turning = end.inverse * dU * (end.inverse * s * end.inverse);
+        const Tensor<T, S> pulled = rotate(end.inverse, hooke(dstrain, slope)) - T(2.0) * symmetric_part(turning);
+        const Tensor<T, S> dsecond = (inner(cofactors, dH) / J + volume(dstrain)) * second + J * pulled;
+        return dH * second + (dsecond + H * dsecond);
+      };
+    }
 
     Tensor<T, S> increment(const Stretch& end) const noexcept { return end.U - stretch; }
     /// ((U0 + U1)/2)^-1

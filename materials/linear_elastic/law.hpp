@@ -37,6 +37,12 @@ struct LinearElastic {
     return [this, k](const Tensor<T, S>& dH) { return P(dH, k); };
   }
 
+  /// P33 = 0 is linear in H.
+  template <class S, class K>
+  K free_constants(const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    return {free_lambda<S>(lambda, mu), mu};
+  }
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;

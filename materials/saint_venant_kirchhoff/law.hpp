@@ -36,14 +36,32 @@ struct SaintVenantKirchhoff {
 
   /// S33 = 0 is linear in C - I: C33 - 1 = -lambda/(lambda + 2 mu) tr (C - I over the plane), in a bar -lambda/(2 (lambda + mu))
   /// (C11 - 1).
+  template <class S, class K>
+  K free_constants(const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    return {free_lambda<S>(lambda, mu), mu};
+  }
+  /// C33 > 0.
+  template <class T, class S, class K>
+  auto stretches_freely(const Tensor<T, S>& H, const K& k) const noexcept {
+    const auto& [lambda, mu] = k;
+    return lambda * given_strain(H) < free_modulus<S>(lambda, mu);
+  }
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;
-    T plane = 0.0;
-    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
-    for (int i = 0; i < S::dimension; ++i) plane += c(i, i);
-    const T square = -lambda / free_modulus<S>(lambda, mu) * plane;
+    const T square = -lambda / free_modulus<S>(lambda, mu) * given_strain(H);
     return square / (1.0 + sqrt(1.0 + square));
+  }
+
+ private:
+  /// tr(C - I) over the body's space.
+  template <class T, class S>
+  static T given_strain(const Tensor<T, S>& H) noexcept {
+    const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
+    T sum = c(0, 0);
+    for (int i = 1; i < S::dimension; ++i) sum += c(i, i);
+    return sum;
   }
 };
 

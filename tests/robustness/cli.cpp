@@ -384,15 +384,17 @@ TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and 
 TEST_CASE("cli: bench gives a table and the same figures for other programs") {
   const Desk desk(plate);
   const std::string counts = "kinematics,material,dimension,body,cells,operations\n";
-  desk.write("counts.csv", counts + "sub_horizon,hencky,2,lattice,5,1234.5\nsub_horizon,hencky,2,cloud,5,2345.5\n");
-  const std::string command = "bench --cells 5 --kinematics sub_horizon --material hencky --dimension 2";
+  desk.write("counts.csv", counts + "sub_horizon,hencky,2,lattice,5,1234.5\nsub_horizon,hencky,2,cloud,5,2345.5\n"
+             "sub_horizon,hencky,2 stress,lattice,5,3456.5\nsub_horizon,hencky,2 stress,cloud,5,4567.5\n");
+  const std::string command = "bench --cells 5 --kinematics sub_horizon --material hencky --dimension 2 --plane strain stress";
   const Result result = desk.perikit(command + " --operations counts.csv --assembly --json figures.json");
   INFO(result.err);
   REQUIRE(result.status == 0);
   CHECK(contains(result.out, "| sub_horizon | hencky | 2 | lattice |"));
   CHECK(contains(result.out, "| sub_horizon | hencky | 2 | cloud |"));
+  CHECK(contains(result.out, "| sub_horizon | hencky | 2 stress | cloud |"));
   const std::string figures = desk.text("figures.json");
-  for (const std::string word : {"\"triad_GB_per_s\": ", "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25"})
+  for (const std::string word : {"\"triad_GB_per_s\": ", "\"kinematics\": \"sub_horizon\", \"material\": \"hencky\", \"dimension\": 2, \"body\": \"cloud\", \"points\": 25, \"lateral\": \"strain\"", "\"points\": 25, \"lateral\": \"stress\""})
     CHECK_MESSAGE(contains(figures, word), word, " is missing in ", figures);
   CHECK_MESSAGE(!contains(figures, "null"), figures);
   CHECK(contains(figures, "\"operations\": 2345.5, \"of_triad\": "));

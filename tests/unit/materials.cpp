@@ -129,8 +129,27 @@ TEST_CASE("missing pieces by forward differentiation equal the written ones") {
 
 namespace {
 
-/// Plane and uniaxial stress at stretches from 1/20 to 20: the solid at the free stretch has no stress along it, and the same stress.
-void check_extreme_stretches(const Material& material, const std::vector<double>& constants, const std::string& what) {
+/// dP for a given dH where the lateral strains of H keep free of stress, in extended precision. lateral: nearly that strain.
+template <class S, class Law>
+contract::Values freed_tangent(const Law& law, const std::vector<double>& constants, const contract::Values& H, double lateral, const contract::Values& dH) {
+  using Long = long double;
+  std::array<Long, Law::traits.constants> k;
+  std::copy(constants.begin(), constants.end(), k.begin());
+  const auto tensor = [](const contract::Values& a, Long free) { return with_free_part(Tensor<Long, S>::map([&](int c) { return Long(a[c]); }), free); };
+  const Tensor<Long, S> N = free_direction<Long, S>();
+  Long h = lateral;
+  for (int step = 0; step < 3; ++step) h -= inner(N, stress(law, tensor(H, h), k)) / inner(N, tangent(law, tensor(H, h), k)(N));
+  const auto action = tangent(law, tensor(H, h), k);
+  const Tensor<Long, S> given = action(tensor(dH, 0)), freed = action(N);
+  contract::Values dP;
+  for (int c = 0; c < S::components; ++c) dP.push_back(static_cast<double>(given[c] - inner(N, given) / inner(N, freed) * freed[c]));
+  return dP;
+}
+
+/// Plane and uniaxial stress at stretches from 1/20 to 20: the solid at the free stretch has no stress along it, the same stress, and the same tangent.
+template <class Law>
+void check_extreme_stretches(const Law& law, const std::vector<double>& constants, const std::string& what) {
+  const LawMaterial<Law> material(law);
   const double stretches[] = {0.05, 0.2, 0.6, 0.95, 1 - 1e-9, 1.0, 1.0001, 1.4, 3, 20};
   std::vector<contract::Values> planes, lines, solids;
   for (const double a : stretches) {
@@ -139,7 +158,10 @@ void check_extreme_stretches(const Material& material, const std::vector<double>
       for (const double shear : {0.0, 0.4}) planes.push_back({a - 1, shear * a, -0.3 * shear * b, b - 1, 0});
   }
   for (const auto& [space, points] : {std::pair(Space::plane_stress, planes), std::pair(Space::line_stress, lines)}) {
-    const Evaluation free(material, space, constants, points);
+    contract::Random random(3);
+    std::vector<contract::Values> directions;
+    for (std::size_t p = 0; p < points.size(); ++p) directions.push_back(contract::random_direction(random, space));
+    const Evaluation free(material, space, constants, points, directions);
     CHECK_MESSAGE(free.status.ok(), what, ", ", name(space), ": no free stretch at point ", free.status.inadmissible);
     solids.clear();
     for (int p = 0; p < free.n; ++p) {
@@ -157,17 +179,22 @@ void check_extreme_stretches(const Material& material, const std::vector<double>
       CHECK_MESSAGE(std::abs(P[8]) <= rounding, what, ", ", name(space), ", point ", p, ": free stress ", P[8]);
       CHECK_MESSAGE(std::abs(P[0] - plane[0]) <= rounding, what, ", ", name(space), ", point ", p, ": P11 ", plane[0], ", expected ", P[0]);
       if (space == Space::plane_stress) CHECK_MESSAGE(std::abs(P[1] - plane[1]) <= rounding, what, ", point ", p, ": P12 ", plane[1], ", expected ", P[1]);
+      const contract::Values found = free.at(free.dP, p), expected = space == Space::plane_stress ? freed_tangent<Plane>(law, constants, points[p], free.lateral.data()[p], directions[p])
+                                                                                                   : freed_tangent<Line>(law, constants, points[p], free.lateral.data()[p], directions[p]);
+      for (std::size_t c = 0; c < expected.size(); ++c)
+        CHECK_MESSAGE(std::abs(found[c] - expected[c]) <= 4 * rounding, what, ", ", name(space), ", point ", p, ": dP ", c, " is ", found[c], ", expected ", expected[c]);
     }
   }
 }
 
 }  // namespace
 
-TEST_CASE("plane and uniaxial stress of rubber at extreme stretches") {
+TEST_CASE("plane and uniaxial stress at extreme stretches") {
+  check_extreme_stretches(Hencky(), {1.2, 0.8}, "hencky");
   for (const Volumetric form : {Volumetric::quadratic, Volumetric::logarithmic})
     for (const double kappa : {0.4, 3.0, 1e3, 1e6}) {
-      check_extreme_stretches(LawMaterial(NeoHookean{form}), {1.0, kappa}, "neo_hookean, bulk modulus " + std::to_string(kappa));
-      check_extreme_stretches(LawMaterial(MooneyRivlin{form}), {0.3, 0.2, kappa}, "mooney_rivlin, bulk modulus " + std::to_string(kappa));
+      check_extreme_stretches(NeoHookean{form}, {1.0, kappa}, "neo_hookean, bulk modulus " + std::to_string(kappa));
+      check_extreme_stretches(MooneyRivlin{form}, {0.3, 0.2, kappa}, "mooney_rivlin, bulk modulus " + std::to_string(kappa));
     }
 }
 
@@ -183,9 +210,15 @@ TEST_CASE("saint_venant_kirchhoff: uniaxial strain and uniaxial stress") {
     CHECK(stress.P.data()[0] == doctest::Approx(stretch * E * green).epsilon(1e-14));
     CHECK(stress.psi.data()[0] == doctest::Approx(E * green * green / 2).epsilon(1e-14));
   }
-  // E33 = -lambda/(lambda + 2 mu) (E11 + E22) < -1/2: no thickness is left to carry
-  const Evaluation beyond(material, Space::plane_stress, std::vector{lambda, mu}, {{0.1, 0, 0, 0, 0}, {1.5, 0, 0, 1.5, 0}});
-  CHECK(beyond.status.inadmissible == 1);
+  // E33 = -lambda/(lambda + 2 mu) (E11 + E22) < -1/2, in a bar -lambda/(2 (lambda + mu)) E11: no thickness is left to carry
+  for (const double part : {1 - 1e-12, 1 + 1e-12}) {
+    const double plane = std::sqrt(1 + part * (lambda + 2 * mu) / (2 * lambda)) - 1, bar = std::sqrt(1 + part * 2 * (lambda + mu) / lambda) - 1;
+    const int refused = part > 1 ? 1 : -1;
+    const Evaluation sheet(material, Space::plane_stress, std::vector{lambda, mu}, {{0.1, 0, 0, 0, 0}, {plane, 0, 0, plane, 0}});
+    CHECK(sheet.status.inadmissible == refused);
+    const Evaluation wire(material, Space::line_stress, std::vector{lambda, mu}, {{0.1, 0, 0}, {bar, 0, 0}});
+    CHECK(wire.status.inadmissible == refused);
+  }
 }
 
 TEST_CASE("neo_hookean: nearly incompressible tension and simple shear") {

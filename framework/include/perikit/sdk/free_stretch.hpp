@@ -50,6 +50,19 @@ Pack contraction_ratio(const Law& law, const K& k) noexcept {
   return q[0] / inner(free_direction<Pack, S>(), q);
 }
 
+/// Where lateral stress adds nothing but a multiple of the volume change to the stress in the body's space, as in laws linear in a measure of strain,
+/// zero lateral stress is zero lateral strain with other constants: law.free_constants<S>(k) of these, S confined. The law has free_stretch(H, k), too,
+/// with its own constants and H without lateral strain, and, where not every admissible H has one, stretches_freely(H, k) -> lanes that have.
+template <class Law, class S, class K>
+concept HasFreeConstants = requires(const Law& law, const K& k) {
+  { law.template free_constants<S>(k) } -> std::same_as<K>;
+};
+/// The lambda of isotropic laws of that kind.
+template <class S, class T>
+T free_lambda(const T& lambda, const T& mu) noexcept {
+  return (2.0 * mu) * lambda / free_modulus<S>(lambda, mu);
+}
+
 /// Kirchhoff stress along a free axis, and its derivative by the logarithm of the free stretch.
 template <class T>
 struct FreeStress {
@@ -67,8 +80,15 @@ concept HasFreeStress = requires(const Law& law, const Tensor<T, S>& H, const K&
   { law.free_stress(H, k)(h) } -> std::same_as<FreeStress<T>>;
 };
 
+/// Laws may know the tangent under zero free stress: law.free_tangent(H, k) returns dH -> dP, H with its free strain; free components of dH are zero,
+/// those of dP are not read.
+template <class Law, class T, class S, class K>
+concept HasFreeTangent = S::dimension < 3 && requires(const Law& law, const Tensor<T, S>& H, const K& k) {
+  { law.free_tangent(H, k)(H) } -> std::same_as<Tensor<T, S>>;
+};
+
 /// An equation may solve itself: zeros(several of it, what rest() of each gives, h, q) -> H33, NaN where it does not, and the cube root q
-/// of J; stress(H, q) is P there.
+/// of J; stress(H, q) is P there, tangent(H, q) dH -> dP as of HasFreeTangent.
 template <class Law, class T, class S, class K>
 concept HasFreeZeros = requires(const Law& law, const Tensor<T, S>& H, const K& k, T& q) {
   law.free_stress(H, k).zeros(std::array{law.free_stress(H, k)}, std::array{law.free_stress(H, k).rest()}, &q, &q);
@@ -156,7 +176,7 @@ Pack free_strain(const Law& law, const Tensor<Pack, S>& H, const K& k, Pack rati
   return select(good, h, Pack(0.0));
 }
 
-inline constexpr int free_zero_packs = 4;
+inline constexpr int free_zero_packs = 2;
 
 /// Free strains of some packs of points at a time, and what the stress takes from them, of laws with HasFreeZeros.
 template <class Law, class S, class K>
@@ -187,14 +207,15 @@ class FreeZeros {
     const Tensor<Pack, S> H = admissible_given_part<false>(whole, good);
     const PackMask found = strain[i] == strain[i];
     strain[i] = select(found, strain[i], free_strain<false>(law, H, k, contraction_ratio<S>(law, k), good));
-    root[i] = select(found, root[i], cbrt(1.0 + jacobian_minus_one(with_free_part(H, strain[i]))));
+    const Pack free = 1.0 + strain[i], area = S::dimension == 2 ? free : Pack(free * free);
+    root[i] = select(found, root[i], cbrt((1.0 + jacobian_minus_one(H)) * area));  // a product keeps the digits of small volumes
     strain[i] = select(good, strain[i], Pack(std::numeric_limits<double>::quiet_NaN()));
   }
 
   std::array<typename Equation::Rest, packs> rest_;
 };
 
-/// dH -> dP under zero free stress: dP = A : (dH + N dh) with N : dP = 0.
+/// dH -> dP under zero free stress: dP = A : (dH + N dh) with N : dP = 0. Free components of dH are zero.
 template <class Law, class S, class K>
 auto condensed_tangent(const Law& law, const Tensor<Pack, S>& H, const K& k) noexcept {
   auto full = tangent(law, H, k);

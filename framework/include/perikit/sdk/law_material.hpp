@@ -19,7 +19,8 @@
 /// accept every finite H. Uniaxial stress needs an isotropic law (both free stretches are taken equal).
 ///
 /// Faster, where a root or a division stands at the beginning of all of them: invariants(H), which psi, P and tangent then take as a third
-/// argument (perikit/sdk/differentiation.hpp; rubber_invariants.hpp has those of rubber).
+/// argument (perikit/sdk/differentiation.hpp; rubber_invariants.hpp has those of rubber). In plane and uniaxial stress: the free stretch, its equation,
+/// the tangent that it leaves, or constants with which zero lateral strain has the same stress (perikit/sdk/free_stretch.hpp).
 
 #include <algorithm>
 #include <array>
@@ -71,7 +72,11 @@ class LawMaterial final : public Material {
   }
 
  private:
+  using Constants = std::array<Pack, Law::traits.constants>;
   static constexpr bool small_strain_law = !Law::traits.objective;
+  /// Zero lateral stress: as zero lateral strain with other constants where the law has them.
+  template <class Confined, class Open>
+  using Free = std::conditional_t<HasFreeConstants<Law, Confined, Constants>, Confined, Open>;
   /// Whether psi or P of H = 0 is not exactly zero for some constants that were made: of this law whatever its parameters, since
   /// taking off zero changes nothing.
   inline static std::atomic<bool> offset_at_rest_ = false;
@@ -83,11 +88,11 @@ class LawMaterial final : public Material {
       case Space::plane_strain:
         return strain<ConfinedPlane, Plane>(batch);
       case Space::plane_stress:
-        return run<Plane, true>(batch);
+        return run<Free<ConfinedPlane, Plane>, true>(batch);
       case Space::line_strain:
         return strain<ConfinedLine, Line>(batch);
       case Space::line_stress:
-        return run<Line, true>(batch);
+        return run<Free<ConfinedLine, Line>, true>(batch);
     }
     return {0};
   }
@@ -140,8 +145,6 @@ class LawMaterial final : public Material {
     }
     return run<Open, false>(b);
   }
-
-  using Constants = std::array<Pack, Law::traits.constants>;
 
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
     Constants k;
@@ -229,6 +232,13 @@ class LawMaterial final : public Material {
     }
   }
 
+  /// The equation of a free strain, and the root of J where it vanishes.
+  template <class Equation>
+  struct FreeRoot {
+    const Equation& equation;
+    const Pack& root;
+  };
+
   template <class S, bool own>
   static auto zeros_of_batch() noexcept {
     if constexpr (own)
@@ -248,18 +258,21 @@ class LawMaterial final : public Material {
 
   template <class S, bool free_stretch>
   PERIKIT_FLATTEN Status run(const MaterialBatch& b) const noexcept {
+    constexpr bool own_constants = free_stretch && S::confined;
     constexpr bool own_zeros = free_stretch && HasFreeZeros<Law, Pack, S, Constants>;
     Status status;
-    Constants k = load_constants(b, 0);
-    Pack ratio = 0.0;
+    Constants k, given;  // given: where k are those of zero lateral strain
+    [[maybe_unused]] Pack ratio = 0.0;
     [[maybe_unused]] decltype(zeros_of_batch<S, own_zeros>()) zeros;
-    if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
+    const auto begin_constants = [&](int p) {
+      k = given = load_constants(b, p);
+      if constexpr (own_constants) k = law_.template free_constants<S>(given);
+      else if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
+    };
+    begin_constants(0);
     [[maybe_unused]] auto ahead = make_ahead<S, free_stretch>();
     for (int p = 0; p < b.n; p += pack_width) {
-      if (b.constant_stride != 0) {
-        k = load_constants(b, p);
-        if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
-      }
+      if (b.constant_stride != 0) begin_constants(p);
       decltype(auto) law = law_at<S>(b, p);
       Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
       PackMask good = Pack(0.0) == Pack(0.0);
@@ -270,7 +283,9 @@ class LawMaterial final : public Material {
         put_free_part(H, zeros.strain[in_group]);
         good = zeros.strain[in_group] == zeros.strain[in_group];
       } else {
-        if constexpr (free_stretch) {
+        if constexpr (own_constants) {
+          if constexpr (requires { law.stretches_freely(H, given); }) good = law.stretches_freely(H, given);
+        } else if constexpr (free_stretch) {
           H = admissible_given_part<small_strain_law>(H, good);
           put_free_part(H, free_strain<small_strain_law>(law, H, k, ratio, good));
         }
@@ -279,7 +294,10 @@ class LawMaterial final : public Material {
         }
         good &= admissible(H, ahead[at]);
       }
-      if (b.lateral) H[S::components - 1].store(b.lateral + p);
+      if (b.lateral) {
+        if constexpr (own_constants) law.free_stretch(H, given).store(b.lateral + p);
+        else H[S::components - 1].store(b.lateral + p);
+      }
 
       Pack probe = 0.0;  // turns to NaN where an output is not finite
       const auto put_energy = [&](Pack psi) {
@@ -318,7 +336,10 @@ class LawMaterial final : public Material {
           if (b.P) put_stress(P);
         }
       }
-      if (b.dP || b.A) tangents<S, free_stretch>(law, b, p, H, k, ahead[at]);
+      if (b.dP || b.A) {
+        if constexpr (own_zeros) tangents<S, free_stretch>(law, b, p, H, k, FreeRoot{zeros.equation[in_group], zeros.root[in_group]});
+        else tangents<S, free_stretch>(law, b, p, H, k, ahead[at]);
+      }
       good &= probe == 0.0;
       if (!all(good)) [[unlikely]]
         clear(b, S::components, state_size<Law, S>(), p, good, status);
@@ -330,21 +351,26 @@ class LawMaterial final : public Material {
   [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
                                                        const Constants& k, [[maybe_unused]] const Invariants& of) noexcept {
     const auto action = [&] {
-      if constexpr (free_stretch)
+      if constexpr (free_stretch && HasFreeZeros<Law, Pack, S, Constants>)
+        return of.equation.tangent(H, of.root);
+      else if constexpr (free_stretch && HasFreeTangent<StepLaw, Pack, S, Constants>)
+        return law.free_tangent(H, k);
+      else if constexpr (free_stretch && !S::confined)
         return condensed_tangent(law, H, k);
       else if constexpr (looks_ahead<S, free_stretch>)
         return tangent(law, H, k, of);
       else
         return tangent(law, H, k);
     }();
-    if (b.dP) store(action(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
-    if constexpr (!S::confined) {
+    const auto along = [&](Tensor<Pack, S> direction) {
+      if constexpr (!free_stretch) return action(direction);
+      else return put_free_part(direction, Pack(0.0)), with_free_part(action(direction), Pack(0.0));
+    };
+    if (b.dP) store(along(load<S>(b.dH, b.stride, p)), b.dP, b.stride, p);
+    if constexpr (free_stretch || !S::confined) {
       if (!b.A) return;
 #pragma GCC unroll 1
-      for (int c = 0; c < S::components; ++c) {
-        Tensor<Pack, S> direction = Tensor<Pack, S>::unit(c);
-        store(action(direction), b.A + c * b.stride, S::components * b.stride, p);
-      }
+      for (int c = 0; c < S::components; ++c) store(along(Tensor<Pack, S>::unit(c)), b.A + c * b.stride, S::components * b.stride, p);
     }
   }
 

@@ -93,6 +93,46 @@ class RubberFreeStress {
     return P;
   }
 
+  /// dH -> dP there. With x the determinant of the block F of the space, X = ln x, t = tr F F^T, y = b33 = exp(2 z) in a plane and exp(z) in a bar,
+  /// psi(t, X, z) is least where the free stress vanishes; what is left there of its second derivatives is
+  ///   W_tt = -psi_tz^2/psi_zz,  W_tX = psi_tX - psi_tz psi_Xz/psi_zz,  W_XX = psi_XX - psi_Xz^2/psi_zz,
+  /// multiplied out, so that no term is a difference (psi_zz = c + B with the slope B of the volumetric stress; in a bar the isochoric part depends on
+  /// X - z/2 alone). With these
+  ///   P = 2 psi_t F + psi_X F^-T,  dt = 2 F : dF,  dX = F^-T : dF,  d(cof F) = cof(dF)
+  auto tangent(const Tensor<T, S>& H, const T& q) const noexcept {
+    const T q2 = q * q, J = q * q2, stretch = J * inverse_, y = plane ? T(stretch * stretch) : stretch, x = 1.0 + j_;
+    const T s = reciprocal(q2), first = C1_ * s, second = by_C2(s * s), bulk = volumetric_kirchhoff_slope(volumetric_, kappa_, T(J - 1.0));
+    if constexpr (plane) {
+      const T t = 2.0 + c_, x2 = x * x, ty = t * y;
+      const T c = (2.0 / 3) * (first * (t + 4.0 * y) + second * (4.0 * x2 + ty)), inverse_slope = reciprocal(T(bulk + c));
+      const T mixed = first * second, by_z = second * y - first, by_x = 3.0 * (second * (x2 - ty) - first * y);
+      const T WtX = (3.0 * (second * bulk) + 4.0 * (first * first + second * second * x2)) * y + 4.0 * (mixed * (x2 + ty + y * y));
+      const T WXX = 6.0 * (bulk * (first * y + second * (x2 + ty))) + 4.0 * (ty * (first * first + second * second * x2) + mixed * (x2 * t + ty * (t + y)));
+      const T on_F = 3.0 * (first + second * y), on_cofactor = by_x * inverse_;
+      const T FF = -4.0 * (by_z * by_z * inverse_slope), FG = -2.0 * (WtX * inverse_slope) * inverse_, GG = (WXX * inverse_slope - by_x) * (inverse_ * inverse_);
+      const T F00 = 1.0 + H(0, 0), F11 = 1.0 + H(1, 1), F01 = H(0, 1), F10 = H(1, 0);
+      return [=](const Tensor<T, S>& dH) {
+        const T &d00 = dH(0, 0), &d01 = dH(0, 1), &d10 = dH(1, 0), &d11 = dH(1, 1);
+        const T shape = F00 * d00 + F01 * d01 + F10 * d10 + F11 * d11, area = F11 * d00 - F10 * d01 - F01 * d10 + F00 * d11;
+        const T f = FF * shape + FG * area, g = FG * shape + GG * area;
+        Tensor<T, S> dP = dH;
+        dP(0, 0) = on_F * d00 + on_cofactor * d11 + (f * F00 + g * F11);
+        dP(1, 1) = on_F * d11 + on_cofactor * d00 + (f * F11 + g * F00);
+        dP(0, 1) = on_F * d01 - on_cofactor * d10 + (f * F01 - g * F10);
+        dP(1, 0) = on_F * d10 - on_cofactor * d01 + (f * F10 - g * F01);
+        return dP;
+      };
+    } else {
+      const T x2 = x * x, c = (1.0 / 3) * (first * (2.0 * x2 + y) + second * (y * (2.0 * y + x2)));
+      const T slope = (9.0 * (bulk * c) * reciprocal(T(bulk + c)) - 3.0 * (x2 - y) * (first + second * y)) * (inverse_ * inverse_);
+      return [=](const Tensor<T, S>& dH) {
+        Tensor<T, S> dP = dH;
+        dP(0, 0) = slope * dH(0, 0);
+        return dP;
+      };
+    }
+  }
+
  private:
   static constexpr bool plane = S::dimension == 2;
   static constexpr int most_steps = 6;
@@ -134,20 +174,18 @@ class RubberFreeStress {
   /// The stress times q^4 (1 + j)^2, q^2 (1 + j)^2 or q^4 (1 + j), over d = q - 1.
   template <Volumetric volumetric>
   FreeStress<T> polynomial(const T& d) const noexcept {
-    const T J0 = 1.0 + j_, M = plane ? T(J0 * J0) : J0, c = c_ * M, q = 1.0 + d, q2 = q * q, v = d * (3.0 + d * (3.0 + d));  // v: J - 1
-    const T pressure = volumetric_kirchhoff(volumetric, kappa_, v), bulk = volumetric_kirchhoff_slope(volumetric, kappa_, v);
-    const T by_q = 3.0 * q2;
+    const T J0 = 1.0 + j_, M = plane ? T(J0 * J0) : J0, K = M * kappa_, c = c_ * M, q = 1.0 + d, q2 = q * q, v = d * (3.0 + d * (3.0 + d)), J = 1.0 + v;
+    const T pressure = volumetric_kirchhoff(volumetric, K, v), bulk = volumetric_kirchhoff_slope(volumetric, K, v);
     if constexpr (plane) {
-      const T sum = J0 + (1.0 + v), E = (v - j_) * sum, on_first = 2.0 * E - c, by_E = (2.0 + 2.0 * v) * by_q;  // E: e (1 + j)^2
-      if constexpr (!has_second)
-        return {C1_ * on_first + (M * q2) * pressure, (2.0 * C1_) * by_E + (M * q) * (2.0 * pressure + 3.0 * bulk)};
-      const T on_second = (2.0 + c_) * E + (c - (2.0 * M) * (j_ * (2.0 + j_)));
-      return {(C1_ * q2) * on_first + C2_ * on_second + (M * (q2 * q2)) * pressure,
-              (2.0 * C1_) * (q * on_first + q2 * by_E) + (C2_ * (2.0 + c_)) * by_E + (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk)};
+      const T E = (v - j_) * (J0 + J), on_first = 2.0 * E - c, by_E = (6.0 * J) * q2;  // E: e (1 + j)^2, by_E: dE/dq
+      if constexpr (!has_second) return {C1_ * on_first + q2 * pressure, (2.0 * C1_) * by_E + q * (2.0 * pressure + 3.0 * bulk)};
+      const T C2t = C2_ * (2.0 + c_), first = C1_ * q;
+      return {(first * q) * on_first + (C2t * E + (C2_ * M) * (c_ - 2.0 * (j_ * (2.0 + j_)))) + (q * J) * pressure,
+              2.0 * (first * on_first) + (2.0 * (first * q) + C2t) * by_E + J * (4.0 * pressure + 3.0 * bulk)};
     } else {
-      const T difference = (v - j_) - c, second = by_C2(inverse_), both = has_second ? T(C1_ * q2 + second * (1.0 + v)) : T(C1_ * q2);
+      const T difference = (v - j_) - c, second = by_C2(inverse_), both = has_second ? T(C1_ * q2 + second * J) : T(C1_ * q2), by_q = 3.0 * q2;
       const T slope = has_second ? T(2.0 * C1_ * q + second * by_q) : T(2.0 * C1_ * q);
-      return {both * difference + (M * (q2 * q2)) * pressure, slope * difference + both * by_q + (M * (q * q2)) * (4.0 * pressure + 3.0 * bulk)};
+      return {both * difference + (q * J) * pressure, slope * difference + both * by_q + J * (4.0 * pressure + 3.0 * bulk)};
     }
   }
 
