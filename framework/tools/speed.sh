@@ -11,6 +11,7 @@ export OMP_WAIT_POLICY=passive
 out=$build/speed
 mkdir -p "$out"
 bench="$build/bin/perikit bench"
+stress="--dimension 2 1 --plane strain stress --kinematics baqp"
 
 if [ -z "$small" ]; then
   cmake --preset counting > /dev/null
@@ -25,6 +26,7 @@ if [ -z "$small" ]; then
   $bench --json "$out/bench.json" | tee "$out/bench.md"
   $bench $plane --json "$out/bench_plane.json" | tee "$out/bench_plane.md"
   $bench $line --json "$out/bench_line.json" | tee "$out/bench_line.md"
+  $bench $stress --cells 100 --material hencky hypoelastic linear_elastic mooney_rivlin neo_hookean saint_venant_kirchhoff | tee "$out/bench_stress.md"
   tests/benchmarks/lammps.sh | tee "$out/lammps.txt"
   "$build/bin/materials_benchmark" | tee "$out/materials.md"
   page=framework/docs/speed.md
@@ -33,6 +35,7 @@ else
   $bench --cells 6 --kinematics conventional baqp conventional+wan --json "$out/bench.json" | tee "$out/bench.md"
   $bench --cells 6 --kinematics conventional --dimension 2 | tee "$out/bench_plane.md"
   $bench --cells 6 --kinematics conventional --dimension 1 | tee "$out/bench_line.md"
+  $bench $stress --cells 6 | tee "$out/bench_stress.md"
   printf 'LAMMPS lps 1\nLAMMPS pmb 1\n' > "$out/lammps.txt"
   : > "$out/materials.md"
   page=$out/speed.md
@@ -58,6 +61,18 @@ laws_table() {
             print "|---|---|---|---|---|---|" }
     $3 == "solid" { stress = $4; tangent = $9; share = $7 ", " $12 }
     $3 == "plane strain" { printf "| `%s` | %s | %s | %s | %s | %s |\n", $2, stress, $4, tangent, $9, share }' "$out/materials.md"
+}
+
+# What zero stress across planes and lines costs over zero strain, a line a law and body.
+stress_table() {
+  awk -F' *[|] *' '
+    BEGIN { print "| law | body | plane stress: step [ns] | over plane strain | tangent action [ns] | over plane strain | uniaxial stress: step [ns] | over uniaxial strain | tangent action [ns] | over uniaxial strain |"
+            print "|---|---|---|---|---|---|---|---|---|---|" }
+    $4 ~ /^[12]$/ { step[$3, $4, $5] = $6; action[$3, $4, $5] = $12 }
+    $4 ~ /stress/ { d = substr($4, 1, 1)
+                    cell[d] = sprintf("%s | %.2f | %s | %.2f", $6, $6 / step[$3, d, $5], $12, $12 / action[$3, d, $5])
+                    if (!(($3, $5) in plane)) plane[$3, $5] = cell[d]
+                    else printf "| `%s` | %s | %s | %s |\n", $3, $5, plane[$3, $5], cell[d] }' "$out/bench_stress.md"
 }
 
 # The lines between <!-- NAME --> and <!-- end NAME --> of how_fast.md become standard input.
@@ -87,6 +102,8 @@ printf 'There: %s.\nOn the same machine, the same 32^3 lattice and one core, Deb
   sed 1,2d "$out/bench_plane.md"
   printf '\n## Kinematics, 1D\n\n'
   sed 1,2d "$out/bench_line.md"
+  printf '\n## Zero stress across planes and lines\n\n`perikit bench %s --cells 100 --material ...`\n\n' "$stress"
+  stress_table
   printf '\n## LAMMPS, the same lattice\n\n`tests/benchmarks/lammps.sh`, right after: linear peridynamic solid (`lps`) %s ns a point and step, bond-based (`pmb`) %s ns.\n' "$lps" "$pmb"
   printf '\n## Laws\n\nBatches of 128 points through the virtual call; operations counted by a scalar that knows what it shares.\n\n'
   cat "$out/materials.md"

@@ -62,10 +62,11 @@ struct Hypoelastic {
     T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {
       const auto& [lambda, mu] = k;
       const Stretch end(with_free_part(H, T(0.0)));
-      const Tensor<T, S> given = symmetric_part(increment(end) * middle_inverse(end));
-      T plane = 0.0;
-      for (int i = 0; i < S::dimension; ++i) plane += given(i, i);
-      const T e = -(stress(2, 2) + lambda * plane) / free_modulus<S>(lambda, mu);
+      const Tensor<T, S> change = increment(end), M = inverse(with_free_part(middle(end), T(1.0)));
+      T given = 0.0;   // the trace over the space
+      for (int i = 0; i < S::dimension; ++i)
+        for (int j = 0; j < S::dimension; ++j) given += change(i, j) * M(j, i);
+      const T e = -(stress(2, 2) + lambda * given) / free_modulus<S>(lambda, mu);
       return (2.0 * stretch(2, 2) + e * (2.0 + stretch(2, 2))) / (2.0 - e);
     }
 
@@ -95,8 +96,13 @@ struct Hypoelastic {
         const Spectral<T, S> e = spectral(right_cauchy_green_minus_identity(H));
         T less_one[3], inverse_less_one[3];
         for (int i = 0; i < 3; ++i) {
-          values[i] = sqrt(1.0 + e.values[i]);
-          less_one[i] = e.values[i] / (1.0 + values[i]);
+          if (S::dimension == 1 || i >= S::dimension) {  // F is diagonal there
+            values[i] = 1.0 + H(i, i);
+            less_one[i] = H(i, i);
+          } else {
+            values[i] = sqrt(1.0 + e.values[i]);
+            less_one[i] = e.values[i] / (1.0 + values[i]);
+          }
           inverse_less_one[i] = -less_one[i] / values[i];
         }
         axes = e.vectors;
@@ -128,11 +134,11 @@ struct Hypoelastic {
     }
 
     Tensor<T, S> increment(const Stretch& end) const noexcept { return end.U - stretch; }
-    /// ((U0 + U1)/2)^-1
-    Tensor<T, S> middle_inverse(const Stretch& end) const noexcept {
-      const Tensor<T, S> middle = add_diagonal(T(0.5) * (stretch + end.U), T(1.0));
-      return (T(1.0) / determinant(middle)) * cofactor(middle);
-    }
+    /// (U0 + U1)/2
+    Tensor<T, S> middle(const Stretch& end) const noexcept { return add_diagonal(T(0.5) * (stretch + end.U), T(1.0)); }
+    /// Of a symmetric tensor.
+    static Tensor<T, S> inverse(const Tensor<T, S>& a) noexcept { return (T(1.0) / determinant(a)) * cofactor(a); }
+    Tensor<T, S> middle_inverse(const Stretch& end) const noexcept { return inverse(middle(end)); }
     template <class K>
     static Tensor<T, S> hooke(const Tensor<T, S>& strain, const K& k) noexcept {
       return add_diagonal((2.0 * k[1]) * strain, k[0] * trace(strain));

@@ -44,14 +44,14 @@ struct MooneyRivlin {
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    const auto [first, second] = isochoric_strains(left_cauchy_green_minus_identity(H), of);
+    const T first = first_isochoric_strain(H, of), second = second_isochoric_strain(deviator(left_cauchy_green_minus_identity(H)), of, first);
     return C1 * first + C2 * second + volumetric_energy(volumetric, kappa, of.j);
   }
 
   template <class T, class S, class K>
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [C1, C2, kappa] = k;
-    const auto& [j, m, root] = of;
+    const T &j = of.j, &m = of.m, &root = of.root;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H);
     const T scale = root * root, inverse_J = scale * root;  // J^(-2/3), 1/J
     const T second = 2.0 * C2 * (scale * scale), both = 2.0 * C1 * scale + second;
@@ -65,7 +65,7 @@ struct MooneyRivlin {
   auto tangent(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [C1, C2, kappa] = k;
     const Tensor<T, S> e = left_cauchy_green_minus_identity(H), d = deviator(e);
-    const auto& [j, m, root] = of;
+    const T &j = of.j, &m = of.m, &root = of.root;
     const T scale = root * root;
     const T first = 2.0 * C1 * scale, second = 2.0 * C2 * (scale * scale), on_d = first + second * (1.0 + m);
     const Tensor<T, S> square = second * deviator(gram(d));

@@ -31,7 +31,7 @@ struct NeoHookean {
   template <class T, class S, class K>
   T psi(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [mu, kappa] = k;
-    return 0.5 * mu * isochoric_strains(right_cauchy_green_minus_identity(H), of).first + volumetric_energy(volumetric, kappa, of.j);
+    return 0.5 * mu * first_isochoric_strain(H, of) + volumetric_energy(volumetric, kappa, of.j);
   }
 
   template <class T, class S, class K>
@@ -47,7 +47,7 @@ struct NeoHookean {
   template <class T, class S, class K>
   auto tangent(const Tensor<T, S>& H, const K& k, const RubberInvariants<T>& of) const noexcept {
     const auto& [mu, kappa] = k;
-    const auto& [j, m, root] = of;
+    const T &j = of.j, &m = of.m, &root = of.root;
     const T a = mu * (root * root);
     const T c = volumetric_kirchhoff(volumetric, kappa, j) - a * (1.0 + m);
     const T c_by_volume = volumetric_kirchhoff_slope(volumetric, kappa, j) + (2.0 / 3) * a * (1.0 + m);  // dc for dJ/J = 1

@@ -230,15 +230,26 @@ T determinant(const Tensor<T, S>& a) noexcept {
   }
 }
 
-/// det(I + H) - 1 from the invariants of H.
+/// det(I + H) - 1 - tr(H), from the invariants of H.
+template <class T, class S>
+T jacobian_beyond_trace(const Tensor<T, S>& H) noexcept {
+  if constexpr (S::confined && S::dimension == 2)
+    return H(0, 0) * H(1, 1) - H(0, 1) * H(1, 0);
+  else if constexpr (S::confined)
+    return T(0.0);
+  else
+    return second_invariant(H) + determinant(H);
+}
+
+/// det(I + H) - 1.
 template <class T, class S>
 T jacobian_minus_one(const Tensor<T, S>& H) noexcept {
-  if constexpr (S::confined && S::dimension == 2)
-    return (H(0, 0) + H(1, 1)) + (H(0, 0) * H(1, 1) - H(0, 1) * H(1, 0));
-  else if constexpr (S::confined)
+  if constexpr (S::confined && S::dimension == 1)
     return H(0, 0);
+  else if constexpr (S::confined)
+    return (H(0, 0) + H(1, 1)) + jacobian_beyond_trace(H);
   else
-    return trace(H) + (second_invariant(H) + determinant(H));
+    return trace(H) + jacobian_beyond_trace(H);
 }
 
 /// cof(I + H) - I = tr(H) I - H^T + cof(H).

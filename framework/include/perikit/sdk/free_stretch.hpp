@@ -176,7 +176,8 @@ Pack free_strain(const Law& law, const Tensor<Pack, S>& H, const K& k, Pack rati
   return select(good, h, Pack(0.0));
 }
 
-inline constexpr int free_zero_packs = 2;
+/// Sixteen points, or as many as the registers hold what they need.
+inline constexpr int free_zero_packs = pack_width == 8 ? 2 : 4;
 
 /// Free strains of some packs of points at a time, and what the stress takes from them, of laws with HasFreeZeros.
 template <class Law, class S, class K>

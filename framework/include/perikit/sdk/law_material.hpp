@@ -216,12 +216,19 @@ class LawMaterial final : public Material {
   static constexpr bool looks_ahead = !free_stretch && !HasHistory<Law> && HasInvariants<Law, Pack, S>;
 
   template <class S, bool free_stretch>
-  static auto make_ahead() noexcept {
+  static auto invariants_ahead() noexcept {
     if constexpr (looks_ahead<S, free_stretch>)
       return std::array<decltype(std::declval<const Law&>().invariants(Tensor<Pack, S>())), packs_ahead>();
     else
       return std::array<NoInvariants, 1>();
   }
+
+  /// Memory of a T, without the zeros that packs begin with.
+  template <class T>
+  union Unset {
+    T value;
+    Unset() noexcept {}
+  };
 
   /// Those of the packs from point p on.
   template <class S>
@@ -263,14 +270,16 @@ class LawMaterial final : public Material {
     Status status;
     Constants k, given;  // given: where k are those of zero lateral strain
     [[maybe_unused]] Pack ratio = 0.0;
-    [[maybe_unused]] decltype(zeros_of_batch<S, own_zeros>()) zeros;
+    [[maybe_unused]] Unset<decltype(zeros_of_batch<S, own_zeros>())> memory_of_zeros;
+    [[maybe_unused]] Unset<decltype(invariants_ahead<S, free_stretch>())> memory_ahead;
+    [[maybe_unused]] auto& zeros = memory_of_zeros.value;
+    [[maybe_unused]] auto& ahead = memory_ahead.value;
     const auto begin_constants = [&](int p) {
       k = given = load_constants(b, p);
       if constexpr (own_constants) k = law_.template free_constants<S>(given);
       else if constexpr (free_stretch && !own_zeros) ratio = contraction<S>(k, b.time_step);
     };
     begin_constants(0);
-    [[maybe_unused]] auto ahead = make_ahead<S, free_stretch>();
     for (int p = 0; p < b.n; p += pack_width) {
       if (b.constant_stride != 0) begin_constants(p);
       decltype(auto) law = law_at<S>(b, p);

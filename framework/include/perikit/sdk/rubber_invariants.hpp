@@ -9,32 +9,47 @@ namespace perikit {
 /// What stresses and energies of such a law begin with.
 template <class T>
 struct RubberInvariants {
-  T j;     ///< J - 1
-  T m;     ///< tr(C)/3 - 1
-  T root;  ///< J^(-1/3)
+  T j;       ///< J - 1
+  T m;       ///< tr(C)/3 - 1
+  T root;    ///< J^(-1/3)
+  T square;  ///< H : H
+  T shape;   ///< 3 m - 2 j, without the terms of first order that cancel
 
   template <class S>
-  explicit RubberInvariants(const Tensor<T, S>& H) noexcept
-      : j(jacobian_minus_one(H)), m((2.0 * trace(H) + inner(H, H)) * (1.0 / 3.0)), root(reciprocal_cbrt(T(1.0 + j))) {}
+  explicit RubberInvariants(const Tensor<T, S>& H) noexcept : square(inner(H, H)) {
+    const T sum = trace(H), beyond = jacobian_beyond_trace(H);
+    j = sum + beyond;
+    m = (2.0 * sum + square) * (1.0 / 3.0);
+    shape = square - 2.0 * beyond;
+    root = reciprocal_cbrt(T(1.0 + j));
+  }
   RubberInvariants() = default;
 };
 
-template <class T>
-struct IsochoricStrains {
-  T first;   ///< J^(-2/3) I1(C) - 3
-  T second;  ///< J^(-4/3) I2(C) - 3
-};
-
-/// Of e = C - I or b - I, term by term of second order in its deviator d, so that they keep their digits where d is small. With
-/// s = (1 + m) J^(-2/3) they are 3 s - 3 and 3 s^2 + I2(d) J^(-4/3) - 3, and det C = (1 + m)^3 + (1 + m) I2(d) + det(d) = J^2 says that
-/// s^3 - 1 = -((1 + m) I2(d) + det(d))/J^2.
+/// (1 + m)^3 - J^2, m = tr(C)/3 - 1, from the deviator d of C - I: det C = (1 + m)^3 + (1 + m) I2(d) + det(d) = J^2. Apart and by value, as it is
+/// seldom needed.
 template <class T, class S>
-IsochoricStrains<T> isochoric_strains(const Tensor<T, S>& e, const RubberInvariants<T>& of) noexcept {
-  const T scale = of.root * of.root, inverse_J = of.root * scale, s = scale * (1.0 + of.m);
-  const Tensor<T, S> d = deviator(e);
-  const T I2 = second_invariant(d), cubes = (I2 * (1.0 + of.m) + determinant(d)) * (inverse_J * inverse_J);
-  const T first = -3.0 * cubes * reciprocal(T(1.0 + s * (1.0 + s)));
-  return {first, I2 * (scale * scale) + first * (1.0 + s)};
+[[gnu::noinline, gnu::cold]] T cubes_of_deviator(Tensor<T, S> H, T m) noexcept {
+  const Tensor<T, S> d = deviator(right_cauchy_green_minus_identity(H));
+  return -(second_invariant(d) * (1.0 + m) + determinant(d));
+}
+
+/// J^(-2/3) I1(C) - 3 = 3 s - 3, s = (1 + m) J^(-2/3), with the digits of small strains: s^3 - 1 = ((1 + m)^3 - J^2)/J^2. In the numerator cancels
+/// what a rotation adds to H; where that takes more than six digits the deviator keeps them.
+template <class T, class S>
+T first_isochoric_strain(const Tensor<T, S>& H, const RubberInvariants<T>& of) noexcept {
+  const T &j = of.j, &m = of.m, scale = of.root * of.root, inverse_J = of.root * scale, s = scale * (1.0 + m);
+  T cubes = of.shape + ((m * m) * (3.0 + m) - j * j);
+  if (const auto turned = cubes - 1e-6 * of.square < 0.0; any(turned)) [[unlikely]]
+    cubes = select(turned, cubes_of_deviator(H, m), cubes);
+  return (3.0 * cubes) * (inverse_J * inverse_J) * reciprocal(T(1.0 + s * (1.0 + s)));
+}
+
+/// J^(-4/3) I2(C) - 3 = 3 s^2 - 3 + J^(-4/3) I2(d), d the deviator of C - I or b - I. first: the one before.
+template <class T, class S>
+T second_isochoric_strain(const Tensor<T, S>& d, const RubberInvariants<T>& of, const T& first) noexcept {
+  const T scale = of.root * of.root;
+  return second_invariant(d) * (scale * scale) + first * (1.0 + scale * (1.0 + of.m));
 }
 
 }  // namespace perikit
