@@ -312,6 +312,39 @@ TEST_CASE("P = dpsi/dF and A = dP/dF to ten digits, against the same law in exte
   check_extended(Hencky(), {1.2, 0.8}, "hencky");
 }
 
+namespace {
+
+/// psi where small strains are turned far, of the same H in extended precision.
+template <class Law>
+void check_turned(const Law& law, const std::vector<double>& constants, const std::string& what) {
+  using Long = long double;
+  contract::Random random(8);
+  std::array<Long, Law::traits.constants> k;
+  std::copy(constants.begin(), constants.end(), k.begin());
+  for (const double size : {0.1, 1e-2, 1e-3, 1e-4, 1e-5})
+    for (const double angle : {0.0, 1e-6, 1e-3, 0.1, 1.0, 3.0})
+      for (int trial = 0; trial < 8; ++trial) {
+        const contract::Values e = contract::random_direction(random, Space::solid);
+        const auto strain = Tensor<double, Solid>::build_symmetric([&](int i, int j) { return size * e[3 * i + j]; });
+        const double c = std::cos(angle), s = std::sin(angle);
+        const Tensor<double, Solid> turn{{c, -s, 0, s, c, 0, 0, 0, 1}}, F = turn * add_diagonal(strain, 1.0);
+        contract::Values H(F.c, F.c + 9);
+        for (int i = 0; i < 3; ++i) H[4 * i] -= 1;
+        const Evaluation found(LawMaterial<Law>(law), Space::solid, constants, {H});
+        const auto HL = Tensor<Long, Solid>::map([&](int i) { return Long(H[i]); });
+        const Long expected = energy(law, HL, k);
+        CHECK_MESSAGE(std::abs(static_cast<double>(found.psi.data()[0] - expected)) <= 2e-9 * static_cast<double>(expected), what, ", strains of ", size, " turned by ", angle, ": ",
+                      found.psi.data()[0], ", expected ", static_cast<double>(expected));
+      }
+}
+
+}  // namespace
+
+TEST_CASE("energies of rubber keep nine digits where small strains are turned far") {
+  check_turned(NeoHookean(), {0.8, 8.0}, "neo_hookean");
+  check_turned(MooneyRivlin(), {0.3, 0.1, 8.0}, "mooney_rivlin");
+}
+
 TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
   contract::Random random(3);
   for (int shape = 0; shape < 3; ++shape)
