@@ -54,8 +54,7 @@ struct Hencky {
   /// (lambda + mu)) ln F11.
   template <class S, class K>
   K free_constants(const K& k) const noexcept {
-    const auto& [lambda, mu] = k;
-    return {free_lambda<S>(lambda, mu), mu};
+    return free_lame<S>(k);
   }
   template <class T, class S, class K>
   T free_stretch(const Tensor<T, S>& H, const K& k) const noexcept {

@@ -83,7 +83,7 @@ struct Hypoelastic {
       const auto& [lambda, mu] = k;
       const T u0 = stretch(2, 2), u = H(2, 2), twice_middle = 2.0 + u0 + u;
       const T by_trace = -((3 - S::dimension) * lambda) * (twice_middle * twice_middle) / (free_modulus<S>(lambda, mu) * (4.0 * (1.0 + u0) * (1.0 + u)));
-      return derivative(H, k, K{free_lambda<S>(lambda, mu), mu}, [by_trace](const Tensor<T, S>& dstrain) { return by_trace * trace(dstrain); });
+      return derivative(H, k, free_lame<S>(k), [by_trace](const Tensor<T, S>& dstrain) { return by_trace * trace(dstrain); });
     }
 
    private:

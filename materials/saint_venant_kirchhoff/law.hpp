@@ -38,8 +38,7 @@ struct SaintVenantKirchhoff {
   /// (C11 - 1).
   template <class S, class K>
   K free_constants(const K& k) const noexcept {
-    const auto& [lambda, mu] = k;
-    return {free_lambda<S>(lambda, mu), mu};
+    return free_lame<S>(k);
   }
   /// C33 > 0.
   template <class T, class S, class K>

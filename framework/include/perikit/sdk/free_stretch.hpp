@@ -50,17 +50,18 @@ Pack contraction_ratio(const Law& law, const K& k) noexcept {
   return q[0] / inner(free_direction<Pack, S>(), q);
 }
 
-/// Where lateral stress adds nothing but a multiple of the volume change to the stress in the body's space, as in laws linear in a measure of strain,
-/// zero lateral stress is zero lateral strain with other constants: law.free_constants<S>(k) of these, S confined. The law has free_stretch(H, k), too,
-/// with its own constants and H without lateral strain, and, where not every admissible H has one, stretches_freely(H, k) -> lanes that have.
+/// In laws linear in a measure of strain, stress in the body's space under zero lateral stress is that under zero lateral strain with other constants:
+/// law.free_constants<S>(k) of these, S confined. The law has free_stretch(H, k), too, with its own constants and H without lateral strain, and, where
+/// not every admissible H has one, stretches_freely(H, k) -> lanes that have.
 template <class Law, class S, class K>
 concept HasFreeConstants = requires(const Law& law, const K& k) {
   { law.template free_constants<S>(k) } -> std::same_as<K>;
 };
-/// The lambda of isotropic laws of that kind.
-template <class S, class T>
-T free_lambda(const T& lambda, const T& mu) noexcept {
-  return (2.0 * mu) * lambda / free_modulus<S>(lambda, mu);
+/// Of isotropic laws of that kind, whose constants are lambda and mu: 2 lambda mu/(lambda + 2 mu), in a bar lambda mu/(lambda + mu), and mu.
+template <class S, class K>
+K free_lame(const K& k) noexcept {
+  const auto& [lambda, mu] = k;
+  return {(2.0 * mu) * lambda / free_modulus<S>(lambda, mu), mu};
 }
 
 /// Kirchhoff stress along a free axis, and its derivative by the logarithm of the free stretch.
