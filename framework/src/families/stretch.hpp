@@ -20,6 +20,8 @@ struct Stretch {
     e = difference * reciprocal.sum;
     for (int c = 0; c < D; ++c) n[c] = y[c] * inverse_length;
   }
+  /// Whether the bond has a finite length and not less than 1e-7 of that at rest: |y|^2 has no digits left below, nor has the direction.
+  PackMask has_length(Pack length) const noexcept { return e > Pack(1e-7 - 1.0) * length; }
   Pack along(const Pack (&dw)[D]) const noexcept {
     Pack sum(0.0);
     for (int c = 0; c < D; ++c) sum += n[c] * dw[c];

@@ -39,19 +39,29 @@ T bond_shape_row_adjoint(T (&P)[D], const T (&xi)[D], const T (&g)[D]) noexcept 
   return t;
 }
 
+/// Bits of the lanes l ... l + pack_width - 1 of a mask.
+inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
+  return static_cast<std::uint8_t>(mask >> l & ((1u << pack_width) - 1));
+}
+
 /// Lattices: H of `slots` bonds of each of the eight points p ... p + 7, straight from the fields, lanes slot by slot.
-/// both: A = (1 - far_share) Hbar_i + far_share Hbar_j, else Hbar_i.
+/// masks[k]: lanes whose far end is live; H is zero in the others. both: A = (1 - far_share) Hbar_i + far_share Hbar_j, else Hbar_i.
 template <int D, bool per_slot, bool both>
-void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p, const BondVectors& v, double far_share,
-                           ConstFieldView u, ConstFieldView Hbar, double* H) noexcept {
+void lattice_bond_gradient(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v,
+                           double far_share, ConstFieldView u, ConstFieldView Hbar, double* H) noexcept {
   const Pack near(both ? 1 - far_share : 1.0), other(far_share);
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
     Pack own_u[D], own_H[D * D];
     for (int c = 0; c < D; ++c) own_u[c] = Pack::load(u.component(c) + p + l);
     for (int c = 0; c < D * D; ++c) own_H[c] = near * Pack::load(Hbar.component(c) + p + l);
     for (int k = 0; k < slots; ++k) {
+      const std::uint8_t mask = pack_mask(masks[k], l);
       const std::int64_t far = p + shifts[k] + l;
       const int lane = k * static_cast<int>(padding) + l;
+      if (mask == 0) {
+        for (int c = 0; c < D * D; ++c) Pack(0.0).store(H + c * batch_points + lane);
+        continue;
+      }
       Pack xi[D], g[D];
       for (int e = 0; e < D; ++e) {
         xi[e] = bond_value<per_slot>(v.xi[e], lane);
@@ -64,15 +74,14 @@ void lattice_bond_gradient(const std::int64_t* shifts, int slots, std::int64_t p
           if constexpr (both) a[e] += other * Pack::load(Hbar.component(c * D + e) + far);
         }
         bond_shape_row<D>(a, Pack::load(u.component(c) + far) - own_u[c], xi, g, h);
-        for (int e = 0; e < D; ++e) h[e].store(H + (c * D + e) * batch_points + lane);
+        const auto store = [&](auto&& lanes) {
+          for (int e = 0; e < D; ++e) lanes(h[e]).store(H + (c * D + e) * batch_points + lane);
+        };
+        if (mask == pack_mask(0xff, 0)) store([](Pack value) { return value; });
+        else store([mask](Pack value) { return keep(mask, value); });
       }
     }
   }
-}
-
-/// Bits of the lanes l ... l + pack_width - 1 of a mask.
-inline std::uint8_t pack_mask(std::uint8_t mask, int l) noexcept {
-  return static_cast<std::uint8_t>(mask >> l & ((1u << pack_width) - 1));
 }
 
 /// to[lanes of mask] += value; other cells are not touched.

@@ -169,12 +169,13 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
-  const std::int64_t* shifts = families_.slots.shifts.data() + slot;
+  const std::int64_t* const shifts = families_.slots.shifts.data() + slot;
+  const std::uint8_t* const masks = pattern.mask.data() + slot;
   const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* to) {
-    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, slots, p, vectors, far_share_, u, Hbar, to);
+    lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, masks, slots, p, vectors, far_share_, u, Hbar, to);
   };
   const auto adjoint = [&](auto per_slot, auto of_both) {
-    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, pattern.mask.data() + slot, slots, p, vectors, far_share_, s.P,
+    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, masks, slots, p, vectors, far_share_, s.P,
                                                            pass.out, flux_);
   };
   // The kernels are compiled for each way of reading the bond vectors and each base.
@@ -189,7 +190,6 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   choose(gradient, pass.u, ConstFieldView(gradient_), H);
   if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
   // Local copies: a pack that is stored may be any member, so that the compiler would read each again for every slot.
-  const std::uint8_t* const masks = pattern.mask.data() + slot;
   const double* const integrity = pattern.integrity.empty() ? nullptr : pattern.b_of(slot);
   const auto weigh = [&, slot_weight = slot_weight_.data() + slot](const double* end_scale, const std::int64_t* moved, double* weight) {
     for (int k = 0; k < slots; ++k) {
@@ -201,17 +201,6 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   };
   weigh(pattern.scale_of(formulation_.weight), nullptr, s.weight);
   if (both_ends || sampled_pairs) weigh(scale_.data() + p, shifts, s.far_weight);
-  for (int k = 0; k < slots; ++k) {
-    if (masks[k] == 0xff) continue;
-    for (int l = 0; l < chunk_points; l += pack_width) {
-      const int lane = k * chunk_points + l;
-      const Pack keep = Pack::load(lane_factors[masks[k]] + l);
-      for (int c = 0; c < D * D; ++c) {
-        (keep * Pack::load(H + c * batch_points + lane)).store(H + c * batch_points + lane);
-        if (tangent) (keep * Pack::load(dH + c * batch_points + lane)).store(dH + c * batch_points + lane);
-      }
-    }
-  }
   for (int k = 0; k < slots && (pass.work.samples() || (!laws_.single() && s.one_law < 0)); ++k)
     for (int l = 0; l < chunk_points; ++l) {
       s.owner[k * chunk_points + l] = chunk.first + l;

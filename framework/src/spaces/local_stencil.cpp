@@ -10,7 +10,11 @@ namespace perikit {
 namespace {
 
 /// Rows of the influence that are multiplied at a time; a multiple of every pack width.
-constexpr int tile = 8;
+constexpr int tile = pack_registers == 32 ? 8 : 4;
+/// Packs of bonds, and rows of stresses, whose sums are found at a time.
+constexpr int bond_packs = pack_registers == 32 ? 2 : 4;
+template <int D>
+constexpr int stress_rows = pack_registers == 32 ? D : 1;
 
 /// out[column * stride + q] = sum_k weight[q * row + k] columns[k * width + column] for a tile of q and P packs of columns. The
 /// sums stay in registers; they come out with q along the lanes.
@@ -40,22 +44,25 @@ void multiply_tile(const double* weight, std::size_t row, int bonds, const doubl
 template <int D, int C>
 void adjoint_tile(const double* weight, std::size_t row, int points, const double* stress, std::size_t lanes, const double* lever,
                   double* const (&t)[D], std::size_t k) noexcept {
-  Pack sums[D * D][C];
-  for (std::size_t q = 0; q < static_cast<std::size_t>(points); ++q) {
-    Pack w[C];
-    for (int p = 0; p < C; ++p) w[p] = Pack::load(weight + q * row + k + static_cast<std::size_t>(p * pack_width));
-    for (std::size_t c = 0; c < D * D; ++c) {
-      const Pack s(stress[c * lanes + q]);
-      for (int p = 0; p < C; ++p) sums[c][p] += s * w[p];
+  constexpr int rows = stress_rows<D>;
+  for (int first = 0; first < D; first += rows) {
+    Pack sums[rows * D][C];
+    for (std::size_t q = 0; q < static_cast<std::size_t>(points); ++q) {
+      Pack s[rows * D];
+      for (int c = 0; c < rows * D; ++c) s[c] = Pack(stress[static_cast<std::size_t>(first * D + c) * lanes + q]);
+      for (int p = 0; p < C; ++p) {
+        const Pack w = Pack::load(weight + q * row + k + static_cast<std::size_t>(p * pack_width));
+        for (int c = 0; c < rows * D; ++c) sums[c][p] += s[c] * w;
+      }
     }
+    for (int p = 0; p < C; ++p)
+      for (int c = 0; c < rows; ++c) {
+        const std::size_t at = k + static_cast<std::size_t>(p * pack_width);
+        Pack force(0.0);
+        for (int e = 0; e < D; ++e) force += sums[c * D + e][p] * Pack::load(lever + static_cast<std::size_t>(e) * row + at);
+        force.store(t[first + c] + at);
+      }
   }
-  for (int p = 0; p < C; ++p)
-    for (int c = 0; c < D; ++c) {
-      const std::size_t at = k + static_cast<std::size_t>(p * pack_width);
-      Pack force(0.0);
-      for (int e = 0; e < D; ++e) force += sums[c * D + e][p] * Pack::load(lever + static_cast<std::size_t>(e) * row + at);
-      force.store(t[c] + at);
-    }
 }
 
 /// Inverse of symmetric K by cofactors; `regular` and `poor` where it is sure that the eigenvalues spread by less, or more, than
@@ -357,8 +364,8 @@ void LocalStencil<D>::adjoint(double* const (&t)[D]) noexcept {
   std::size_t k = 0;
   // Of local force states only the owner's own gradient (selective map) acts through all bonds.
   const int points = tested_.empty() ? points_ : points_ - bonds_;
-  for (; k + 2 * pack <= row_; k += 2 * pack)
-    adjoint_tile<D, 2>(omega_.data(), row_, points, stress_.data(), lanes_, lever_.data(), t, k);
+  for (constexpr std::size_t step = bond_packs * pack; k + step <= row_; k += step)
+    adjoint_tile<D, bond_packs>(omega_.data(), row_, points, stress_.data(), lanes_, lever_.data(), t, k);
   for (; k < row_; k += pack) adjoint_tile<D, 1>(omega_.data(), row_, points, stress_.data(), lanes_, lever_.data(), t, k);
   for (std::size_t b = 0; b < tested_.size(); ++b) {
     const std::size_t q = b + static_cast<std::size_t>(points);

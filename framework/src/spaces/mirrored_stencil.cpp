@@ -15,7 +15,8 @@ namespace {
 /// Mirror images of gradients agree to this, relative to the largest: they differ by the rounding of K^-1.
 constexpr double symmetric_to = 1e-12;
 
-constexpr int tile_rows = 8;
+/// As many as have their sums in registers.
+constexpr int tile_rows = pack_registers == 32 ? 8 : 4;
 
 double sign(std::size_t character, std::size_t element) {
   return std::popcount(character & element) % 2 == 0 ? 1.0 : -1.0;

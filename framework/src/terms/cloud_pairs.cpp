@@ -207,7 +207,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       }
       const Pack length = Pack::load(g.length + l);
       const Stretch<D> bond(xi, length, du);
-      finite = finite && all(bond.e == bond.e);
+      finite = finite && all(bond.has_length(length));
       if (work == PairWork::force && fails) excess = max(excess, bond.e - onset * length);
       bond.e.store(s.e + l);
       for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);

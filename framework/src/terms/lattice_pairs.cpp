@@ -271,7 +271,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         }
         const double length = lengths[at * chunk_points];
         const Stretch<D> bond(xi, Pack(length), du);
-        good &= bond.e == bond.e;
+        good &= bond.has_length(Pack(length));
         if constexpr (sums) {
           // multiply_add: fused with its sum in no copy of the loop.
           Pack term = multiply_add(Pack(omegas[at * chunk_points] * length * volume), rate ? bond.along(dw) : bond.e, Pack(0.0));

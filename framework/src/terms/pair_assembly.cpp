@@ -42,8 +42,9 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
       xi[c] = Pack::load(m.family.xi[c].data() + l);
       du[c] = Pack::load(m.du[c].data() + l);
     }
-    const Stretch<D> bond(xi, Pack::load(m.family.length.data() + l), du);
-    finite = finite && all(bond.e == bond.e);
+    const Pack length = Pack::load(m.family.length.data() + l);
+    const Stretch<D> bond(xi, length, du);
+    finite = finite && all(bond.has_length(length));
     bond.e.store(m.extension.data() + l);
     bond.inverse_length.store(m.inverse_length.data() + l);
     for (int c = 0; c < D; ++c) bond.n[c].store(m.direction[c].data() + l);

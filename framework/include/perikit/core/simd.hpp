@@ -23,6 +23,13 @@ inline constexpr int pack_width = 4;
 inline constexpr int pack_width = 2;
 #endif
 
+/// Packs that the registers of the target hold, for loops whose sums are to stay in them.
+#if (defined(__AVX512F__) && defined(__AVX512DQ__)) || defined(__aarch64__)
+inline constexpr int pack_registers = 32;
+#else
+inline constexpr int pack_registers = 16;
+#endif
+
 namespace detail {
 typedef double Lanes __attribute__((vector_size(8 * pack_width)));
 typedef double UnalignedLanes __attribute__((vector_size(8 * pack_width), aligned(8), may_alias));
@@ -194,30 +201,17 @@ inline Pack sqrt(Pack a) noexcept {
   return {reinterpret_cast<detail::Lanes>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
 #elif defined(__AVX__)
   return {reinterpret_cast<detail::Lanes>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(a.v)))};
+#elif defined(__SSE2__)
+  return {reinterpret_cast<detail::Lanes>(_mm_sqrt_pd(reinterpret_cast<__m128d>(a.v)))};
+#elif defined(__aarch64__)
+  return {reinterpret_cast<detail::Lanes>(vsqrtq_f64(reinterpret_cast<float64x2_t>(a.v)))};
 #else
   Pack r;
   for (int i = 0; i < pack_width; ++i) r.v[i] = std::sqrt(a.v[i]);
   return r;
 #endif
 }
-/// 1/sqrt(a) and 1/a for normal a > 0 to about one unit in the last place; not a number for 0 and infinity.
-inline Pack reciprocal_sqrt(Pack a) noexcept {
-#if defined(__AVX512F__) && defined(__AVX512DQ__)
-  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_rsqrt14_pd(reinterpret_cast<__m512d>(a.v)))};
-  const Pack half = Pack(0.5) * a;
-  r = r * (Pack(1.5) - half * r * r);
-  return r + r * (Pack(0.5) - half * r * r);
-#else
-  // From the exponent's half to 3.5 %, then (1 - h)^(-1/2) with h = 1 - a r^2: a third of the time of a root and a division with AVX2.
-  typedef std::uint64_t Words __attribute__((vector_size(8 * pack_width)));
-  Pack r = {reinterpret_cast<detail::Lanes>(std::uint64_t{0x5fe6eb50c7b537a9} - (reinterpret_cast<Words>(a.v) >> 1))};
-  for (int step = 0; step < 2; ++step) {
-    const Pack h = Pack(1.0) - (a * r) * r;
-    r = r + (r * h) * (Pack(0.5) + h * (Pack(0.375) + h * Pack(0.3125)));
-  }
-  return select(a > 0.0, r, Pack(__builtin_nan("")));
-#endif
-}
+/// 1/a for normal a > 0 to about one unit in the last place; not a number for 0 and infinity where it comes from an estimate.
 inline Pack reciprocal(Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   Pack r = {reinterpret_cast<detail::Lanes>(_mm512_rcp14_pd(reinterpret_cast<__m512d>(a.v)))};
@@ -227,8 +221,8 @@ inline Pack reciprocal(Pack a) noexcept {
   return Pack(1.0) / a;
 #endif
 }
-/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b >= 0, to one and four units in the last place. The second begins from a first
-/// guess of the root, so that a loop waits less for each.
+/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b > 0, to one and four units in the last place. The root is not finite where a is 0; neither
+/// is above 0 where it is infinite. With estimates the second begins from a first guess of the root, so that a loop waits less for each.
 struct ReciprocalRootAndSum {
   Pack root, sum;
   ReciprocalRootAndSum(Pack a, Pack b) noexcept {
@@ -242,11 +236,21 @@ struct ReciprocalRootAndSum {
     root = root + root * (Pack(0.5) - half * root * root);
     sum = sum + sum * (Pack(1.0) - (a * root + b) * sum);
 #else
-    root = reciprocal_sqrt(a);
-    sum = reciprocal(a * root + b);
+    const Pack length = sqrt(a);
+    root = reciprocal(length);
+    sum = reciprocal(length + b);
 #endif
   }
 };
+#if !(defined(__AVX512F__) && defined(__AVX512DQ__)) && !defined(__aarch64__)
+namespace detail {
+/// All bits set in the lanes whose bit is set, as in keep().
+inline Bits lanes_of(std::uint8_t bits) noexcept {
+  constexpr Bits bit_of_lane = pack_width == 4 ? Bits{1, 2, 4, 8} : Bits{1, 2};
+  return ((Bits{} + bits) & bit_of_lane) == bit_of_lane;
+}
+}  // namespace detail
+#endif
 /// a in the lanes whose bit is set, zero elsewhere (bits: of a group of eight, shifted so that lane 0 is bit 0).
 inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -255,9 +259,7 @@ inline Pack keep(std::uint8_t bits, Pack a) noexcept {
   constexpr uint64x2_t bit_of_lane = {1, 2};
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<uint64x2_t>(a.v) & vtstq_u64(vdupq_n_u64(bits), bit_of_lane))};
 #else
-  for (int i = 0; i < pack_width; ++i)
-    if (!(bits >> i & 1)) a.v[i] = 0;
-  return a;
+  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & detail::lanes_of(bits))};
 #endif
 }
 /// p[lane] -= a[lane] where the bit of the lane is set; nothing else is written.

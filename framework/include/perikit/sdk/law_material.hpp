@@ -194,11 +194,11 @@ class LawMaterial final : public Material {
       PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
       return total == 0.0;
     } else {
-      const Pack j = [&] {  // not finite if any component is not
-        if constexpr (requires { of.j; }) return of.j;
-        else return jacobian_minus_one(H);
+      const Pack J = [&] {  // not finite if any component is not
+        if constexpr (requires { of.j; }) return Pack(1.0 + of.j);
+        else return determinant(add_diagonal(H, Pack(1.0)));
       }();
-      return (j > -1.0) & (j < std::numeric_limits<double>::infinity());
+      return (J > 0.0) & (J < std::numeric_limits<double>::infinity());
     }
   }
 
@@ -316,9 +316,9 @@ class LawMaterial final : public Material {
       const auto put_stress = [&](Tensor<Pack, S> P) {
         if constexpr (free_stretch) put_free_part(P, Pack(0.0));
         store(P, b.P, b.stride, p);
-        Pack total = P[0];
-        PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += P[c];
-        probe += 0.0 * total;
+        Pack total[3];   // three sums, so that they do not wait for each other
+        PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) total[c % 3] = c < 3 ? P[c] : total[c % 3] + P[c];
+        probe += 0.0 * (total[0] + total[1] + total[2]);
       };
       if constexpr (HasHistory<Law>) {
         if (b.psi || b.P || b.state_new || b.dissipated) {
