@@ -245,8 +245,9 @@ struct ReciprocalRootAndSum {
 #if !(defined(__AVX512F__) && defined(__AVX512DQ__)) && !defined(__aarch64__)
 namespace detail {
 /// All bits set in the lanes whose bit is set, as in keep().
-inline Bits lanes_of(std::uint8_t bits) noexcept {
-  constexpr Bits bit_of_lane = pack_width == 4 ? Bits{1, 2, 4, 8} : Bits{1, 2};
+template <std::size_t... I>
+Bits lanes_of(std::uint8_t bits, std::index_sequence<I...>) noexcept {
+  constexpr Bits bit_of_lane = {(1 << I)...};
   return ((Bits{} + bits) & bit_of_lane) == bit_of_lane;
 }
 }  // namespace detail
@@ -259,7 +260,7 @@ inline Pack keep(std::uint8_t bits, Pack a) noexcept {
   constexpr uint64x2_t bit_of_lane = {1, 2};
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<uint64x2_t>(a.v) & vtstq_u64(vdupq_n_u64(bits), bit_of_lane))};
 #else
-  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & detail::lanes_of(bits))};
+  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & detail::lanes_of(bits, std::make_index_sequence<pack_width>()))};
 #endif
 }
 /// p[lane] -= a[lane] where the bit of the lane is set; nothing else is written.
