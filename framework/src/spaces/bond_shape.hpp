@@ -56,6 +56,7 @@ void lattice_bond_gradient(const std::int64_t* shifts, const std::uint8_t* masks
     for (int c = 0; c < D * D; ++c) own_H[c] = near * Pack::load(Hbar.component(c) + p + l);
     for (int k = 0; k < slots; ++k) {
       const std::uint8_t mask = pack_mask(masks[k], l);
+      const bool whole = mask == pack_mask(0xff, 0);
       const std::int64_t far = p + shifts[k] + l;
       const int lane = k * static_cast<int>(padding) + l;
       if (mask == 0) {
@@ -74,11 +75,7 @@ void lattice_bond_gradient(const std::int64_t* shifts, const std::uint8_t* masks
           if constexpr (both) a[e] += other * Pack::load(Hbar.component(c * D + e) + far);
         }
         bond_shape_row<D>(a, Pack::load(u.component(c) + far) - own_u[c], xi, g, h);
-        const auto store = [&](auto&& lanes) {
-          for (int e = 0; e < D; ++e) lanes(h[e]).store(H + (c * D + e) * batch_points + lane);
-        };
-        if (mask == pack_mask(0xff, 0)) store([](Pack value) { return value; });
-        else store([mask](Pack value) { return keep(mask, value); });
+        for (int e = 0; e < D; ++e) (whole ? h[e] : keep(mask, h[e])).store(H + (c * D + e) * batch_points + lane);
       }
     }
   }

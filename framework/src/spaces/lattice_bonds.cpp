@@ -169,6 +169,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   BondVectors vectors;
   bond_vectors(chunk, slot, slots, s, vectors);
   const int lanes = slots * chunk_points;
+  // Local copies, here and below: a pack that is stored may be any member, so that the compiler would read each again for every slot.
   const std::int64_t* const shifts = families_.slots.shifts.data() + slot;
   const std::uint8_t* const masks = pattern.mask.data() + slot;
   const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* to) {
@@ -189,7 +190,6 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   };
   choose(gradient, pass.u, ConstFieldView(gradient_), H);
   if (tangent) choose(gradient, pass.w, ConstFieldView(direction_), dH);
-  // Local copies: a pack that is stored may be any member, so that the compiler would read each again for every slot.
   const double* const integrity = pattern.integrity.empty() ? nullptr : pattern.b_of(slot);
   const auto weigh = [&, slot_weight = slot_weight_.data() + slot](const double* end_scale, const std::int64_t* moved, double* weight) {
     for (int k = 0; k < slots; ++k) {

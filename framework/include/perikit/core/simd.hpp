@@ -24,10 +24,10 @@ inline constexpr int pack_width = 2;
 #endif
 
 /// Packs that the registers of the target hold, for loops whose sums are to stay in them.
-#if (defined(__AVX512F__) && defined(__AVX512DQ__)) || defined(__aarch64__)
+#if defined(__aarch64__)
 inline constexpr int pack_registers = 32;
 #else
-inline constexpr int pack_registers = 16;
+inline constexpr int pack_registers = pack_width == 8 ? 32 : 16;
 #endif
 
 namespace detail {
@@ -221,7 +221,7 @@ inline Pack reciprocal(Pack a) noexcept {
   return Pack(1.0) / a;
 #endif
 }
-/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b > 0, to one and four units in the last place. The root is not finite where a is 0; neither
+/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b >= 0, to one and four units in the last place. The root is not finite where a is 0; neither
 /// is above 0 where it is infinite. With estimates the second begins from a first guess of the root, so that a loop waits less for each.
 struct ReciprocalRootAndSum {
   Pack root, sum;
@@ -242,16 +242,6 @@ struct ReciprocalRootAndSum {
 #endif
   }
 };
-#if !(defined(__AVX512F__) && defined(__AVX512DQ__)) && !defined(__aarch64__)
-namespace detail {
-/// All bits set in the lanes whose bit is set, as in keep().
-template <std::size_t... I>
-Bits lanes_of(std::uint8_t bits, std::index_sequence<I...>) noexcept {
-  constexpr Bits bit_of_lane = {(1 << I)...};
-  return ((Bits{} + bits) & bit_of_lane) == bit_of_lane;
-}
-}  // namespace detail
-#endif
 /// a in the lanes whose bit is set, zero elsewhere (bits: of a group of eight, shifted so that lane 0 is bit 0).
 inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -260,7 +250,9 @@ inline Pack keep(std::uint8_t bits, Pack a) noexcept {
   constexpr uint64x2_t bit_of_lane = {1, 2};
   return {reinterpret_cast<detail::Lanes>(reinterpret_cast<uint64x2_t>(a.v) & vtstq_u64(vdupq_n_u64(bits), bit_of_lane))};
 #else
-  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & detail::lanes_of(bits, std::make_index_sequence<pack_width>()))};
+  constexpr auto bit_of_lane = []<std::size_t... I>(std::index_sequence<I...>) { return detail::Bits{(1 << I)...}; }(std::make_index_sequence<pack_width>());
+  const detail::Bits kept = ((detail::Bits{} + bits) & bit_of_lane) == bit_of_lane;
+  return {reinterpret_cast<detail::Lanes>(reinterpret_cast<detail::Bits>(a.v) & kept)};
 #endif
 }
 /// p[lane] -= a[lane] where the bit of the lane is set; nothing else is written.

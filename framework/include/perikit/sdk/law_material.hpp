@@ -186,13 +186,19 @@ class LawMaterial final : public Material {
     }
   }
 
+  /// In three sums, which do not wait for each other.
+  template <class S, class Of>
+  static Pack sum_of_components(const Of& of) noexcept {
+    Pack total[3] = {of(0), of(1), of(2)};
+    PERIKIT_UNROLL for (int c = 3; c < S::components; ++c) total[c % 3] += of(c);
+    return total[0] + total[1] + total[2];
+  }
+
   /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
   template <class S, class Invariants>
   static PackMask admissible(const Tensor<Pack, S>& H, const Invariants& of) noexcept {
     if constexpr (small_strain_law) {
-      Pack total = H[0] * 0.0;
-      PERIKIT_UNROLL for (int c = 1; c < S::components; ++c) total += H[c] * 0.0;
-      return total == 0.0;
+      return sum_of_components<S>([&](int c) { return H[c] * 0.0; }) == 0.0;
     } else {
       const Pack J = [&] {  // not finite if any component is not
         if constexpr (requires { of.j; }) return Pack(1.0 + of.j);
@@ -316,9 +322,7 @@ class LawMaterial final : public Material {
       const auto put_stress = [&](Tensor<Pack, S> P) {
         if constexpr (free_stretch) put_free_part(P, Pack(0.0));
         store(P, b.P, b.stride, p);
-        Pack total[3];   // three sums, so that they do not wait for each other
-        PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) total[c % 3] = c < 3 ? P[c] : total[c % 3] + P[c];
-        probe += 0.0 * (total[0] + total[1] + total[2]);
+        probe += 0.0 * sum_of_components<S>([&](int c) { return P[c]; });
       };
       if constexpr (HasHistory<Law>) {
         if (b.psi || b.P || b.state_new || b.dissipated) {
