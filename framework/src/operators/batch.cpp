@@ -84,7 +84,20 @@ double weighted_energy(int n, const double* weight, const double* psi) noexcept 
   return total;
 }
 
+/// P <- weight P.
+void multiply_stress(int n, int components, const double* weight, double* P) noexcept {
+  for (int l = 0; l < n; l += pack_width) {
+    const Pack w = Pack::load(weight + l);
+    for (int c = 0; c < components; ++c) (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
+  }
+}
+
 }  // namespace
+
+void BatchWork::weigh_stress(int n, BatchScratch& s) const noexcept {
+  const int d = dimension(laws_.space());
+  if (s.stress_weight) multiply_stress(n, d * d, s.stress_weight, s.P);
+}
 
 /// Of lanes first ..., with their weights.
 void BatchWork::add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept {
@@ -149,9 +162,8 @@ int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const 
   return -1;
 }
 
-int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, GroupEnergy* energy,
+int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* weight, double* P, GroupEnergy* energy,
                     const LaminateLanes* laminates) const noexcept {
-  const int d = dimension(laws_.space());
   const bool tangent = work_ == Work::tangent;
   int bad = evaluate_laws(n, s, points, numbers, tangent ? nullptr : P, tangent ? P : nullptr);
   if (bad >= 0) return bad;
@@ -159,12 +171,8 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   if (bad >= 0) return bad;
   add_energies(n, weight, s, 0, energy);
   if (along_) add_samples(n, s, s.own_weight, *along_, true);
-  if (work_ == Work::sample) return -1;
-  const double sign = tangent ? -1.0 : 1.0;
-  for (int l = 0; l < n; l += pack_width) {
-    const Pack w = Pack::load(weight + l) * Pack(sign);
-    for (int c = 0; c < d * d; ++c) (w * Pack::load(P + c * batch_points + l)).store(P + c * batch_points + l);
-  }
+  for (int l = 0; l < n && tangent; l += pack_width) (-Pack::load(weight + l)).store(weight + l);
+  s.stress_weight = weight;
   return -1;
 }
 
@@ -262,6 +270,7 @@ void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
 }
 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept {
+  s.stress_weight = nullptr;
   if (finder_) {
     finder_->add(n, selective_ ? s.Ht : s.H, s);
     return -1;
@@ -300,8 +309,11 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnerg
   // Laminates have no weight left here.
   bad = pass(n, s, s.far, s.far_number, s.far_weight, s.other, energy, nullptr);
   const int d = dimension(laws_.space());
+  multiply_stress(n, d * d, s.weight, s.P);
+  multiply_stress(n, d * d, s.far_weight, s.other);
   for (int c = 0; c < d * d; ++c)
     for (int l = 0; l < n; ++l) s.P[c * batch_points + l] += s.other[c * batch_points + l];
+  s.stress_weight = nullptr;
   return bad;
 }
 

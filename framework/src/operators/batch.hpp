@@ -40,7 +40,8 @@ struct Balance {
 struct BatchScratch {
   alignas(64) double H[9 * batch_points];
   alignas(64) double dH[9 * batch_points];
-  alignas(64) double P[9 * batch_points];        ///< result: weighted stress
+  alignas(64) double P[9 * batch_points];        ///< result: stress, of which every lane counts stress_weight
+  const double* stress_weight = nullptr;         ///< result: -W for a tangent, else W; null: P is weighted already
   alignas(64) double other[9 * batch_points];    ///< stress of the far ends' material
   alignas(64) double psi[batch_points];
   alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
@@ -151,11 +152,15 @@ class BatchWork {
   /// What is done in place of laws; null: laws are.
   const Balance* balance() const noexcept { return balance_; }
 
-  /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well.
-  /// s.P <- sum of W P (force) or -W A:dH (tangent). Adds the energies of the lanes to *energy. Returns the first bad lane or -1.
+  /// Evaluates n lanes with W = weight (owner's law) and, where `both_ends`, W = far_weight for the far end's law as well; with forces and tangents
+  /// neither is kept.
+  /// s.P times s.stress_weight <- sum of W P (force) or -W A:dH (tangent). Adds the energies of the lanes to *energy. Returns the first bad lane
+  /// or -1.
   /// With the selective map gradients come in as s.Ht, s.dHt, with s.owner_volumes; s.pressure and s.pressure_rate are results too; both
   /// ends of at most batch_points / 2 lanes.
   int evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept;
+  /// After evaluate, for whoever does not weigh stresses where they are read.
+  void weigh_stress(int n, BatchScratch& s) const noexcept;
   /// After evaluate with Work::sample: adds lane l to the sums of owner s.owner[l], and of both_ends with far_weight to those of s.far[l].
   void add_samples(int n, const BatchScratch& s, const SampleSums& sums, bool both_ends) const noexcept {
     add_samples(n, s, s.weight, sums, both_ends);
@@ -169,7 +174,7 @@ class BatchWork {
     const LaminatePoint* point[batch_points];
   };
 
-  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, const double* weight, double* P, GroupEnergy* energy,
+  int pass(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* weight, double* P, GroupEnergy* energy,
            const LaminateLanes* laminates) const noexcept;
   void find_laminates(int n, const BatchScratch& s, bool both_ends, LaminateLanes& lanes) const noexcept;
   void merge_weights(BatchScratch& s, const LaminateLanes& lanes) const noexcept;

@@ -88,10 +88,11 @@ inline void add_to_cells(double* to, Pack value, std::uint8_t mask) noexcept {
 }
 
 /// The adjoint of lattice_bond_gradient: adds t = WP g to the owners' forces and -t to the far ends', S = WP - t (x) xi to the
-/// stress on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written.
-template <int D, bool per_slot, bool both>
+/// stress on Hbar of the owners (and of the far ends). masks[k]: lanes whose far end is live; only live cells are written. W: by lane; not read
+/// unless `weighs`: P is weighted already.
+template <int D, bool per_slot, bool both, bool weighs>
 void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v,
-                          double far_share, const double* WP, FieldView force, FieldView stress) noexcept {
+                          double far_share, const double* P, const double* W, FieldView force, FieldView stress) noexcept {
   const Pack near(both ? 1 - far_share : 1.0), other(far_share);
   for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
     // Every loop over components is unrolled whole: sums of the owners stay in registers.
@@ -108,7 +109,10 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
       }
       PERIKIT_UNROLL for (int c = 0; c < D; ++c) {
         Pack row[D];
-        PERIKIT_UNROLL for (int e = 0; e < D; ++e) row[e] = Pack::load(WP + (c * D + e) * batch_points + lane);
+        PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
+          row[e] = Pack::load(P + (c * D + e) * batch_points + lane);
+          if constexpr (weighs) row[e] = Pack::load(W + lane) * row[e];
+        }
         t[c] = bond_shape_row_adjoint<D>(row, xi, g);
         own_t[c] += t[c];
         PERIKIT_UNROLL for (int e = 0; e < D; ++e) own_S[c * D + e] += near * (S[c * D + e] = row[e]);

@@ -215,13 +215,14 @@ void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool bo
   for (int l = 0; l < n; l += pack_width) {
     Pack xi[D], g[D];
     RowColumns t, stress[D];  // t: on the far ends
+    const Pack weight = s.stress_weight ? Pack::load(s.stress_weight + l) : Pack(1.0);
     PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
       xi[e] = Pack::load(s.bond[0] + e * batch_points + l);
       g[e] = Pack::load(s.bond[1] + e * batch_points + l);
     }
     PERIKIT_UNROLL for (int c = 0; c < D; ++c) {
       Pack P[D];
-      PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = Pack::load(s.P + (c * D + e) * batch_points + l);
+      PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = weight * Pack::load(s.P + (c * D + e) * batch_points + l);
       const Pack owners = bond_shape_row_adjoint<D>(P, xi, g);
       own[c] += owners;
       t[c] = -owners;

@@ -66,7 +66,9 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       pass.add_samples(n, s);
       continue;
     }
-    for (int l = 0; l < n && !pass.alone(); ++l) {
+    if (pass.alone()) continue;
+    pass.work.weigh_stress(n, s);
+    for (int l = 0; l < n; ++l) {
       Row S[D];
       for (int e = 0; e < D; ++e) {
         S[e] = Row{};

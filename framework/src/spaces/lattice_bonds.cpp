@@ -175,13 +175,13 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   const auto gradient = [&](auto per_slot, auto of_both, ConstFieldView u, ConstFieldView Hbar, double* to) {
     lattice_bond_gradient<D, per_slot.value, of_both.value>(shifts, masks, slots, p, vectors, far_share_, u, Hbar, to);
   };
-  const auto adjoint = [&](auto per_slot, auto of_both) {
-    lattice_bond_adjoint<D, per_slot.value, of_both.value>(shifts, masks, slots, p, vectors, far_share_, s.P,
-                                                           pass.out, flux_);
+  const auto adjoint = [&](auto per_slot, auto of_both, auto weighs) {
+    lattice_bond_adjoint<D, per_slot.value, of_both.value, weighs.value>(shifts, masks, slots, p, vectors, far_share_, s.P, s.stress_weight, pass.out,
+                                                                         flux_);
   };
   // The kernels are compiled for each way of reading the bond vectors and each base.
+  using std::false_type, std::true_type;
   const auto choose = [&](const auto& kernel, auto... arguments) {
-    using std::false_type, std::true_type;
     const bool both = far_share_ > 0;
     if (vectors.per_slot)
       both ? kernel(true_type(), true_type(), arguments...) : kernel(true_type(), false_type(), arguments...);
@@ -216,7 +216,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
     return sampled_pairs && !one_law ? sample_far_ends(lanes, s, pass) : -1;
   }
   if (pass.alone()) return -1;
-  choose(adjoint);
+  s.stress_weight ? choose(adjoint, true_type()) : choose(adjoint, false_type());
   if (selective_) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
 }

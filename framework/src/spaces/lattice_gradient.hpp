@@ -33,11 +33,11 @@ class LatticeOperator {
     runs<true>(chunks, count, u, H, stride, sums);
   }
 
-  /// Q = S K^-1 / spacing for one chunk, in place of any weighted stress S: Q[c] at at + lane.
-  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at) const noexcept {
+  /// Q = W S K^-1 / spacing for one chunk, in place of any stress S: Q[c] at at + lane. W: by lane; null: S is weighted already.
+  void stress_to_flux(const LatticeChunk& chunk, const double* S, std::size_t s_stride, FieldView Q, std::int64_t at, const double* W = nullptr) const noexcept {
     const LatticePattern& pattern = f_.pattern(chunk);
-    const Pack scale(1.0 / f_.spacing);
     for (int l = 0; l < chunk_points; l += pack_width) {
+      const Pack scale = W ? Pack(1.0 / f_.spacing) * Pack::load(W + l) : Pack(1.0 / f_.spacing);
       Pack inverse[6];
       for (int k = 0; k < symmetric_components(D); ++k) inverse[k] = Pack::load(pattern.inverse[k] + l) * scale;
       for (int c = 0; c < D; ++c) {

@@ -190,8 +190,10 @@ void LatticePoints<D>::by_rows(std::size_t b, Pass& pass) {
       if (pass.work.tangent()) gradients(&r.index[i], n, pass.w, s.dH);
       s.keep_history = own;
       if (!evaluate(&r.index[i], n, s, pass, own ? &energy : &of_others)) return;
-      for (int k = 0; k < n; ++k, ++i)
-        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i]);
+      for (int k = 0; k < n; ++k, ++i) {
+        const double* const weight = s.stress_weight ? s.stress_weight + k * chunk_points : nullptr;
+        operator_.stress_to_flux(chunk(r.index[i]), s.P + k * chunk_points, batch_points, r.flux, r.at[i], weight);
+      }
     }
     // Row by row, so that the order of sums does not depend on how many rows are taken together: a rank may have a part of the block.
     std::int64_t start = gap_;

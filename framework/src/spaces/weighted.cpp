@@ -146,6 +146,7 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     if (sample) pass.add_samples(n, s);
     if (alone) continue;
     if (selective_) add_pressures(n, 1, s, tangent, m);
+    pass.work.weigh_stress(n, s);
     stencil.add_stress(first, n, s.P, batch_points);
   }
   if (alone) return -1;
@@ -222,6 +223,7 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
     pass.work.screen(members, 8, slots * 8, s);
     if (sample) pass.add_samples(slots * 8, s);
     if (selective_ && !alone) add_pressures(slots * 8, 8, s, tangent, m);
+    if (!alone) pass.work.weigh_stress(slots * 8, s);
     slots = 0;
     for (; begin != end; slots += begin++->size)
       if (!alone) orbit_stresses<D>(*begin, s.P, slots, m.m.data());
@@ -284,6 +286,7 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
     }
     if (alone) continue;
     if (selective_) add_pressures(8 * n, 8, s, tangent, m);
+    pass.work.weigh_stress(8 * n, s);
     scatter(first, n);
   }
   if (alone || !selective_) return -1;
