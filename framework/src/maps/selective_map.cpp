@@ -82,22 +82,30 @@ Pack growth_rate(const OwnerVolumes& owners, int at, Pack rate) noexcept {
   return Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate);
 }
 
-template <class S, bool tangent>
-[[gnu::flatten]] void map(const SelectiveBatch& in, double* H, double* dH) noexcept {
+template <class S, bool tangent, int ends>
+[[gnu::flatten]] void map(const SelectiveBatch in, double* H, double* dH) noexcept {
+  // In loops of their own: one that waits for a root, a division after it, and then for many components, holds up all that come next.
+  alignas(64) double jt[batch_points], root[batch_points];
+  for (int l = 0; l < in.lanes; l += pack_width) jacobian_minus_one(load_in_space<S>(in.Ht + l, batch_points)).store(jt + l);
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const Pack J = positive_or_nan(Pack::load(jt + l) + Pack(1.0));
+    reciprocal(J).store(in.inverse + l);
+    reciprocal_cbrt(J).store(root + l);
+  }
+  for (int l = 0; l < in.lanes; l += pack_width) {
+    const Growth growth{Pack::load(jt + l), Pack::load(in.inverse + l), Pack::load(root + l)};
+    for (int at = l; at < ends * in.lanes; at += in.lanes) growth(in.volume, at).store(in.growth + at);
+  }
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ht = load_in_space<S>(in.Ht + l, batch_points), Ft = add_diagonal(Ht, Pack(1.0));
-    const Pack jt = jacobian_minus_one(Ht), J = positive_or_nan(jt + Pack(1.0)), inverse = reciprocal(J);
-    inverse.store(in.inverse + l);
-    const Growth growth{jt, inverse, reciprocal_cbrt(J)};
-    for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
-      const Pack grow = growth(in.volume, at);
-      grow.store(in.growth + at);
+    for (int at = l; at < ends * in.lanes; at += in.lanes) {
+      const Pack grow = Pack::load(in.growth + at);
       PERIKIT_UNROLL for (int c = 0; c < S::components; ++c)(Ht[c] + grow * Ft[c]).store(H + c * batch_points + at);
     }
     if constexpr (tangent) {
       const auto dFt = load_in_space<S>(in.dHt + l, batch_points);
-      const Pack rate = inverse * inner(cofactor(Ft), dFt);
-      for (int at = l; at < in.ends * in.lanes; at += in.lanes) {
+      const Pack rate = Pack::load(in.inverse + l) * inner(cofactor(Ft), dFt);
+      for (int at = l; at < ends * in.lanes; at += in.lanes) {
         const Pack grow = Pack::load(in.growth + at), m = grow + share_of(in.volume, at);
         const auto dFh = (grow + Pack(1.0)) * dFt + (m * growth_rate(in.volume, at, rate)) * Ft;
         PERIKIT_UNROLL for (int c = 0; c < S::components; ++c) dFh[c].store(dH + c * batch_points + at);
@@ -122,34 +130,43 @@ void store_in_space(const Tensor<Pack, S>& t, double* x) noexcept {
   PERIKIT_UNROLL for (int c = 0; c < S::dimension * S::dimension; ++c) t[c].store(x + c * batch_points);
 }
 
-template <class S>
-[[gnu::flatten]] void pull_back(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+template <class S, int ends>
+[[gnu::flatten]] void pull_back(const SelectiveBatch in, const SelectiveStress stress) noexcept {
+  for (int end = 0; end < ends; ++end)
+    for (int l = 0; l < in.lanes; l += pack_width) {
+      const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
+      const int at = end * in.lanes + l;
+      (EndOfBond(in, stress, end, l).share * inner(load<S>(stress.P + at), Ft)).store(stress.pressure + at);
+    }
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
-    auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
-    Pack sum_p(0.0);
-    for (int end = 0; end < in.ends; ++end) {
+    const auto turned = cofactor(Ft);
+    Pack factor[2] = {0.0, 0.0}, sum_p(0.0);
+    for (int end = 0; end < ends; ++end) {
       const EndOfBond bond(in, stress, end, l);
-      const auto P = load<S>(stress.P + end * in.lanes + l);
-      const Pack p = bond.share * inner(P, Ft);
-      p.store(stress.pressure + end * in.lanes + l);
-      sum_p += p;
-      sum = sum + (bond.weight * bond.a) * P;
+      factor[end] = bond.weight * bond.a;
+      sum_p += Pack::load(stress.pressure + end * in.lanes + l);
     }
-    store_in_space(sum - (sum_p * Pack::load(in.inverse + l)) * cofactor(Ft), stress.S + l);
+    const Pack volume = sum_p * Pack::load(in.inverse + l);
+    PERIKIT_UNROLL for (int c = 0; c < S::dimension * S::dimension; ++c) {
+      const double* const P = stress.P + c * batch_points + l;
+      Pack sum = factor[0] * Pack::load(P) - volume * turned[c];
+      if (ends == 2) sum += factor[1] * Pack::load(P + in.lanes);
+      sum.store(stress.S + c * batch_points + l);
+    }
   }
 }
 
 /// d(a P - p/3 F^-T) = a dP + m phi P - dp/3 F^-T + p/3 F^-T dF^T F^-T
-template <class S>
-[[gnu::flatten]] void pull_back_tangent(const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
+template <class S, int ends>
+[[gnu::flatten]] void pull_back_tangent(const SelectiveBatch in, const SelectiveStress stress) noexcept {
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0)),
                dFt = load_in_space<S>(in.dHt + l, batch_points);
     const auto Ftm = Pack::load(in.inverse + l) * cofactor(Ft);
     auto sum = Tensor<Pack, S>::map([](int) { return Pack(0.0); });
     Pack sum_p(0.0), sum_dp(0.0);
-    for (int end = 0; end < in.ends; ++end) {
+    for (int end = 0; end < ends; ++end) {
       const int at = end * in.lanes + l;
       const EndOfBond bond(in, stress, end, l);
       const auto P = load<S>(stress.P + at), dP = load<S>(stress.dP + at);
@@ -190,11 +207,17 @@ void add_owner_stress(Space space, const OwnerGradients& in, const double* press
 }
 
 void selective_map(Space space, const SelectiveBatch& in, double* H, double* dH) noexcept {
-  in_space(space, [&]<class S>(S) { in.dHt ? map<S, true>(in, H, dH) : map<S, false>(in, H, dH); });
+  in_space(space, [&]<class S>(S) {
+    if (in.ends == 1) in.dHt ? map<S, true, 1>(in, H, dH) : map<S, false, 1>(in, H, dH);
+    else in.dHt ? map<S, true, 2>(in, H, dH) : map<S, false, 2>(in, H, dH);
+  });
 }
 
 void selective_pull_back(Space space, const SelectiveBatch& in, const SelectiveStress& stress) noexcept {
-  in_space(space, [&]<class S>(S) { in.dHt ? pull_back_tangent<S>(in, stress) : pull_back<S>(in, stress); });
+  in_space(space, [&]<class S>(S) {
+    if (in.ends == 1) in.dHt ? pull_back_tangent<S, 1>(in, stress) : pull_back<S, 1>(in, stress);
+    else in.dHt ? pull_back_tangent<S, 2>(in, stress) : pull_back<S, 2>(in, stress);
+  });
 }
 
 }  // namespace perikit

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "operators/lane_stresses.hpp"
 #include "perikit/core/parallel.hpp"
@@ -24,9 +23,9 @@ void BondSamples::add(const Entry& entry) {
 
 void BondSamples::add(int n, const BatchScratch& s, bool selective) {
   std::vector<Entry>& entries = of_thread_[static_cast<std::size_t>(thread_index())];
-  std::optional<LaneStresses> stresses;
+  LaneStresses stresses;
   const int components = dimension(space_) * dimension(space_);
-  if (what_ == BondSampling::stress) stresses.emplace(n, space_, s);
+  if (what_ == BondSampling::stress) stresses.find(n, space_, s);
   for (int l = 0; l < n; ++l) {
     const double w = s.weight[l];
     if (w == 0 || s.owner[l] == s.far[l] || !keeps(s.owner[l], s.far[l])) continue;
@@ -40,7 +39,7 @@ void BondSamples::add(int n, const BatchScratch& s, bool selective) {
     }
     if (what_ != BondSampling::stress) continue;
     constexpr int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-    const auto sigma = [&](int a, int b) { return stresses->sigma[3 * a + b][l]; };
+    const auto sigma = [&](int a, int b) { return stresses.sigma[3 * a + b][l]; };
     for (int c = 0; c < 6; ++c) entry.tensor[c] = 0.5 * w * (sigma(pair[c][0], pair[c][1]) + sigma(pair[c][1], pair[c][0]));
   }
 }

@@ -7,23 +7,23 @@
 
 namespace perikit {
 
-/// Of the first n lanes of a batch, in three dimensions whatever the space is.
+/// Of the lanes of a batch, in three dimensions whatever the space is; unset before `find`.
 struct LaneStresses {
   alignas(64) double sigma[9][batch_points];      ///< row by row [Pa]
   alignas(64) double von_mises[batch_points];   ///< [Pa]
 
-  /// sigma = P F^T / det F; not stored without `tensors`.
-  LaneStresses(int n, Space space, const BatchScratch& s, bool tensors = true) noexcept {
+  /// Of the first n lanes, sigma = P F^T / det F; not stored without `tensors`.
+  void find(int n, Space space, const BatchScratch& s, bool tensors = true) noexcept {
     const bool stress_space = space == Space::plane_stress || space == Space::line_stress;
-    if (dimension(space) == 3) tensors ? find<3, true>(n, nullptr, s) : find<3, false>(n, nullptr, s);
-    else if (dimension(space) == 2) find<2, true>(n, stress_space ? s.lateral : nullptr, s);
-    else find<1, true>(n, stress_space ? s.lateral : nullptr, s);
+    if (dimension(space) == 3) tensors ? of_lanes<3, true>(n, nullptr, s) : of_lanes<3, false>(n, nullptr, s);
+    else if (dimension(space) == 2) of_lanes<2, true>(n, stress_space ? s.lateral : nullptr, s);
+    else of_lanes<1, true>(n, stress_space ? s.lateral : nullptr, s);
   }
 
  private:
   /// lateral: strain of the free axes; null: in s.H.
   template <int d, bool tensors>
-  void find(int n, const double* lateral, const BatchScratch& s) noexcept {
+  void of_lanes(int n, const double* lateral, const BatchScratch& s) noexcept {
     for (int l = 0; l < n; l += pack_width) {
       Pack F[3][3] = {}, P[3][3] = {};
       PERIKIT_UNROLL for (int a = 0; a < 3; ++a) {

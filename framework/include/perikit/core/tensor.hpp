@@ -156,12 +156,12 @@ Tensor<T, S> transpose_times(const Tensor<T, S>& a, const Tensor<T, S>& b) noexc
   });
 }
 
-/// a : b, the sum of all products of components.
+/// a : b, the sum of all products of components: in three sums, which do not wait for each other.
 template <class T, class S>
 T inner(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
-  T r = a[0] * b[0];
-  PERIKIT_UNROLL for (int k = 1; k < S::components; ++k) r = r + a[k] * b[k];
-  return r;
+  T sum[3] = {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+  PERIKIT_UNROLL for (int k = 3; k < S::components; ++k) sum[k % 3] = sum[k % 3] + a[k] * b[k];
+  return sum[0] + sum[1] + sum[2];
 }
 
 /// (a + a^T)/2.

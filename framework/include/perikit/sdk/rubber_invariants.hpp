@@ -34,15 +34,20 @@ template <class T, class S>
   return -(second_invariant(d) * (1.0 + m) + determinant(d));
 }
 
-/// J^(-2/3) I1(C) - 3 = 3 s - 3, s = (1 + m) J^(-2/3), with the digits of small strains: s^3 - 1 = ((1 + m)^3 - J^2)/J^2. In the numerator cancels
-/// what a rotation adds to H; where that takes more than six digits the deviator keeps them.
+/// J^(-2/3) I1(C) - 3 = 3 t, 1 + t = s = (1 + m) J^(-2/3), with the digits of small strains: s^3 - 1 = ((1 + m)^3 - J^2)/J^2 = e. In the numerator
+/// cancels what a rotation adds to H; where that takes more than six digits the deviator keeps them. Of a small t that is s - 1 rounding leaves
+/// nothing; a step of Newton gives it the digits of e,
+///   t - (t (3 + t (3 + t)) - e)/(3 (1 + t)^2),
+/// where (1 - t)/3 will do for the last factor: it differs by no more than t, and vanishes at t = 1, from where on s - 1 has all digits.
 template <class T, class S>
 T first_isochoric_strain(const Tensor<T, S>& H, const RubberInvariants<T>& of) noexcept {
-  const T &j = of.j, &m = of.m, scale = of.root * of.root, inverse_J = of.root * scale, s = scale * (1.0 + m);
+  const T &j = of.j, &m = of.m, scale = of.root * of.root, inverse_J = of.root * scale;
   T cubes = of.shape + ((m * m) * (3.0 + m) - j * j);
-  if (const auto turned = cubes - 1e-6 * of.square < 0.0; any(turned)) [[unlikely]]
-    cubes = select(turned, cubes_of_deviator(H, m), cubes);
-  return (3.0 * cubes) * (inverse_J * inverse_J) * reciprocal(T(1.0 + s * (1.0 + s)));
+  if (const auto turned = cubes - 1e-6 * of.square < 0.0; any(turned)) [[unlikely]]  // a copy of H, which need not be in memory for it
+    cubes = select(turned, cubes_of_deviator(Tensor<T, S>::map([&](int c) { return H[c]; }), m), cubes);
+  const T t = scale * m + (scale - 1.0), near = select(t < 1.0, t, T(1.0));
+  const T beyond = near * (3.0 + near * (3.0 + near)) - cubes * (inverse_J * inverse_J);
+  return 3.0 * t + (near - 1.0) * beyond;
 }
 
 /// J^(-4/3) I2(C) - 3 = 3 s^2 - 3 + J^(-4/3) I2(d), d the deviator of C - I or b - I. first: the one before.
