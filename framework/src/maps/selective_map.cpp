@@ -82,9 +82,10 @@ Pack growth_rate(const OwnerVolumes& owners, int at, Pack rate) noexcept {
   return Pack(1.0 / 3.0) * (load_volume(owners, volume_rate, at) - rate);
 }
 
+// Batches by value, here and below: a pack that is stored may be any member of what others see, which would be read again for every component.
 template <class S, bool tangent, int ends>
 [[gnu::flatten]] void map(const SelectiveBatch in, double* H, double* dH) noexcept {
-  // In loops of their own: one that waits for a root, a division after it, and then for many components, holds up all that come next.
+  // In loops of their own: lanes that wait for a root and for a division after it would hold up the many components of those that follow.
   alignas(64) double jt[batch_points], root[batch_points];
   for (int l = 0; l < in.lanes; l += pack_width) jacobian_minus_one(load_in_space<S>(in.Ht + l, batch_points)).store(jt + l);
   for (int l = 0; l < in.lanes; l += pack_width) {
@@ -132,26 +133,21 @@ void store_in_space(const Tensor<Pack, S>& t, double* x) noexcept {
 
 template <class S, int ends>
 [[gnu::flatten]] void pull_back(const SelectiveBatch in, const SelectiveStress stress) noexcept {
-  for (int end = 0; end < ends; ++end)
-    for (int l = 0; l < in.lanes; l += pack_width) {
-      const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
-      const int at = end * in.lanes + l;
-      (EndOfBond(in, stress, end, l).share * inner(load<S>(stress.P + at), Ft)).store(stress.pressure + at);
-    }
   for (int l = 0; l < in.lanes; l += pack_width) {
     const auto Ft = add_diagonal(load_in_space<S>(in.Ht + l, batch_points), Pack(1.0));
-    const auto turned = cofactor(Ft);
-    Pack factor[2] = {0.0, 0.0}, sum_p(0.0);
-    for (int end = 0; end < ends; ++end) {
+    Pack factor[ends], sum_p(0.0);
+    PERIKIT_UNROLL for (int end = 0; end < ends; ++end) {
       const EndOfBond bond(in, stress, end, l);
+      const Pack p = bond.share * inner(load<S>(stress.P + end * in.lanes + l), Ft);
+      p.store(stress.pressure + end * in.lanes + l);
       factor[end] = bond.weight * bond.a;
-      sum_p += Pack::load(stress.pressure + end * in.lanes + l);
+      sum_p += p;
     }
-    const Pack volume = sum_p * Pack::load(in.inverse + l);
+    const auto turned = (sum_p * Pack::load(in.inverse + l)) * cofactor(Ft);
+    // P once more: sixteen registers do not hold its two ends.
     PERIKIT_UNROLL for (int c = 0; c < S::dimension * S::dimension; ++c) {
-      const double* const P = stress.P + c * batch_points + l;
-      Pack sum = factor[0] * Pack::load(P) - volume * turned[c];
-      if (ends == 2) sum += factor[1] * Pack::load(P + in.lanes);
+      Pack sum = -turned[c];
+      PERIKIT_UNROLL for (int end = 0; end < ends; ++end) sum += factor[end] * Pack::load(stress.P + c * batch_points + end * in.lanes + l);
       sum.store(stress.S + c * batch_points + l);
     }
   }
