@@ -345,6 +345,24 @@ TEST_CASE("energies of rubber keep nine digits where small strains are turned fa
   check_turned(MooneyRivlin(), {0.3, 0.1, 8.0}, "mooney_rivlin");
 }
 
+TEST_CASE("energies of neo_hookean have all digits at any stretch, against their definition in extended precision") {
+  using Long = long double;
+  const std::vector<double> constants = {0.8, 8.0};
+  // On both sides of J^(-2/3) tr C / 3 = 2, where a step of Newton ends, and far beyond.
+  for (const double stretch : {0.01, 0.1, 0.3, 0.5, 0.9, 0.99, 1.01, 1.1, 1.5, 2.0, 2.1, 2.2, 2.3, 2.4, 2.5, 3.0, 10.0, 100.0})
+    for (const double volume : {0.2, 0.7, 1.0, 1.3, 5.0}) {
+      const double across = std::sqrt(volume / stretch);
+      const contract::Values H = {stretch - 1, 0, 0, 0.1 * across, across - 1, 0, 0, 0, across - 1};
+      const Evaluation found(LawMaterial<NeoHookean>(), Space::solid, constants, {H});
+      Long trace = 0;
+      for (std::size_t i = 0; i < 9; ++i) trace += (H[i] + (i % 4 == 0 ? Long(1) : Long(0))) * (H[i] + (i % 4 == 0 ? Long(1) : Long(0)));
+      const Long J = (1 + Long(H[0])) * (1 + Long(H[4])) * (1 + Long(H[8]));
+      const Long expected = Long(constants[0]) / 2 * (trace / std::cbrt(J * J) - 3) + Long(constants[1]) / 2 * (J - 1) * (J - 1);
+      CHECK_MESSAGE(std::abs(static_cast<double>(found.psi.data()[0] / expected - 1)) <= 2e-14, "stretch ", stretch, ", volume ", volume, ": ",
+                    found.psi.data()[0], ", expected ", static_cast<double>(expected));
+    }
+}
+
 TEST_CASE("hencky: stress and tangent at and near equal principal stretches") {
   contract::Random random(3);
   for (int shape = 0; shape < 3; ++shape)
