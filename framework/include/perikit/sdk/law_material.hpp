@@ -270,13 +270,7 @@ class LawMaterial final : public Material {
   }
 
   template <class S, bool free_stretch>
-  Status run(const MaterialBatch& b) const noexcept {
-    return b.psi ? loop<S, free_stretch, true>(b) : loop<S, free_stretch, false>(b);
-  }
-
-  /// with_energy: psi is asked for. Without a branch between them stress and energy share what they can.
-  template <class S, bool free_stretch, bool with_energy>
-  PERIKIT_FLATTEN Status loop(const MaterialBatch& b) const noexcept {
+  PERIKIT_FLATTEN Status run(const MaterialBatch& b) const noexcept {
     constexpr bool own_constants = free_stretch && S::confined;
     constexpr bool own_zeros = free_stretch && HasFreeZeros<Law, Pack, S, Constants>;
     Status status;
@@ -331,22 +325,23 @@ class LawMaterial final : public Material {
         probe += 0.0 * sum_of_components<S>([&](int c) { return P[c]; });
       };
       if constexpr (HasHistory<Law>) {
-        if (with_energy || b.P || b.state_new || b.dissipated) {
+        if (b.psi || b.P || b.state_new || b.dissipated) {
           const auto end = law.update(H, k);
-          if constexpr (with_energy) put_energy(end.psi);
+          if (b.psi) put_energy(end.psi);
           if (b.dissipated) end.dissipated.store(b.dissipated + p);
           if (b.P) put_stress(end.P);
           if (b.state_new)
             for (std::size_t i = 0; i < end.state.size(); ++i) end.state[i].store(b.state_new + i * b.state_stride + p);
         }
       } else {
-        if (with_energy || b.P) {
+        if (b.psi || b.P) {
+          // Stress first, and always: what the energy has in common with it is there by then.
           const Tensor<Pack, S> P = [&] {
             if constexpr (own_zeros) return zeros.equation[in_group].stress(H, zeros.root[in_group]);
             else if constexpr (looks_ahead<S, free_stretch>) return stress(law, H, k, ahead[at]);
             else return stress(law, H, k);
           }();
-          if constexpr (with_energy) {
+          if (b.psi) {
             if constexpr (!HasEnergy<Law, Pack, S, Constants>) put_energy(0.0);
             else if constexpr (looks_ahead<S, free_stretch>) put_energy(energy(law, H, k, ahead[at]));
             else put_energy(energy(law, H, k));
@@ -356,8 +351,7 @@ class LawMaterial final : public Material {
       }
       if (b.dP || b.A) {
         if constexpr (own_zeros) tangents<S, free_stretch>(law, b, p, H, k, FreeRoot{zeros.equation[in_group], zeros.root[in_group]});
-        else if constexpr (free_stretch) tangents<S, free_stretch>(law, b, p, H, k, ahead[at]);
-        else tangents<S, free_stretch>(law, b, p, AsLoaded(), k, ahead[at]);
+        else tangents<S, free_stretch>(law, b, p, H, k, ahead[at]);
       }
       good &= probe == 0.0;
       if (!all(good)) [[unlikely]]
@@ -366,16 +360,9 @@ class LawMaterial final : public Material {
     return status;
   }
 
-  /// In place of a gradient that is the batch's: handed over, it would have to be in memory, at every evaluation.
-  struct AsLoaded {};
-
-  template <class S, bool free_stretch, class StepLaw, class Gradient, class Invariants>
-  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Gradient& gradient,
+  template <class S, bool free_stretch, class StepLaw, class Invariants>
+  [[gnu::noinline]] PERIKIT_FLATTEN static void tangents(const StepLaw& law, const MaterialBatch& b, int p, const Tensor<Pack, S>& H,
                                                        const Constants& k, [[maybe_unused]] const Invariants& of) noexcept {
-    const Tensor<Pack, S> H = [&] {
-      if constexpr (std::is_same_v<Gradient, AsLoaded>) return load<S>(b.H, b.stride, p);
-      else return gradient;
-    }();
     const auto action = [&] {
       if constexpr (free_stretch && HasFreeZeros<Law, Pack, S, Constants>)
         return of.equation.tangent(H, of.root);

@@ -44,8 +44,7 @@ T first_isochoric_strain(const Tensor<T, S>& H, const RubberInvariants<T>& of) n
   const T &j = of.j, &m = of.m, scale = of.root * of.root, inverse_J = of.root * scale;
   T cubes = of.shape + ((m * m) * (3.0 + m) - j * j);
   if (const auto turned = cubes - 1e-6 * of.square < 0.0; any(turned)) [[unlikely]]
-    // Of a copy: H itself would have to be in memory, at every evaluation.
-    cubes = select(turned, cubes_of_deviator(Tensor<T, S>::map([&](int c) { return H[c]; }), m), cubes);
+    cubes = select(turned, cubes_of_deviator(H, m), cubes);
   const T t = scale * m + (scale - 1.0), near = select(t < 1.0, t, T(1.0));
   const T beyond = near * (3.0 + near * (3.0 + near)) - cubes * (inverse_J * inverse_J);
   return 3.0 * t + (near - 1.0) * beyond;
