@@ -156,12 +156,18 @@ Tensor<T, S> transpose_times(const Tensor<T, S>& a, const Tensor<T, S>& b) noexc
   });
 }
 
-/// a : b, the sum of all products of components: in three sums, which do not wait for each other.
+/// of(c) over the components of a tensor, in three sums, which do not wait for each other.
+template <class S, class Of>
+auto sum_of_components(const Of& of) noexcept {
+  decltype(of(0)) sum[3] = {of(0), of(1), of(2)};
+  PERIKIT_UNROLL for (int c = 3; c < S::components; ++c) sum[c % 3] = sum[c % 3] + of(c);
+  return sum[0] + sum[1] + sum[2];
+}
+
+/// a : b, the sum of all products of components.
 template <class T, class S>
 T inner(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
-  T sum[3] = {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
-  PERIKIT_UNROLL for (int k = 3; k < S::components; ++k) sum[k % 3] = sum[k % 3] + a[k] * b[k];
-  return sum[0] + sum[1] + sum[2];
+  return sum_of_components<S>([&](int c) -> T { return a[c] * b[c]; });
 }
 
 /// (a + a^T)/2.

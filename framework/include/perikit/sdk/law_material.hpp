@@ -186,12 +186,10 @@ class LawMaterial final : public Material {
     }
   }
 
-  /// In three sums, which do not wait for each other.
-  template <class S, class Of>
-  static Pack sum_of_components(const Of& of) noexcept {
-    Pack total[3] = {of(0), of(1), of(2)};
-    PERIKIT_UNROLL for (int c = 3; c < S::components; ++c) total[c % 3] += of(c);
-    return total[0] + total[1] + total[2];
+  /// The same pointer, of which the compiler knows nothing.
+  static double* hidden(double* pointer) noexcept {
+    asm volatile("" : "+r"(pointer));
+    return pointer;
   }
 
   /// Lanes of finite H and, but for small-strain laws, 0 < det F < infinity.
@@ -335,18 +333,20 @@ class LawMaterial final : public Material {
         }
       } else {
         if (b.psi || b.P) {
-          // Stress first, and always: what the energy has in common with it is there by then.
+          // Stress first, and always: what the energy has in common with it is there by then. What is asked for is hidden from the compiler: one
+          // that knew would write this once for energies and once without, contract products otherwise, and stresses would have other last bits.
+          double *const energies = hidden(b.psi), *const stresses = hidden(b.P);
           const Tensor<Pack, S> P = [&] {
             if constexpr (own_zeros) return zeros.equation[in_group].stress(H, zeros.root[in_group]);
             else if constexpr (looks_ahead<S, free_stretch>) return stress(law, H, k, ahead[at]);
             else return stress(law, H, k);
           }();
-          if (b.psi) {
+          if (energies) {
             if constexpr (!HasEnergy<Law, Pack, S, Constants>) put_energy(0.0);
             else if constexpr (looks_ahead<S, free_stretch>) put_energy(energy(law, H, k, ahead[at]));
             else put_energy(energy(law, H, k));
           }
-          if (b.P) put_stress(P);
+          if (stresses) put_stress(P);
         }
       }
       if (b.dP || b.A) {
