@@ -144,10 +144,11 @@ int flushed(int status) {
 
 int main(int argc, char** argv) {
   open_standard_streams();
-  // Waiting threads must sleep: spinning ones make a busy machine several times slower. The runtime reads this when it starts,
-  // which is before main; so the program starts itself again once.
+  // Waiting threads must sleep: spinning ones make a busy machine several times slower. They look for more work for ten microseconds or so before
+  // that, since waking takes as long. The runtime reads this when it starts, which is before main; so the program starts itself again once.
   if (!std::getenv("OMP_WAIT_POLICY")) {
     setenv("OMP_WAIT_POLICY", "passive", 1);
+    setenv("GOMP_SPINCOUNT", "1000", 0);
     execv("/proc/self/exe", argv);
   }
   // Factorizations have threads of ours or none; those of OpenBLAS would only take memory, 128 MiB each.

@@ -8,9 +8,13 @@
 #include <atomic>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <random>
 #include <set>
 
 #include "core/following_arrival.hpp"
+#include "core/loop_order.hpp"
+#include "core/loop_shares.hpp"
 #include "families/quiet_blocks.hpp"
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/loop_times.hpp"
@@ -223,33 +227,89 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("turns of a loop: each index once, after all that it waits for, and one thread comes soon to what waited") {
+TEST_CASE("order of a loop: one thread comes soon to what waited") {
   // Blocks in a row of which every other one waits for both neighbours.
-  constexpr int n = 101;
+  constexpr std::size_t n = 101;
   LoopWaits waits_for(n);
-  for (int i = 1; i < n; i += 2) waits_for[static_cast<std::size_t>(i)] = {i - 1, i + 1};
-  for (const int threads : {1, 2, 7, 64}) {
-    const std::vector<std::int32_t> turns = loop_turns(waits_for, threads);
-    REQUIRE(turns.size() == n);
-    std::vector<int> place(n, -1);
-    for (int k = 0; k < n; ++k) place[static_cast<std::size_t>(turns[static_cast<std::size_t>(k)])] = k;
-    CHECK(std::ranges::count(place, -1) == 0);
-    int farthest = 0, nearest = n;
-    for (int i = 1; i < n; i += 2)
-      for (const std::int32_t other : waits_for[static_cast<std::size_t>(i)]) {
-        const int apart = place[static_cast<std::size_t>(i)] - place[static_cast<std::size_t>(other)];
-        farthest = std::max(farthest, apart);
-        nearest = std::min(nearest, apart);
-      }
-    CHECK(nearest >= 1);
-    if (threads == 1) CHECK(farthest <= 3);
-    if (threads == 2) CHECK(farthest <= 12);
+  for (std::size_t i = 1; i < n; i += 2) waits_for[i] = {static_cast<std::int32_t>(i - 1), static_cast<std::int32_t>(i + 1)};
+  LoopOrder order(std::make_shared<const LoopWaits>(waits_for));
+  REQUIRE(order.turns().size() == n);
+  std::vector<int> place(n, -1);
+  for (std::size_t k = 0; k < n; ++k) place[static_cast<std::size_t>(order.turns()[k])] = static_cast<int>(k);
+  CHECK(std::ranges::count(place, -1) == 0);
+  for (std::size_t i = 1; i < n; i += 2)
+    for (const std::int32_t other : waits_for[i]) {
+      const int apart = place[i] - place[static_cast<std::size_t>(other)];
+      CHECK(apart >= 1);
+      CHECK(apart <= 3);
+    }
+}
+
+TEST_CASE("order of a loop: each index once, after all that it waits for, late ones after what arrives, on any number of threads") {
+  constexpr std::size_t n = 300;
+  std::mt19937 random(5);
+  LoopWaits waits_for(n);
+  std::vector<std::uint8_t> late(n, 0);
+  for (std::size_t i = 1; i < n; ++i) {
+    std::set<std::int32_t> others;
+    for (int k = 0; k < 3; ++k)
+      if (random() % 2 == 0) others.insert(static_cast<std::int32_t>(random() % i));
+    waits_for[i].assign(others.begin(), others.end());
+    late[i] = random() % 10 == 0 || std::ranges::any_of(others, [&](std::int32_t other) { return late[static_cast<std::size_t>(other)] != 0; });
   }
+  LoopOrder order(std::make_shared<const LoopWaits>(waits_for), late);
+  CHECK(order.early() == static_cast<std::size_t>(std::ranges::count(late, std::uint8_t{0})));
+  const int before = thread_count();
+  Late arrival;
+  for (const int threads : {1, 2, 3, 8, 64}) {
+    set_thread_count(threads);
+    for (int round = 0; round < 20; ++round) {
+      std::vector<std::atomic<int>> ended(n);
+      std::atomic<int> too_early = 0;
+      if (round % 2 == 1) arrival.start();
+      parallel_for(
+          order,
+          [&](std::size_t i) {
+            for (const std::int32_t other : waits_for[i]) too_early += ended[static_cast<std::size_t>(other)] != 1;
+            too_early += late[i] != 0 && arrival.pending();
+            ++ended[i];
+          },
+          round % 2 == 1 ? &arrival : nullptr);
+      CHECK(too_early == 0);
+      CHECK(std::ranges::all_of(ended, [](int times) { return times == 1; }));
+      CHECK_FALSE(arrival.pending());
+    }
+  }
+  set_thread_count(before);
+}
+
+TEST_CASE("loops begin with the same share of indices on the same thread") {
+  for (const std::size_t n : {2, 7, 8, 100})
+    for (const int threads : {1, 2, 3, 7, 64}) {
+      detail::LoopShares shares(10, 10 + n, threads);
+      std::vector<int> taken(n, 0);
+      // All threads side by side, one index each.
+      for (bool any = true; any;) {
+        any = false;
+        for (int t = 0; t < threads; ++t)
+          if (const std::optional<std::size_t> i = shares.take(t)) {
+            any = true;
+            REQUIRE(*i - 10 < n);
+            ++taken[*i - 10];
+            // An index of another's share only when nothing of its own is left.
+            const std::size_t whose = detail::share_of(*i - 10, n, static_cast<std::size_t>(threads));
+            for (std::size_t k = 0; k < n && whose != static_cast<std::size_t>(t); ++k)
+              if (detail::share_of(k, n, static_cast<std::size_t>(threads)) == static_cast<std::size_t>(t)) CHECK(taken[k] == 1);
+          }
+      }
+      CHECK(taken == std::vector<int>(n, 1));
+    }
 }
 
 TEST_CASE("times of loops: each index once, and how long they take on more threads") {
   CHECK(makespan({{3, 1, 1, 1}, {}}, 2) == 3);
-  CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);   // in their order
+  CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);      // in their order
+  CHECK(makespan({{1, 1, 1, 1, 9, 1}, {}}, 2) == 10);   // half of them on each: the other helps with the last, which is behind the long one
   CHECK(makespan({{1, 2, 3}, {}}, 1) == 6);
   CHECK(makespan({{1, 2, 3}, {}}, 64) == 3);
   CHECK(makespan({}, 4) == 0);

@@ -6,10 +6,11 @@
 #include <chrono>
 #include <optional>
 #include <queue>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "core/loop_order.hpp"
+#include "core/loop_shares.hpp"
 #include "core/thread_team.hpp"
 #include "perikit/core/loop_times.hpp"
 #include "perikit/core/simd.hpp"
@@ -17,24 +18,50 @@
 namespace perikit {
 
 namespace {
+
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 std::optional<std::vector<TimedLoop>> loop_times;
 
 void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), LoopOrder* order = nullptr) {
   using Clock = std::chrono::steady_clock;
-  TimedLoop loop{std::vector<double>(n), {}};
-  if (order) order->begin(1);
+  TimedLoop loop{std::vector<double>(n), order ? order->waits_for() : nullptr};
   auto before = Clock::now();
   for (std::size_t k = 0; k < n; ++k) {
-    const std::size_t i = order ? order->turn(k) : k;
+    const std::size_t i = order ? static_cast<std::size_t>(order->turns()[k]) : k;
     body(context, i);
     const auto now = Clock::now();
     loop.seconds[i] = std::chrono::duration<double>(now - before).count();
     before = now;
   }
-  if (order) loop.waits_for = order->waits_for();
   loop_times->push_back(std::move(loop));
 }
+
+/// Threads that take indices of `shares` as soon as they are free.
+template <class Shares>
+double makespan(Shares& shares, const std::vector<double>& seconds, int threads) {
+  struct End {
+    double at;
+    int thread;
+    std::size_t index;
+    bool operator>(const End& other) const noexcept { return std::pair(at, thread) > std::pair(other.at, other.thread); }
+  };
+  std::priority_queue<End, std::vector<End>, std::greater<>> running;
+  std::vector<std::uint8_t> busy(static_cast<std::size_t>(threads), 0);
+  for (double now = 0;;) {
+    for (int thread = 0; thread < threads; ++thread)
+      if (auto& works = busy[static_cast<std::size_t>(thread)]; !works)
+        if (const std::optional<std::size_t> i = shares.take(thread)) {
+          works = 1;
+          running.push({now + seconds[*i], thread, *i});
+        }
+    if (running.empty()) return now;
+    for (now = running.top().at; !running.empty() && running.top().at == now; running.pop()) {
+      shares.end(running.top().index);
+      busy[static_cast<std::size_t>(running.top().thread)] = 0;
+    }
+  }
+}
+
 }  // namespace
 
 int thread_count() noexcept { return threads; }
@@ -46,145 +73,78 @@ LoopTimes::~LoopTimes() { loop_times.reset(); }
 std::vector<TimedLoop> LoopTimes::take() { return std::exchange(*loop_times, {}); }
 
 double makespan(const TimedLoop& loop, int threads) {
-  std::priority_queue<double, std::vector<double>, std::greater<>> free_at(std::greater<>(), std::vector<double>(static_cast<std::size_t>(threads), 0.0));
-  std::vector<double> ends(loop.seconds.size());
-  const auto run = [&](std::size_t i, std::span<const std::int32_t> waits_for) {
-    double begin = free_at.top();
-    for (const std::int32_t other : waits_for) begin = std::max(begin, ends[static_cast<std::size_t>(other)]);
-    free_at.pop();
-    free_at.push(ends[i] = begin + loop.seconds[i]);
-  };
-  if (const LoopWaits* const waits = loop.waits_for.get())
-    for (const std::int32_t i : loop_turns(*waits, threads))
-      run(static_cast<std::size_t>(i), (*waits)[static_cast<std::size_t>(i)]);
-  else
-    for (std::size_t i = 0; i < ends.size(); ++i) run(i, {});
-  return ends.empty() ? 0 : *std::ranges::max_element(ends);
-}
-
-/// As if all took equally long: again and again the lowest ones that may begin, then what waited for them. As many at a time as
-/// leave each of several threads several to do meanwhile.
-std::vector<std::int32_t> loop_turns(const LoopWaits& waits_for, int threads) {
-  const std::size_t n = waits_for.size(), together = static_cast<std::size_t>(threads) * static_cast<std::size_t>(threads);
-  std::vector<std::size_t> awaited(n);
-  std::vector<std::vector<std::int32_t>> followers(n);
-  std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
-  for (std::size_t i = 0; i < n; ++i) {
-    awaited[i] = waits_for[i].size();
-    if (awaited[i] == 0) ready.push(static_cast<std::int32_t>(i));
-    for (const std::int32_t other : waits_for[i])
-      followers[static_cast<std::size_t>(other)].push_back(static_cast<std::int32_t>(i));
+  if (loop.waits_for) {
+    LoopOrder order(loop.waits_for);
+    order.begin(threads);
+    return makespan(order, loop.seconds, threads);
   }
-  std::vector<std::int32_t> turns;
-  while (!ready.empty()) {
-    const std::size_t begin = turns.size();
-    for (; turns.size() < begin + together && !ready.empty(); ready.pop()) turns.push_back(ready.top());
-    for (std::size_t k = begin; k < turns.size(); ++k)
-      for (const std::int32_t follower : followers[static_cast<std::size_t>(turns[k])])
-        if (--awaited[static_cast<std::size_t>(follower)] == 0) ready.push(follower);
-  }
-  return turns;
-}
-
-LoopOrder::LoopOrder(LoopWaits waits_for, std::vector<std::uint8_t> late)
-    : waits_for_(std::make_shared<const LoopWaits>(std::move(waits_for))),
-      late_(std::move(late)),
-      early_(size() - static_cast<std::size_t>(std::ranges::count(late_, std::uint8_t{1}))),
-      ended_(std::make_unique<std::atomic<std::uint32_t>[]>(size())) {}
-
-void LoopOrder::begin(int threads) {
-  ++round_;
-  if (threads_ == threads) return;
-  threads_ = threads;
-  turns_ = loop_turns(*waits_for_, threads);
-  if (!late_.empty())
-    std::ranges::stable_partition(turns_, [&](std::int32_t i) { return late_[static_cast<std::size_t>(i)] == 0; });
-}
-
-namespace {
-
-/// Spins until `ready` says so.
-template <class Ready>
-void await(const Ready& ready) noexcept {
-  constexpr int patience = 200;  // then there may be more threads than cores
-  for (int spins = 0; !ready(); ++spins)
-    if (spins > patience) std::this_thread::yield();
-}
-
-/// A body that waits for what its late indices read. The thread that runs the loop, which alone may fetch it, looks for it
-/// between indices.
-struct Expecting {
-  LateIndices late;
-  void* context;
-  void (*body)(void*, std::size_t);
-
-  static void call(void* of, std::size_t i) {
-    const auto& [late, context, body] = *static_cast<Expecting*>(of);
-    const bool fetches = detail::team_index() == 0;
-    if (i >= late.first) {
-      if (fetches)
-        late.arrival->finish();
-      else
-        await([&] { return !late.arrival->pending(); });
-    }
-    body(context, i);
-    if (fetches) late.arrival->look();
-  }
-};
-
-void run_alone(std::size_t n, void* context, void (*body)(void*, std::size_t)) {
-  for (std::size_t i = 0; i < n; ++i) body(context, i);
-}
-
-}  // namespace
-
-void LoopOrder::wait(std::size_t i) const noexcept {
-  for (const std::int32_t other : (*waits_for_)[i])
-    await([&] { return ended_[static_cast<std::size_t>(other)].load(std::memory_order_acquire) == round_; });
+  detail::LoopShares shares(0, loop.seconds.size(), threads);
+  return makespan(shares, loop.seconds, threads);
 }
 
 namespace detail {
+
 void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(void*, std::size_t)) {
+  const bool expects = late.any();
   if (loop_times) [[unlikely]] {
-    if (late.any()) late.arrival->finish();
+    if (expects) late.arrival->finish();
     return run_timed(n, context, body);
   }
-  const bool alone = threads == 1 || n < 2;
-  if (!late.any()) return alone ? run_alone(n, context, body) : team_for(threads, n, context, body, nullptr);
-  Expecting expecting{late, context, body};
-  if (!alone) return team_for(threads, n, &expecting, Expecting::call, late.arrival);
-  run_alone(n, &expecting, Expecting::call);
-  late.arrival->finish();
+  if (threads == 1 || n < 2) {
+    for (std::size_t i = 0; i < n; ++i) {
+      if (expects && i >= late.first) late.arrival->finish();
+      body(context, i);
+      if (expects) late.arrival->look();
+    }
+    if (expects) late.arrival->finish();
+    return;
+  }
+  // The thread that runs the loop, which alone may fetch what arrives, looks for it between indices.
+  const std::size_t first = expects ? std::min(late.first, n) : n;
+  LoopShares early(0, first, threads), others(first, n, threads);
+  run_team(threads, [&](int thread) {
+    while (const auto i = early.take(thread)) {
+      body(context, *i);
+      if (expects && thread == 0) late.arrival->look();
+    }
+    if (!expects) return;
+    if (thread == 0) late.arrival->finish();
+    for (Patience patience; late.arrival->pending();) patience.wait();
+    while (const auto i = others.take(thread)) body(context, *i);
+  });
 }
 
-/// A turn comes after those of all that it waits for, so that the first of those that have not ended waits for nothing but what
-/// arrives.
 void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body)(void*, std::size_t)) {
   const std::size_t n = order.size();
-  const LateIndices late{order.early(), arrival};
-  if (loop_times) [[unlikely]] {
-    if (late.any()) arrival->finish();
-    return run_timed(n, context, body, &order);
+  const bool expects = arrival && arrival->pending();
+  if (threads == 1 || n < 2 || loop_times) {
+    if (loop_times) [[unlikely]] {
+      if (expects) arrival->finish();
+      return run_timed(n, context, body, &order);
+    }
+    const std::vector<std::int32_t>& turns = order.turns();
+    auto in_turn = [&](std::size_t k) { body(context, static_cast<std::size_t>(turns[k])); };
+    return perikit::parallel_for(n, in_turn, {order.early(), arrival});
   }
-  struct Ordered {
-    LoopOrder& order;
-    void* context;
-    void (*body)(void*, std::size_t);
-  } ordered{order, context, body};
   order.begin(threads);
-  const auto alone = [](void* of, std::size_t k) {
-    const auto& [order, context, body] = *static_cast<Ordered*>(of);
-    body(context, order.turn(k));
-  };
-  const auto waiting = [](void* of, std::size_t k) {
-    const auto& [order, context, body] = *static_cast<Ordered*>(of);
-    const std::size_t i = order.turn(k);
-    order.wait(i);
-    body(context, i);
-    order.end(i);
-  };
-  threads == 1 ? parallel_for(n, late, &ordered, alone) : parallel_for(n, late, &ordered, waiting);
+  run_team(threads, [&](int thread) {
+    for (Patience patience; order.taken() < n;) {
+      const bool there = !expects || !arrival->pending();
+      if (const auto i = order.take(thread, there)) {
+        body(context, *i);
+        order.end(*i);
+        if (expects && thread == 0) arrival->look();
+        patience = {};
+      } else if (!there && thread == 0 && order.taken() >= order.early()) {
+        arrival->finish();
+      } else {
+        patience.wait();
+      }
+    }
+    if (expects && thread == 0) arrival->finish();
+  });
 }
+
 }  // namespace detail
 
 }  // namespace perikit

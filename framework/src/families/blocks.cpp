@@ -67,7 +67,7 @@ Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& c
           reach.late(static_cast<std::size_t>(b)) ||
           std::ranges::any_of(before, [&](std::int32_t other) { return late[static_cast<std::size_t>(other)] != 0; });
     }
-  order_ = LoopOrder(std::move(waits_for), std::move(late));
+  order_ = std::make_unique<LoopOrder>(std::make_shared<const LoopWaits>(std::move(waits_for)), std::move(late));
 }
 
 }  // namespace perikit

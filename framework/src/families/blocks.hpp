@@ -5,9 +5,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
-#include "perikit/core/parallel.hpp"
+#include "core/loop_order.hpp"
 
 namespace perikit {
 
@@ -64,13 +65,13 @@ class Colouring {
   /// them.
   template <class Body>
   void for_each(Body&& body, Arrival* arrival = nullptr) const {
-    parallel_for(order_, body, arrival);
+    if (order_) parallel_for(*order_, body, arrival);
   }
   std::size_t colours() const noexcept { return colours_; }
 
  private:
   std::size_t colours_ = 0;
-  mutable LoopOrder order_;  ///< of blocks
+  std::unique_ptr<LoopOrder> order_;  ///< of blocks; null: there are none
 };
 
 }  // namespace perikit

@@ -1,12 +1,14 @@
 #pragma once
 /// How long each block of each parallel loop takes, and what that makes on more threads than this machine has.
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "perikit/core/parallel.hpp"
-
 namespace perikit {
+
+/// By index of a loop: those that it waits for, and never, by way of others, itself.
+using LoopWaits = std::vector<std::vector<std::int32_t>>;
 
 /// A loop: the seconds of each index, and which indices it waits for (null: none wait).
 struct TimedLoop {
@@ -26,9 +28,8 @@ class LoopTimes {
   std::vector<TimedLoop> take();
 };
 
-/// Seconds until the last thread is done when threads take indices in their order (`loop_turns` where some wait), each the next
-/// one as soon as it is free, and wait with it for what it waits for, as parallel_for does. Starting and ending the loop costs
-/// nothing here.
+/// Seconds until the last thread is done when threads take indices as those of parallel_for do, each the next one as soon as it is free and one may
+/// begin. Starting and ending the loop, and taking an index, cost nothing here.
 double makespan(const TimedLoop& loop, int threads);
 
 }  // namespace perikit

@@ -1,0 +1,88 @@
+#pragma once
+/// Which thread takes which indices of a loop: each begins with a share of neighbouring ones, the same in every loop of as many, so that what it wrote
+/// is still in its own caches when it reads it, and helps others when nothing of its own is left.
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <thread>
+
+namespace perikit::detail {
+
+/// For the thread sanitizer neighbouring indices are always on different threads, whatever the machine is doing.
+#if defined(__SANITIZE_THREAD__)
+inline constexpr bool threads_keep_to_themselves = true;
+#else
+inline constexpr bool threads_keep_to_themselves = false;
+#endif
+
+/// Whose share of n indices an index belongs to.
+inline std::size_t share_of(std::size_t i, std::size_t n, std::size_t threads) noexcept {
+  return threads_keep_to_themselves ? i % threads : i * threads / n;
+}
+
+/// For loops that wait for something: briefly by themselves, then by leaving the core to others, of whom there may be more than cores.
+class Patience {
+ public:
+  void wait() noexcept {
+    if (++turns_ > 200) std::this_thread::yield();
+  }
+
+ private:
+  int turns_ = 0;
+};
+
+/// Holds a lock while it lives. What is done meanwhile is short.
+class Locked {
+ public:
+  explicit Locked(std::atomic_flag& flag) noexcept : flag_(flag) {
+    for (Patience patience; flag_.test_and_set(std::memory_order_acquire);) patience.wait();
+  }
+  ~Locked() { flag_.clear(std::memory_order_release); }
+  Locked(const Locked&) = delete;
+  Locked& operator=(const Locked&) = delete;
+
+ private:
+  std::atomic_flag& flag_;
+};
+
+/// The indices [first, last) of a loop in which none waits for others.
+class LoopShares {
+ public:
+  LoopShares(std::size_t first, std::size_t last, int threads)
+      : threads_(static_cast<std::size_t>(threads)), shares_(std::make_unique<Share[]>(threads_)) {
+    const std::size_t n = last - first;
+    for (std::size_t t = 0; t < threads_; ++t) {
+      if (threads_keep_to_themselves) {
+        shares_[t].next = first + t;
+        shares_[t].last = last;
+      } else {   // the first i with share_of(i, n, threads) == t
+        shares_[t].next = first + (n * t + threads_ - 1) / threads_;
+        shares_[t].last = first + (n * (t + 1) + threads_ - 1) / threads_;
+      }
+    }
+  }
+
+  /// The next index of this thread; none: all are taken.
+  std::optional<std::size_t> take(int thread) noexcept {
+    const std::size_t step = threads_keep_to_themselves ? threads_ : 1;
+    for (std::size_t k = 0; k < (threads_keep_to_themselves ? 1 : threads_); ++k) {
+      Share& share = shares_[(static_cast<std::size_t>(thread) + k) % threads_];
+      if (share.next.load(std::memory_order_relaxed) >= share.last) continue;
+      if (const std::size_t i = share.next.fetch_add(step, std::memory_order_relaxed); i < share.last) return i;
+    }
+    return {};
+  }
+  void end(std::size_t) noexcept {}
+
+ private:
+  struct alignas(64) Share {
+    std::atomic<std::size_t> next{0};
+    std::size_t last = 0;
+  };
+  std::size_t threads_;
+  std::unique_ptr<Share[]> shares_;
+};
+
+}  // namespace perikit::detail
