@@ -286,7 +286,7 @@ TEST_CASE("order of a loop: each index once, after all that it waits for, late o
 TEST_CASE("loops begin with the same share of indices on the same thread") {
   for (const std::size_t n : {2, 7, 8, 100})
     for (const int threads : {1, 2, 3, 7, 64}) {
-      detail::LoopShares shares(10, 10 + n, threads);
+      detail::LoopShares shares(10, 10 + n, threads, Sharing::help);
       std::vector<int> taken(n, 0);
       // All threads side by side, one index each.
       for (bool any = true; any;) {
@@ -310,6 +310,7 @@ TEST_CASE("times of loops: each index once, and how long they take on more threa
   CHECK(makespan({{3, 1, 1, 1}, {}}, 2) == 3);
   CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);      // in their order
   CHECK(makespan({{1, 1, 1, 1, 9, 1}, {}}, 2) == 10);   // half of them on each: the other helps with the last, which is behind the long one
+  CHECK(makespan({{1, 1, 1, 1, 9, 1}, {}, Sharing::keep}, 2) == 11);
   CHECK(makespan({{1, 2, 3}, {}}, 1) == 6);
   CHECK(makespan({{1, 2, 3}, {}}, 64) == 3);
   CHECK(makespan({}, 4) == 0);

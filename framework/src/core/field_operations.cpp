@@ -28,21 +28,21 @@ double largest_magnitude(ConstFieldView a) {
 }
 
 void combine(double a, ConstFieldView x, double b, ConstFieldView y, FieldView sum) {
-  over_blocks(sum.size(), [&](std::size_t begin, std::size_t end) {
+  over_values(sum, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) sum.data[k] = a * x.data[k] + b * y.data[k];
   });
 }
 
 void copy(ConstFieldView from, FieldView to) {
-  over_blocks(to.size(), [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
+  over_values(to, [&](std::size_t begin, std::size_t end) { std::copy(from.data + begin, from.data + end, to.data + begin); });
 }
 
 void fill(double value, FieldView x) {
-  over_blocks(x.size(), [&](std::size_t begin, std::size_t end) { std::fill(x.data + begin, x.data + end, value); });
+  over_values(x, [&](std::size_t begin, std::size_t end) { std::fill(x.data + begin, x.data + end, value); });
 }
 
 void mask(ConstFieldView mask, FieldView x) {
-  over_blocks(x.size(), [&](std::size_t begin, std::size_t end) {
+  over_values(x, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) x.data[k] *= mask.data[k];
   });
 }

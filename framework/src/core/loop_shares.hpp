@@ -8,6 +8,8 @@
 #include <optional>
 #include <thread>
 
+#include "perikit/core/parallel.hpp"
+
 namespace perikit::detail {
 
 /// For the thread sanitizer neighbouring indices are always on different threads, whatever the machine is doing.
@@ -50,8 +52,10 @@ class Locked {
 /// The indices [first, last) of a loop in which none waits for others.
 class LoopShares {
  public:
-  LoopShares(std::size_t first, std::size_t last, int threads)
-      : threads_(static_cast<std::size_t>(threads)), shares_(std::make_unique<Share[]>(threads_)) {
+  LoopShares(std::size_t first, std::size_t last, int threads, Sharing sharing)
+      : reach_(sharing == Sharing::keep || threads_keep_to_themselves ? 1 : static_cast<std::size_t>(threads)),
+        threads_(static_cast<std::size_t>(threads)),
+        shares_(std::make_unique<Share[]>(threads_)) {
     const std::size_t n = last - first;
     for (std::size_t t = 0; t < threads_; ++t) {
       if (threads_keep_to_themselves) {
@@ -64,10 +68,10 @@ class LoopShares {
     }
   }
 
-  /// The next index of this thread; none: all are taken.
+  /// The next index of this thread; none: nothing is left for it.
   std::optional<std::size_t> take(int thread) noexcept {
     const std::size_t step = threads_keep_to_themselves ? threads_ : 1;
-    for (std::size_t k = 0; k < (threads_keep_to_themselves ? 1 : threads_); ++k) {
+    for (std::size_t k = 0; k < reach_; ++k) {
       Share& share = shares_[(static_cast<std::size_t>(thread) + k) % threads_];
       if (share.next.load(std::memory_order_relaxed) >= share.last) continue;
       if (const std::size_t i = share.next.fetch_add(step, std::memory_order_relaxed); i < share.last) return i;
@@ -81,7 +85,7 @@ class LoopShares {
     std::atomic<std::size_t> next{0};
     std::size_t last = 0;
   };
-  std::size_t threads_;
+  std::size_t reach_, threads_;   ///< from how many shares a thread takes, and of how many
   std::unique_ptr<Share[]> shares_;
 };
 

@@ -22,9 +22,9 @@ namespace {
 int threads = counts_operations ? 1 : std::max(1, omp_get_max_threads());
 std::optional<std::vector<TimedLoop>> loop_times;
 
-void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), LoopOrder* order = nullptr) {
+void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), Sharing sharing, LoopOrder* order = nullptr) {
   using Clock = std::chrono::steady_clock;
-  TimedLoop loop{std::vector<double>(n), order ? order->waits_for() : nullptr};
+  TimedLoop loop{std::vector<double>(n), order ? order->waits_for() : nullptr, sharing};
   auto before = Clock::now();
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t i = order ? static_cast<std::size_t>(order->turns()[k]) : k;
@@ -78,17 +78,17 @@ double makespan(const TimedLoop& loop, int threads) {
     order.begin(threads);
     return makespan(order, loop.seconds, threads);
   }
-  detail::LoopShares shares(0, loop.seconds.size(), threads);
+  detail::LoopShares shares(0, loop.seconds.size(), threads, loop.sharing);
   return makespan(shares, loop.seconds, threads);
 }
 
 namespace detail {
 
-void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(void*, std::size_t)) {
+void parallel_for(std::size_t n, LateIndices late, Sharing sharing, void* context, void (*body)(void*, std::size_t)) {
   const bool expects = late.any();
   if (loop_times) [[unlikely]] {
     if (expects) late.arrival->finish();
-    return run_timed(n, context, body);
+    return run_timed(n, context, body, sharing);
   }
   if (threads == 1 || n < 2) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -101,7 +101,7 @@ void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(v
   }
   // The thread that runs the loop, which alone may fetch what arrives, looks for it between indices.
   const std::size_t first = expects ? std::min(late.first, n) : n;
-  LoopShares early(0, first, threads), others(first, n, threads);
+  LoopShares early(0, first, threads, sharing), others(first, n, threads, sharing);
   run_team(threads, [&](int thread) {
     while (const auto i = early.take(thread)) {
       body(context, *i);
@@ -120,7 +120,7 @@ void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body
   if (threads == 1 || n < 2 || loop_times) {
     if (loop_times) [[unlikely]] {
       if (expects) arrival->finish();
-      return run_timed(n, context, body, &order);
+      return run_timed(n, context, body, Sharing::help, &order);
     }
     const std::vector<std::int32_t>& turns = order.turns();
     auto in_turn = [&](std::size_t k) { body(context, static_cast<std::size_t>(turns[k])); };

@@ -25,12 +25,6 @@ namespace perikit {
 
 namespace {
 
-/// Zero, a piece for each thread at a time.
-void clear(double* values, std::size_t size) {
-  constexpr std::size_t piece = std::size_t{1} << 16;
-  parallel_for((size + piece - 1) / piece, [&](std::size_t b) { std::fill(values + b * piece, values + std::min(size, (b + 1) * piece), 0.0); });
-}
-
 ReleaseParts release_parts(const TermParts& parts) {
   const bool shifted = parts.consistency && parts.consistency->shift.components() > 0;
   return {*parts.families,
@@ -103,7 +97,7 @@ struct Terms::Failing {
     for (std::size_t g = 0; g < near.size() && to.data; ++g)
       for (int c = 0; c < force.components() && near[g]; ++c)
         for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) to.component(c)[p] += factor * force.component(c)[p];
-    clear(force.data(), force.size());
+    fill(0, force);
   }
 };
 
@@ -161,7 +155,7 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
 /// add(term, energy) adds the forces of a term.
 template <class Add>
 EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, FieldView force, double* energy) {
-  clear(force.data, force.size());
+  fill(0, force);
   ExactSum sum;
   if (criterion_) criterion_->begin_forces();
   std::int64_t bad = -1;
@@ -227,7 +221,7 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
 }
 
 EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  clear(Kw.data, Kw.size());
+  fill(0, Kw);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_tangent(u, w, Kw);
   return status(bad);
@@ -258,7 +252,7 @@ GroupRings Terms::near_failed_bonds() const {
 }
 
 EvaluationStatus Terms::tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  clear(Kw.data, Kw.size());
+  fill(0, Kw);
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
     bad = (*term)->add_tangent_of(u, w, groups.only, groups.near, Kw);
@@ -292,7 +286,7 @@ EvaluationStatus Terms::assemble(ConstFieldView u, BlockMatrix& K) {
     own.version = parts_.families->version();
   }
   if (!K.has_pattern()) make_pattern(own.rows, own.steps, K);
-  clear(K.values.data(), K.values.size());
+  fill(0, {K.values.data(), K.values.size(), 1});
   std::int64_t bad = -1;
   for (auto assembly = own.all.begin(); assembly != own.all.end() && bad < 0; ++assembly) bad = (*assembly)->add(u, K);
   return status(bad);

@@ -14,11 +14,20 @@
 
 namespace perikit {
 
-/// body(begin, end) over [0, n) in blocks of a fixed size, a multiple of `padding`, in any order.
+/// body(begin, end) over [0, n) in blocks of a fixed size, a multiple of `padding`, in any order; those of a part of [0, n) on the same thread in
+/// every loop.
 template <class Body>
 void over_blocks(std::size_t n, Body&& body) {
-  constexpr std::size_t block = 4096;
-  parallel_for((n + block - 1) / block, [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); });
+  constexpr std::size_t block = 1024;
+  parallel_for((n + block - 1) / block, [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); }, {}, Sharing::keep);
+}
+
+/// The same over the values of a field, those of one point on one thread whatever their component.
+template <class Body>
+void over_values(ConstFieldView x, Body&& body) {
+  over_blocks(x.stride, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = 0; c < static_cast<std::size_t>(x.components); ++c) body(c * x.stride + begin, c * x.stride + end);
+  });
 }
 
 /// The exact sum of term(k) over [0, n) on this rank, on all threads.

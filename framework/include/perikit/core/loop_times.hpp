@@ -5,15 +5,18 @@
 #include <memory>
 #include <vector>
 
+#include "perikit/core/parallel.hpp"
+
 namespace perikit {
 
 /// By index of a loop: those that it waits for, and never, by way of others, itself.
 using LoopWaits = std::vector<std::vector<std::int32_t>>;
 
-/// A loop: the seconds of each index, and which indices it waits for (null: none wait).
+/// A loop: the seconds of each index, which indices it waits for (null: none wait), and whether threads help each other.
 struct TimedLoop {
   std::vector<double> seconds;
   std::shared_ptr<const LoopWaits> waits_for;
+  Sharing sharing = Sharing::help;
 };
 
 /// While one of these lives, loops run on one thread and are kept. One at a time.

@@ -50,15 +50,21 @@ struct LateIndices {
   bool any() const noexcept { return arrival && arrival->pending(); }
 };
 
+/// What a thread does that has done its own share of a loop.
+enum class Sharing {
+  help,   ///< it takes indices of others
+  keep,   ///< nothing: for loops whose indices take equally long, and less than it takes to fetch from another core what it wrote
+};
+
 namespace detail {
-void parallel_for(std::size_t n, LateIndices late, void* context, void (*body)(void*, std::size_t));
+void parallel_for(std::size_t n, LateIndices late, Sharing sharing, void* context, void (*body)(void*, std::size_t));
 }  // namespace detail
 
 /// body(i) for i in [0, n), in any order, on all threads, each of which begins with a row of indices of its own, the same in loops of as many. body
 /// must be noexcept in effect. What arrives has arrived after the loop.
 template <class Body>
-void parallel_for(std::size_t n, Body&& body, LateIndices late = {}) {
-  detail::parallel_for(n, late, &body,
+void parallel_for(std::size_t n, Body&& body, LateIndices late = {}, Sharing sharing = Sharing::help) {
+  detail::parallel_for(n, late, sharing, &body,
                        [](void* context, std::size_t i) { (*static_cast<std::remove_reference_t<Body>*>(context))(i); });
 }
 
