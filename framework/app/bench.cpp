@@ -47,44 +47,46 @@ class StepTimer final : public Observer {
 
 constexpr int modelled_threads[] = {2, 4, 8, 16, 32, 64};
 
-/// What the fastest step would take on more threads: loops as long as their last thread, all else as on one.
+/// What a step would take on more threads: loops as long as their last thread, all else as on one. Each index of a loop takes what it took in the step
+/// where it was fastest: what interrupts it for a moment would be a whole share of a short loop.
 class ThreadsModel final : public Observer {
  public:
   bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
-    const std::vector<TimedLoop> loops = times_.take();
+    std::vector<TimedLoop> loops = times_.take();
     const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    if (report.step > 2 && seconds < whole_) {
-      whole_ = seconds;
+    if (report.step > 2) {
       double inside = 0;
-      blocks_ = 0;
-      for (const TimedLoop& loop : loops) {
-        inside += makespan(loop, 1);
-        blocks_ += loop.seconds.size();
-      }
-      outside_ = std::max(0.0, seconds - inside);
-      loops_ = loops.size();
-      for (std::size_t k = 0; k < std::size(modelled_threads); ++k) {
-        double total = outside_;
-        for (const TimedLoop& loop : loops) total += makespan(loop, modelled_threads[k]);
-        efficiency_[k] = seconds / (modelled_threads[k] * total);
-      }
+      for (const TimedLoop& loop : loops) inside += makespan(loop, 1);
+      outside_ = std::min(outside_, std::max(0.0, std::chrono::duration<double>(now - last_).count() - inside));
+      if (loops_.empty()) loops_ = std::move(loops);
+      else
+        for (std::size_t l = 0; l < std::min(loops_.size(), loops.size()); ++l)
+          std::ranges::transform(loops_[l].seconds, loops[l].seconds, loops_[l].seconds.begin(), [](double a, double b) { return std::min(a, b); });
     }
     last_ = std::chrono::steady_clock::now();
   }
   void log(std::string_view) override {}
   void print() const {
-    fmt::print("{} | {} | {:.1f} |", loops_, blocks_, 100 * outside_ / whole_);
-    for (const double efficiency : efficiency_) fmt::print(" {:.0f} |", 100 * efficiency);
+    const double one = seconds(1);
+    std::size_t blocks = 0;
+    for (const TimedLoop& loop : loops_) blocks += loop.seconds.size();
+    fmt::print("{} | {} | {:.1f} |", loops_.size(), blocks, 100 * outside_ / one);
+    for (const int threads : modelled_threads) fmt::print(" {:.0f} |", 100 * one / (threads * seconds(threads)));
     fmt::print("\n");
   }
 
  private:
+  double seconds(int threads) const {
+    double total = outside_;
+    for (const TimedLoop& loop : loops_) total += makespan(loop, threads);
+    return total;
+  }
+
   LoopTimes times_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-  double whole_ = INFINITY, outside_ = 0, efficiency_[std::size(modelled_threads)] = {};
-  std::size_t loops_ = 0, blocks_ = 0;
+  std::vector<TimedLoop> loops_;
+  double outside_ = INFINITY;
 };
 
 /// One row: a kinematics with a material on one body. Times in seconds per point, not a number where not measured.

@@ -16,8 +16,8 @@ namespace perikit {
 
 /// Which indices of a loop wait for which: an index begins when all those that it waits for have ended. What two of them do to
 /// the same memory comes in one order where one waits for the other, if only by way of others, on any number of threads.
-/// Otherwise a thread begins with those of its share that may begin, the lowest first: what waited for them follows soon, so that what they share is
-/// still in the caches. Where none of its own may begin, it takes what may of others' shares.
+/// Otherwise a thread takes what may begin of its own share, the lowest indices first, and those that waited for them soon after, so that what they
+/// share is still in the caches. Where none of its own may begin, it takes what may of others' shares.
 class LoopOrder {
  public:
   /// late: by index, whether it reads what arrives, or waits for one that does; empty: none.
@@ -38,25 +38,26 @@ class LoopOrder {
   std::size_t taken() const noexcept { return taken_.load(std::memory_order_acquire); }
 
  private:
-  /// What may begin of the share of a thread: a heap of keys.
+  /// What may begin of the share of a thread: a heap of places, the first in front.
   struct alignas(64) Share {
     std::atomic_flag locked;
-    std::atomic<std::int64_t> first{0};   ///< the least of them; `nothing`: there is none
-    std::vector<std::int64_t> keys;
-    std::vector<std::int64_t> at_once;    ///< those that wait for nothing
+    std::atomic<std::size_t> first{0};     ///< of them, for others to see; more than there are: there is none
+    std::vector<std::int32_t> ready;
+    std::vector<std::int32_t> at_once;     ///< those that wait for nothing
+    void show() noexcept { first.store(ready.empty() ? SIZE_MAX : static_cast<std::size_t>(ready.front()), std::memory_order_relaxed); }
   };
-  /// The less it is, the sooner an index comes; late ones come last.
-  std::int64_t key(std::size_t i) const noexcept;
+  std::vector<std::int32_t> turns_of(std::size_t threads) const;
   void divide(int threads);
   void may_begin(std::size_t i) noexcept;
-  std::optional<std::size_t> take_of(Share& share, std::int64_t bound) noexcept;
+  std::optional<std::size_t> take_of(Share& share, std::size_t bound) noexcept;
 
   std::shared_ptr<const LoopWaits> waits_for_;
   std::vector<std::vector<std::int32_t>> followers_;
   std::vector<std::uint8_t> late_;
   std::size_t early_ = 0;
-  std::vector<std::int32_t> turns_;
-  std::size_t threads_ = 0;                                 ///< as many as there are shares
+  std::size_t threads_ = 0;                                 ///< for which the following are
+  std::vector<std::int32_t> turns_;                         ///< indices in the order in which a thread prefers them
+  std::vector<std::int32_t> place_;                         ///< there, by index
   std::unique_ptr<Share[]> shares_;
   std::unique_ptr<std::atomic<std::int32_t>[]> awaited_;    ///< by index: how many that it waits for have not ended
   std::atomic<std::size_t> taken_{0};
