@@ -292,7 +292,7 @@ TEST_CASE("loops begin with the same share of indices on the same thread") {
       for (bool any = true; any;) {
         any = false;
         for (int t = 0; t < threads; ++t)
-          if (const std::optional<std::size_t> i = shares.take(t)) {
+          if (const std::optional<std::size_t> i = shares.take(t, threads)) {
             any = true;
             REQUIRE(*i - 10 < n);
             ++taken[*i - 10];
@@ -303,6 +303,14 @@ TEST_CASE("loops begin with the same share of indices on the same thread") {
           }
       }
       CHECK(taken == std::vector<int>(n, 1));
+      // Fewer threads than were asked for do all of it, even where they do not help each other.
+      for (const int team : {1, 2, 3}) {
+        detail::LoopShares kept(0, n, threads, Sharing::keep);
+        std::vector<int> done(n, 0);
+        for (int t = 0; t < std::min(team, threads); ++t)
+          while (const std::optional<std::size_t> i = kept.take(t, std::min(team, threads))) ++done[*i];
+        CHECK(done == std::vector<int>(n, 1));
+      }
     }
 }
 

@@ -53,14 +53,15 @@ class Locked {
 class LoopShares {
  public:
   LoopShares(std::size_t first, std::size_t last, int threads, Sharing sharing)
-      : reach_(sharing == Sharing::keep || threads_keep_to_themselves ? 1 : static_cast<std::size_t>(threads)),
-        threads_(static_cast<std::size_t>(threads)),
+      : threads_(static_cast<std::size_t>(threads)),
+        helped_(sharing == Sharing::help && !threads_keep_to_themselves ? threads_ : 1),
         shares_(std::make_unique<Share[]>(threads_)) {
     const std::size_t n = last - first;
     for (std::size_t t = 0; t < threads_; ++t) {
       if (threads_keep_to_themselves) {
         shares_[t].next = first + t;
         shares_[t].last = last;
+        shares_[t].step = threads_;
       } else {   // the first i with share_of(i, n, threads) == t
         shares_[t].next = first + (n * t + threads_ - 1) / threads_;
         shares_[t].last = first + (n * (t + 1) + threads_ - 1) / threads_;
@@ -68,24 +69,29 @@ class LoopShares {
     }
   }
 
-  /// The next index of this thread; none: nothing is left for it.
-  std::optional<std::size_t> take(int thread) noexcept {
-    const std::size_t step = threads_keep_to_themselves ? threads_ : 1;
-    for (std::size_t k = 0; k < reach_; ++k) {
-      Share& share = shares_[(static_cast<std::size_t>(thread) + k) % threads_];
-      if (share.next.load(std::memory_order_relaxed) >= share.last) continue;
-      if (const std::size_t i = share.next.fetch_add(step, std::memory_order_relaxed); i < share.last) return i;
-    }
+  /// The next index of this thread; none: nothing is left for it. team: how many threads there are, as many as shares, or fewer, which then do those
+  /// of the others, too.
+  std::optional<std::size_t> take(int thread, int team) noexcept {
+    const auto own = static_cast<std::size_t>(thread);
+    for (std::size_t t = own; t < threads_; t += static_cast<std::size_t>(team))
+      if (const auto i = shares_[t].take()) return i;
+    for (std::size_t k = 1; k < helped_; ++k)
+      if (const auto i = shares_[(own + k) % threads_].take()) return i;
     return {};
   }
-  void end(std::size_t) noexcept {}
 
  private:
   struct alignas(64) Share {
     std::atomic<std::size_t> next{0};
-    std::size_t last = 0;
+    std::size_t last = 0, step = 1;
+
+    std::optional<std::size_t> take() noexcept {
+      if (next.load(std::memory_order_relaxed) >= last) return {};
+      const std::size_t i = next.fetch_add(step, std::memory_order_relaxed);
+      return i < last ? std::optional(i) : std::nullopt;
+    }
   };
-  std::size_t reach_, threads_;   ///< from how many shares a thread takes, and of how many
+  std::size_t threads_, helped_;   ///< shares; of how many of them a thread takes
   std::unique_ptr<Share[]> shares_;
 };
 

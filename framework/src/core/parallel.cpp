@@ -36,9 +36,9 @@ void run_timed(std::size_t n, void* context, void (*body)(void*, std::size_t), S
   loop_times->push_back(std::move(loop));
 }
 
-/// Threads that take indices of `shares` as soon as they are free.
-template <class Shares>
-double makespan(Shares& shares, const std::vector<double>& seconds, int threads) {
+/// Threads that take indices as soon as they are free. take(thread): the next one; end(index).
+template <class Take, class EndOf>
+double makespan(const std::vector<double>& seconds, int threads, const Take& take, const EndOf& end) {
   struct End {
     double at;
     int thread;
@@ -50,13 +50,13 @@ double makespan(Shares& shares, const std::vector<double>& seconds, int threads)
   for (double now = 0;;) {
     for (int thread = 0; thread < threads; ++thread)
       if (auto& works = busy[static_cast<std::size_t>(thread)]; !works)
-        if (const std::optional<std::size_t> i = shares.take(thread)) {
+        if (const std::optional<std::size_t> i = take(thread)) {
           works = 1;
           running.push({now + seconds[*i], thread, *i});
         }
     if (running.empty()) return now;
     for (now = running.top().at; !running.empty() && running.top().at == now; running.pop()) {
-      shares.end(running.top().index);
+      end(running.top().index);
       busy[static_cast<std::size_t>(running.top().thread)] = 0;
     }
   }
@@ -76,10 +76,10 @@ double makespan(const TimedLoop& loop, int threads) {
   if (loop.waits_for) {
     LoopOrder order(loop.waits_for);
     order.begin(threads);
-    return makespan(order, loop.seconds, threads);
+    return makespan(loop.seconds, threads, [&](int thread) { return order.take(thread); }, [&](std::size_t i) { order.end(i); });
   }
   detail::LoopShares shares(0, loop.seconds.size(), threads, loop.sharing);
-  return makespan(shares, loop.seconds, threads);
+  return makespan(loop.seconds, threads, [&](int thread) { return shares.take(thread, threads); }, [](std::size_t) {});
 }
 
 namespace detail {
@@ -102,15 +102,15 @@ void parallel_for(std::size_t n, LateIndices late, Sharing sharing, void* contex
   // The thread that runs the loop, which alone may fetch what arrives, looks for it between indices.
   const std::size_t first = expects ? std::min(late.first, n) : n;
   LoopShares early(0, first, threads, sharing), others(first, n, threads, sharing);
-  run_team(threads, [&](int thread) {
-    while (const auto i = early.take(thread)) {
+  run_team(threads, [&](int thread, int team) {
+    while (const auto i = early.take(thread, team)) {
       body(context, *i);
       if (expects && thread == 0) late.arrival->look();
     }
     if (!expects) return;
     if (thread == 0) late.arrival->finish();
     for (Patience patience; late.arrival->pending();) patience.wait();
-    while (const auto i = others.take(thread)) body(context, *i);
+    while (const auto i = others.take(thread, team)) body(context, *i);
   });
 }
 
@@ -127,7 +127,7 @@ void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body
     return perikit::parallel_for(n, in_turn, {order.early(), arrival});
   }
   order.begin(threads);
-  run_team(threads, [&](int thread) {
+  run_team(threads, [&](int thread, int) {
     for (Patience patience; order.taken() < n;) {
       const bool there = !expects || !arrival->pending();
       if (const auto i = order.take(thread, there)) {

@@ -18,16 +18,16 @@ namespace perikit::detail {
 inline thread_local int own_team_index = 0;
 inline int team_index() noexcept { return own_team_index; }
 
-/// work(thread) on each of so many threads; the first is the one that calls.
+/// work(thread, threads) on each of so many threads; the first is the one that calls.
 template <class Work>
 void run_team(int threads, const Work& work) {
   std::vector<std::thread> others;
   for (int thread = 1; thread < threads; ++thread)
-    others.emplace_back([&work, thread] {
+    others.emplace_back([&work, thread, threads] {
       own_team_index = thread;
-      work(thread);
+      work(thread, threads);
     });
-  work(0);
+  work(0, threads);
   for (std::thread& other : others) other.join();
 }
 
@@ -35,11 +35,12 @@ void run_team(int threads, const Work& work) {
 
 inline int team_index() noexcept { return omp_get_thread_num(); }
 
-/// work(thread) on each of so many threads, or on fewer, the first of them at least, which is the one that calls.
+/// work(thread, team) on each of `team` threads: as many as are asked for, or fewer, where the runtime has a limit or the caller is one of a team
+/// (OMP_THREAD_LIMIT, loops within loops). The first is the one that calls.
 template <class Work>
 void run_team(int threads, const Work& work) {
 #pragma omp parallel num_threads(threads)
-  work(omp_get_thread_num());
+  work(omp_get_thread_num(), omp_get_num_threads());
 }
 
 #endif
