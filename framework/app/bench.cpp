@@ -53,16 +53,16 @@ class ThreadsModel final : public Observer {
  public:
   bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
-    std::vector<TimedLoop> loops = times_.take();
+    const std::vector<TimedLoop> loops = times_.take();
     const auto now = std::chrono::steady_clock::now();
     if (report.step > 2) {
       double inside = 0;
       for (const TimedLoop& loop : loops) inside += makespan(loop, 1);
       outside_ = std::min(outside_, std::max(0.0, std::chrono::duration<double>(now - last_).count() - inside));
-      if (loops_.empty()) loops_ = std::move(loops);
-      else
-        for (std::size_t l = 0; l < std::min(loops_.size(), loops.size()); ++l)
-          std::ranges::transform(loops_[l].seconds, loops[l].seconds, loops_[l].seconds.begin(), [](double a, double b) { return std::min(a, b); });
+      if (loops_.empty()) loops_ = loops;
+      for (std::size_t l = 0; l < std::min(loops_.size(), loops.size()); ++l)
+        for (std::size_t i = 0; i < std::min(loops_[l].seconds.size(), loops[l].seconds.size()); ++i)
+          loops_[l].seconds[i] = std::min(loops_[l].seconds[i], loops[l].seconds[i]);
     }
     last_ = std::chrono::steady_clock::now();
   }

@@ -65,7 +65,8 @@ class Colouring {
   /// them.
   template <class Body>
   void for_each(Body&& body, Arrival* arrival = nullptr) const {
-    if (order_) parallel_for(*order_, body, arrival);
+    if (order_) return parallel_for(*order_, body, arrival);
+    if (arrival) arrival->finish();
   }
   std::size_t colours() const noexcept { return colours_; }
 
