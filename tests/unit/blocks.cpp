@@ -371,3 +371,25 @@ TEST_CASE("quiet blocks: laws with a history never sleep again") {
   quiet.look(1, [](std::size_t) { return false; });
   CHECK(quiet.awake(0, 1));
 }
+
+TEST_CASE("quiet blocks: where all have moved, none is looked at any more") {
+  QuietBlocks quiet(row(10));
+  std::atomic<int> looks = 0;
+  const auto moves_to = [&](std::size_t last) {
+    quiet.look(1, [&, last](std::size_t b) {
+      ++looks;
+      return b <= last;
+    });
+  };
+  moves_to(8);
+  CHECK(quiet.awake(9, 1));   // within reach, but at rest
+  moves_to(2);
+  CHECK_FALSE(quiet.awake(9, 1));
+  moves_to(9);
+  CHECK(looks == 30);
+  moves_to(0);
+  CHECK(looks == 30);
+  for (std::size_t b = 0; b < 10; ++b) CHECK(quiet.awake(b, 1));
+  CHECK(quiet.counts().blocks == 40);
+  CHECK(quiet.counts().quiet == 6);
+}

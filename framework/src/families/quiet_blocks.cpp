@@ -16,6 +16,11 @@ void QuietBlocks::wake() {
   std::fill(distance_.begin(), distance_.end(), std::uint8_t{0});
 }
 
+void QuietBlocks::everywhere() {
+  std::fill(distance_.begin(), distance_.end(), std::uint8_t{0});
+  count();
+}
+
 void QuietBlocks::spread() {
   for (int step = 1; step <= passes_ && quiet() > 0; ++step) {
     reached_.assign(reach_.units, 0);

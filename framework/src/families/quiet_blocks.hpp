@@ -34,6 +34,7 @@ class QuietBlocks {
   void look(int passes, const Moves& moves, Arrival* arrival = nullptr) {
     if (distance_.empty()) return;
     begin(passes);
+    if (all_move_) return everywhere();
     auto look_at = [&](std::size_t b) {
       const bool now = (!moved_.empty() && moved_[b]) || moves(b);
       if (!moved_.empty()) moved_[b] = now;
@@ -50,6 +51,7 @@ class QuietBlocks {
       arrival->finish();
     }
     parallel_for(distance_.size(), look_at);
+    all_move_ = quiet() == 0;
     spread();
   }
   /// At the beginning of an evaluation that leaves nothing out.
@@ -72,6 +74,7 @@ class QuietBlocks {
   static constexpr std::uint8_t far = 255;
   void begin(int passes);
   void spread();
+  void everywhere();
   std::int64_t quiet() const noexcept { return std::count(distance_.begin(), distance_.end(), far); }
   void count() noexcept {
     counts_.blocks += static_cast<std::int64_t>(distance_.size());
@@ -83,6 +86,7 @@ class QuietBlocks {
   std::vector<std::uint8_t> moved_;              ///< ever, where laws have a history; else empty
   std::vector<std::uint8_t> late_;               ///< reads what comes from other ranks
   std::vector<std::uint8_t> reached_;            ///< by unit
+  bool all_move_ = false;                        ///< once all blocks have moved they are not looked at any more: none comes to rest to the last bit
   int passes_ = 1, passes_before_ = 1;
   QuietCounts counts_;
 };
