@@ -227,22 +227,41 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("order of a loop: one thread comes soon to what waited") {
+TEST_CASE("order of a loop: each index once, after all that it waits for, and a thread comes soon to what waited in its share") {
   // Blocks in a row of which every other one waits for both neighbours.
   constexpr std::size_t n = 101;
   LoopWaits waits_for(n);
   for (std::size_t i = 1; i < n; i += 2) waits_for[i] = {static_cast<std::int32_t>(i - 1), static_cast<std::int32_t>(i + 1)};
   LoopOrder order(std::make_shared<const LoopWaits>(waits_for));
-  REQUIRE(order.turns().size() == n);
-  std::vector<int> place(n, -1);
-  for (std::size_t k = 0; k < n; ++k) place[static_cast<std::size_t>(order.turns()[k])] = static_cast<int>(k);
-  CHECK(std::ranges::count(place, -1) == 0);
-  for (std::size_t i = 1; i < n; i += 2)
-    for (const std::int32_t other : waits_for[i]) {
-      const int apart = place[i] - place[static_cast<std::size_t>(other)];
-      CHECK(apart >= 1);
-      CHECK(apart <= 3);
-    }
+  const auto check = [&](int threads, const std::vector<std::int32_t>& turns) {
+    REQUIRE(turns.size() == n);
+    std::vector<int> place(n, -1);
+    for (std::size_t k = 0; k < n; ++k) place[static_cast<std::size_t>(turns[k])] = static_cast<int>(k);
+    CHECK(std::ranges::count(place, -1) == 0);
+    const auto share = [&](std::size_t i) { return detail::share_of(i, n, static_cast<std::size_t>(threads)); };
+    int farthest = 0, nearest = n;
+    for (std::size_t i = 1; i < n; i += 2)
+      for (const std::int32_t other : waits_for[i]) {
+        const int apart = place[i] - place[static_cast<std::size_t>(other)];
+        nearest = std::min(nearest, apart);
+        if (share(i - 1) == share(i + 1)) farthest = std::max(farthest, apart);
+      }
+    CHECK(nearest >= 1);
+    if (threads == 1) CHECK(farthest <= 3);
+    if (threads == 2) CHECK(farthest <= 12);
+  };
+  check(1, order.turns());
+  for (const int threads : {1, 2, 7, 64}) {
+    order.begin(threads);
+    std::vector<std::int32_t> turns;   // of threads that take one after the other
+    while (order.taken() < n)
+      for (int t = 0; t < threads; ++t)
+        if (const std::optional<std::size_t> i = order.take(t)) {
+          turns.push_back(static_cast<std::int32_t>(*i));
+          order.end(*i);
+        }
+    check(threads, turns);
+  }
 }
 
 TEST_CASE("order of a loop: each index once, after all that it waits for, late ones after what arrives, on any number of threads") {
@@ -316,7 +335,7 @@ TEST_CASE("loops begin with the same share of indices on the same thread") {
 
 TEST_CASE("times of loops: each index once, and how long they take on more threads") {
   CHECK(makespan({{3, 1, 1, 1}, {}}, 2) == 3);
-  CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);      // in their order
+  CHECK(makespan({{1, 1, 1, 3}, {}}, 2) == 4);        // in their order
   CHECK(makespan({{1, 1, 1, 1, 9, 1}, {}}, 2) == 10);   // half of them on each: the other helps with the last, which is behind the long one
   CHECK(makespan({{1, 1, 1, 1, 9, 1}, {}, Sharing::keep}, 2) == 11);
   CHECK(makespan({{1, 2, 3}, {}}, 1) == 6);

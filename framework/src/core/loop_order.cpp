@@ -47,9 +47,9 @@ void LoopOrder::divide(int threads) {
   shares_ = std::make_unique<Share[]>(threads_);
   std::vector<std::size_t> of_thread(threads_, 0);
   for (std::size_t i = 0; i < size(); ++i) {
-    Share& share = shares_[detail::share_of(i, size(), threads_)];
-    ++of_thread[detail::share_of(i, size(), threads_)];
-    if ((*waits_for_)[i].empty()) share.at_once.push_back(place_[i]);
+    const std::size_t t = detail::share_of(i, size(), threads_);
+    ++of_thread[t];
+    if ((*waits_for_)[i].empty()) shares_[t].at_once.push_back(place_[i]);
   }
   for (std::size_t t = 0; t < threads_; ++t) {
     std::ranges::sort(shares_[t].at_once);   // which is a heap, too

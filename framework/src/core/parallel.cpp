@@ -117,11 +117,11 @@ void parallel_for(std::size_t n, LateIndices late, Sharing sharing, void* contex
 void parallel_for(LoopOrder& order, Arrival* arrival, void* context, void (*body)(void*, std::size_t)) {
   const std::size_t n = order.size();
   const bool expects = arrival && arrival->pending();
-  if (threads == 1 || n < 2 || loop_times) {
-    if (loop_times) [[unlikely]] {
-      if (expects) arrival->finish();
-      return run_timed(n, context, body, Sharing::help, &order);
-    }
+  if (loop_times) [[unlikely]] {
+    if (expects) arrival->finish();
+    return run_timed(n, context, body, Sharing::help, &order);
+  }
+  if (threads == 1 || n < 2) {
     const std::vector<std::int32_t>& turns = order.turns();
     auto in_turn = [&](std::size_t k) { body(context, static_cast<std::size_t>(turns[k])); };
     return perikit::parallel_for(n, in_turn, {order.early(), arrival});

@@ -13,13 +13,10 @@ void QuietBlocks::begin(int passes) {
 void QuietBlocks::wake() {
   if (distance_.empty()) return;
   begin(passes_);
-  std::fill(distance_.begin(), distance_.end(), std::uint8_t{0});
+  wake_all();
 }
 
-void QuietBlocks::everywhere() {
-  std::fill(distance_.begin(), distance_.end(), std::uint8_t{0});
-  count();
-}
+void QuietBlocks::wake_all() { std::fill(distance_.begin(), distance_.end(), std::uint8_t{0}); }
 
 void QuietBlocks::spread() {
   for (int step = 1; step <= passes_ && quiet() > 0; ++step) {

@@ -34,7 +34,10 @@ class QuietBlocks {
   void look(int passes, const Moves& moves, Arrival* arrival = nullptr) {
     if (distance_.empty()) return;
     begin(passes);
-    if (all_move_) return everywhere();
+    if (all_move_) {
+      wake_all();
+      return count();
+    }
     auto look_at = [&](std::size_t b) {
       const bool now = (!moved_.empty() && moved_[b]) || moves(b);
       if (!moved_.empty()) moved_[b] = now;
@@ -74,7 +77,7 @@ class QuietBlocks {
   static constexpr std::uint8_t far = 255;
   void begin(int passes);
   void spread();
-  void everywhere();
+  void wake_all();
   std::int64_t quiet() const noexcept { return std::count(distance_.begin(), distance_.end(), far); }
   void count() noexcept {
     counts_.blocks += static_cast<std::int64_t>(distance_.size());
@@ -86,7 +89,7 @@ class QuietBlocks {
   std::vector<std::uint8_t> moved_;              ///< ever, where laws have a history; else empty
   std::vector<std::uint8_t> late_;               ///< reads what comes from other ranks
   std::vector<std::uint8_t> reached_;            ///< by unit
-  bool all_move_ = false;                        ///< once all blocks have moved they are not looked at any more: none comes to rest to the last bit
+  bool all_move_ = false;                        ///< once all blocks have moved they are not looked at any more: few come to rest to the last bit
   int passes_ = 1, passes_before_ = 1;
   QuietCounts counts_;
 };
