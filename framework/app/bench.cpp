@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <fstream>
 
 #include "data_folder.hpp"
@@ -269,6 +270,8 @@ void count(Registry& registry, const BenchOptions& options) {
 }  // namespace
 
 void bench(Registry& registry, const BenchOptions& options) {
+  // Nothing is lost where a signal ends it.
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
   if constexpr (counts_operations) return count(registry, options);
   if (options.threads_model) {
     fmt::print("{} points a side, horizon 3.015 spacings, verlet. Efficiency of a step [%] on more threads, from the seconds of the blocks of its loops on\n"

@@ -7,6 +7,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/sdk/stable_step.hpp"
 
@@ -14,11 +15,13 @@ namespace perikit {
 
 namespace {
 
-/// The run's loop variables: where the force of the last step is, and what happens to prescribed and loaded points.
-class Stepper {
+/// The run's loop variables: where the force of the last step is, and what happens to prescribed and loaded points. As a motion it kicks points and
+/// lets them drift.
+class Stepper final : private PointMotion {
  public:
   explicit Stepper(Problem& problem)
-      : problem_(problem),
+      : PointMotion(problem.body().stride()),
+        problem_(problem),
         state_(problem.state()),
         constraints_(problem.constraints()),
         u_(state_.displacement()),
@@ -39,46 +42,33 @@ class Stepper {
           fmt::format("step {}, time {:.6g} s: loads that follow the surface: {}", state_.step, state_.time, status.description));
   }
 
+  /// Forces after the motion that `advance` has left to it; without one, at the present displacements.
   void evaluate(double* energy, double dt) {
-    const EvaluationStatus status = problem_.evaluate_forces(u_, force_, energy, dt);
+    const EvaluationStatus status =
+        pending() ? problem_.move_and_evaluate_forces(*this, u_, force_, energy, dt) : problem_.evaluate_forces(u_, force_, energy, dt);
     if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state_.step, state_.time, status.description));
   }
 
-  /// target = source + dt a on all points, and where asked u += drift target.
-  void kick(ConstFieldView source, FieldView target, double dt, double drift = 0) {
-    const double* masses = uniform_ > 0 ? nullptr : mass_;
+  /// target = v + dt a with v at half steps, on all points.
+  void kick(FieldView target, double dt) {
     over_blocks(u_.stride, [&](std::size_t begin, std::size_t end) {
-      for (int c = 0; c < problem_.dimension(); ++c) {
-        const double* f = force_.component(c);
-        const double* e = loaded_ ? external_.component(c) : nullptr;
-        const double* from = source.component(c);
-        double* to = target.component(c);
-        double* u = u_.component(c);
-        for (std::size_t p = begin; p < end; p += pack_width) {
-          const Pack total = e ? Pack::load(f + p) + Pack::load(e + p) : Pack::load(f + p);
-          const Pack m = masses ? Pack::load(masses + p) : Pack(uniform_);
-          const Pack v = Pack::load(from + p) + select(m > Pack(0.0), Pack(dt) * total / m, Pack(0.0));
-          v.store(to + p);
-          if (drift != 0) (Pack::load(u + p) + Pack(drift) * v).store(u + p);
-        }
-      }
+      kick(target, dt, begin, end, [](int) { return [](std::size_t, Pack) {}; });
     });
   }
 
-  /// Kick and drift; prescribed components move as prescribed.
+  /// The next evaluation begins with kick and drift; prescribed components move as prescribed.
   void advance(double kick_dt, double dt, double t, double t_next) {
-    const auto dofs = constraints_.dofs();
-    held_.resize(dofs.size());
-    before_.resize(dofs.size());
-    for (std::size_t k = 0; k < dofs.size(); ++k) {
-      held_[k] = u_.data[dofs[k]];
-      before_[k] = total_force(dofs[k]);
-    }
-    kick(v_, v_, kick_dt, dt);
-    if (dofs.empty()) return;
-    for (std::size_t k = 0; k < dofs.size(); ++k) u_.data[dofs[k]] = held_[k];
+    kick_dt_ = kick_dt;
+    dt_ = dt;
     constraints_.prescribe_half_step_velocity(t, t_next, u_, v_);
-    for (const std::int64_t dof : dofs) u_.data[dof] += dt * v_.data[dof];
+    const auto dofs = constraints_.dofs();
+    if (before_.size() != dofs.size()) sort_held();
+    for (std::size_t k = 0; k < dofs.size(); ++k) before_[k] = total_force(dofs[k]);
+    for (Held& held : held_) {
+      held.v = v_.data[held.dof];
+      held.u = u_.data[held.dof] + dt * held.v;
+    }
+    expect();
   }
 
   /// Work of the loads over a step of length dt that ended now [J].
@@ -94,7 +84,7 @@ class Stepper {
     ExactSum held;
     const auto dofs = constraints_.dofs();
     for (std::size_t k = 0; k < dofs.size(); ++k) {
-      const double m = mass_[static_cast<std::size_t>(dofs[k]) % u_.stride], now = full_[k];
+      const double m = mass_[point_of(dofs[k])], now = full_[k];
       held.add(0.5 * m * (now * now - speed_[k] * speed_[k]) - 0.5 * (before_[k] + total_force(dofs[k])) * dt * v_.data[dofs[k]]);
       speed_[k] = now;
     }
@@ -116,6 +106,56 @@ class Stepper {
   bool loaded() const noexcept { return loaded_; }
 
  private:
+  /// A prescribed component, and what it is at the end of the step.
+  struct Held {
+    std::int64_t dof;
+    double u, v;
+  };
+
+  /// By point, so that those of a piece follow each other.
+  void sort_held() {
+    before_.resize(constraints_.dofs().size());
+    for (const std::int64_t dof : constraints_.dofs()) held_.push_back({dof, 0, 0});
+    std::ranges::sort(held_, {}, [&](const Held& held) { return point_of(held.dof); });
+  }
+  std::size_t point_of(std::int64_t dof) const noexcept { return static_cast<std::size_t>(dof) % u_.stride; }
+
+  /// target = v + dt a on the points [begin, end); then(c)(p, target) by component and pack.
+  template <class Then>
+  void kick(FieldView target, double dt, std::size_t begin, std::size_t end, const Then& then) const {
+    const double* masses = uniform_ > 0 ? nullptr : mass_;
+    const auto per_mass = [dt](Pack m) { return select(m > Pack(0.0), Pack(dt) / m, Pack(0.0)); };
+    const Pack everywhere = per_mass(Pack(uniform_));
+    for (int c = 0; c < u_.components; ++c) {
+      const double* f = force_.component(c);
+      const double* e = loaded_ ? external_.component(c) : nullptr;
+      const double* from = v_.component(c);
+      double* to = target.component(c);
+      const auto then_of = then(c);
+      for (std::size_t p = begin; p < end; p += pack_width) {
+        const Pack total = e ? Pack::load(f + p) + Pack::load(e + p) : Pack::load(f + p);
+        const Pack factor = masses ? per_mass(Pack::load(masses + p)) : everywhere;
+        const Pack v = Pack::load(from + p) + factor * total;
+        v.store(to + p);
+        then_of(p, v);
+      }
+    }
+  }
+
+  void move(std::size_t begin, std::size_t end) noexcept override {
+    kick(v_, kick_dt_, begin, end, [&](int c) {
+      return [u = u_.component(c), f = force_.component(c), dt = Pack(dt_)](std::size_t p, Pack v) {
+        (Pack::load(u + p) + dt * v).store(u + p);
+        Pack(0.0).store(f + p);
+      };
+    });
+    for (auto held = std::ranges::lower_bound(held_, begin, {}, [&](const Held& h) { return point_of(h.dof); });
+         held != held_.end() && point_of(held->dof) < end; ++held) {
+      v_.data[held->dof] = held->v;
+      u_.data[held->dof] = held->u;
+    }
+  }
+
   double total_force(std::int64_t dof) const noexcept { return force_.data[dof] + (loaded_ ? external_.data[dof] : 0.0); }
 
   Problem& problem_;
@@ -126,7 +166,9 @@ class Stepper {
   double uniform_;
   bool loaded_;
   FieldView external_;
-  std::vector<double> held_, before_, speed_, full_;   ///< by constrained component
+  double kick_dt_ = 0, dt_ = 0;   ///< of the next motion
+  std::vector<Held> held_;
+  std::vector<double> before_, speed_, full_;   ///< by constrained component
 };
 
 }  // namespace
@@ -251,7 +293,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     stepper.add_work_of_constraints(dt);
     last_dt = dt;
     if (sample) {
-      stepper.kick(stepper.half(), v, 0.5 * dt);
+      stepper.kick(v, 0.5 * dt);
       problem.constraints().prescribe_velocity(t_next, v);
     }
     const bool last = state.step == static_cast<std::int64_t>(first + counter);

@@ -34,6 +34,10 @@ class TimedProblem final : public contract::ForwardingProblem {
     if (late()) return {.point = 0, .description = "time is up"};
     return timed(forces, [&] { return of_.evaluate_forces(u, force, energy, time_step); });
   }
+  EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) override {
+    if (late()) return {.point = 0, .description = "time is up"};
+    return timed(forces, [&] { return of_.move_and_evaluate_forces(motion, u, force, energy, time_step); });
+  }
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
     if (late()) return {.point = 0, .description = "time is up"};
     return timed(actions, [&] { return of_.tangent_action(u, w, Kw); });

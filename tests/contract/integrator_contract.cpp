@@ -9,6 +9,7 @@
 #include "perikit/core/parallel.hpp"
 #include "perikit/problem/motion.hpp"
 #include "perikit/sdk/stable_step.hpp"
+#include "tests/contract/forwarding_problem.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 
 using namespace perikit;
@@ -89,6 +90,26 @@ TEST_CASE("integrator: displacements and energy converge with the square of the 
       CHECK_MESSAGE(of_a.imbalance() < 0.02 * of_a.energies.back().kinetic, "energy error ", of_a.imbalance(), " of ", of_a.energies.back().kinetic);
     }
   }
+}
+
+TEST_CASE("integrator: points may move before forces are evaluated, or as they are") {
+  for (const int d : {1, 2})
+    for (const bool cloud : {false, true}) {
+      BodyOptions body = body_of(d, cloud);
+      body.cells = d == 1 ? 700 : 40;
+      body.conditions = waves(d) + driven(d);
+      const std::string of = "type = \"conventional\"";
+      const double h = stable_step(body, of) / 6;
+      for (const Example& integrator : dynamic_integrators(30 * h, h)) {
+        INFO(integrator.part, " ", d, "D", std::string(cloud ? " cloud" : " lattice"));
+        const auto at_once = build_run(body, integrator, of), before = build_run(body, integrator, of);
+        run(*at_once);
+        ForwardingProblem forwarding(before->problem());   // which does not move points itself
+        Watch watch(*before);
+        before->integrator().run(forwarding, watch);
+        CHECK(state(*at_once) == state(*before));
+      }
+    }
 }
 
 TEST_CASE("integrator: the energy of free vibration does not drift") {

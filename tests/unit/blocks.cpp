@@ -16,6 +16,7 @@
 #include "core/loop_order.hpp"
 #include "core/loop_shares.hpp"
 #include "families/quiet_blocks.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/loop_times.hpp"
 
@@ -411,4 +412,55 @@ TEST_CASE("quiet blocks: where all have moved, none is looked at any more") {
   for (std::size_t b = 0; b < 10; ++b) CHECK(quiet.awake(b, 1));
   CHECK(quiet.counts().blocks == 40);
   CHECK(quiet.counts().quiet == 6);
+}
+
+namespace {
+
+/// Adds 1 to values.
+class Raise final : public PointMotion {
+ public:
+  explicit Raise(std::vector<int>& values) : PointMotion(values.size()), values_(values) {}
+  void start() { expect(); }
+
+ private:
+  void move(std::size_t begin, std::size_t end) noexcept override {
+    for (std::size_t p = begin; p < end; ++p) ++values_[p];
+  }
+  std::vector<int>& values_;
+};
+
+}  // namespace
+
+TEST_CASE("motion: what a loop needs has moved when it goes on, and everything moves once") {
+  const int threads = thread_count();
+  std::mt19937 random(7);
+  for (const std::size_t points : {std::size_t{1}, std::size_t{128}, std::size_t{1000}, std::size_t{20001}})
+    for (const int n : {1, 2, 3, 16}) {
+      set_thread_count(n);
+      std::vector<int> values(points, 0);
+      Raise raise(values);
+      CHECK_FALSE(raise.pending());
+      const std::size_t pieces = (points + PointMotion::piece_points - 1) / PointMotion::piece_points;
+      std::vector<std::vector<std::int32_t>> needed(200);
+      for (std::vector<std::int32_t>& of_index : needed)
+        for (std::size_t i = 0; i < pieces; ++i)
+          if (random() % 16 == 0) of_index.push_back(static_cast<std::int32_t>(i));
+      for (int round = 1; round <= 5; ++round) {
+        raise.start();
+        CHECK(raise.pending());
+        std::atomic<int> early{0};
+        parallel_for(needed.size(), [&](std::size_t k) {
+          raise.need(needed[k]);
+          for (const std::int32_t i : needed[k])
+            for (std::size_t p = static_cast<std::size_t>(i) * PointMotion::piece_points; p < std::min(points, static_cast<std::size_t>(i + 1) * PointMotion::piece_points); ++p)
+              if (values[p] != round) ++early;
+        });
+        raise.finish();
+        raise.finish();
+        CHECK(early == 0);
+        CHECK_FALSE(raise.pending());
+        CHECK(std::ranges::count(values, round) == static_cast<std::ptrdiff_t>(points));
+      }
+    }
+  set_thread_count(threads);
 }

@@ -8,6 +8,7 @@
 
 #include "families/lattice_slots.hpp"
 #include "families/quiet_blocks.hpp"
+#include "perikit/core/point_motion.hpp"
 
 namespace perikit {
 
@@ -116,7 +117,8 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
   const std::int64_t along = count[0] > 1 ? (lattice.extent[0] + chunk_points - 1) / chunk_points : 1;
   const auto all_rows = static_cast<std::size_t>(lattice.extent[1] * lattice.extent[2]);
   std::vector<std::size_t> found(all_rows);  // one more than the block that has listed a row last
-  const auto touch = [&](std::size_t b, std::vector<std::int32_t>& touched) {
+  std::vector<std::vector<std::int32_t>> cells_of(blocks.size());
+  for (std::size_t b = 0; b < blocks.size(); ++b)
     for (std::size_t r = blocks[b].row_begin; r < blocks[b].row_end; ++r) {
       const LatticeRow& row = rows[r];
       const std::int64_t chunk = row.first / chunk_points - lattice.index(0, row.k1, row.k2) / chunk_points;
@@ -126,7 +128,7 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
         if (k1 < 0 || k1 >= lattice.extent[1] || k2 < 0 || k2 >= lattice.extent[2]) return;
         const std::int64_t to = k1 + lattice.extent[1] * k2;
         if (std::exchange(found[static_cast<std::size_t>(to)], b + 1) == b + 1) return;
-        for (std::int64_t k0 = first; k0 <= last; ++k0) touched.push_back(static_cast<std::int32_t>(k0 + along * to));
+        for (std::int64_t k0 = first; k0 <= last; ++k0) cells_of[b].push_back(static_cast<std::int32_t>(k0 + along * to));
       };
       reach_row(row.k1, row.k2);
       for (const RowPair& pair : slots.row_pairs) {
@@ -134,8 +136,23 @@ void LatticeTiles::colour(const LatticeTiling& tiling, const std::vector<std::in
         reach_row(row.k1 + pair.d1, row.k2 + pair.d2);
       }
     }
-  };
-  colouring = Colouring(reach, of_blocks, static_cast<std::size_t>(along) * all_rows, touch);
+  colouring = Colouring(reach, of_blocks, static_cast<std::size_t>(along) * all_rows,
+                        [&](std::size_t b, std::vector<std::int32_t>& touched) { touched = cells_of[b]; });
+  // Gradients of cells beyond the ends of a piece of a row are computed with it, and reach as far once more.
+  const std::int64_t beyond = chunk_points * grow[0], row_size = along == 1 ? lattice.extent[0] : chunk_points;
+  std::vector<std::size_t> listed(body.stride() / PointMotion::piece_points + 1);  // one more than the block that has listed a piece last
+  pieces_.resize(blocks.size());
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    for (const std::int32_t cell : cells_of[b]) {
+      const std::int64_t row = cell / along, from = lattice.index(0, row % lattice.extent[1], row / lattice.extent[1]),
+                         first = from + chunk_points * (cell % along);
+      const auto begin = static_cast<std::size_t>(std::max(from, first - beyond)),
+                 end = static_cast<std::size_t>(std::min(from + lattice.extent[0], first + row_size + beyond));
+      for (std::size_t i = begin / PointMotion::piece_points; i <= (end - 1) / PointMotion::piece_points; ++i)
+        if (std::exchange(listed[i], b + 1) != b + 1) pieces_[b].push_back(static_cast<std::int32_t>(i));
+    }
+    std::ranges::sort(pieces_[b]);
+  }
 }
 
 bool LatticeTiles::moves(std::size_t b, ConstFieldView u) const noexcept {
@@ -166,7 +183,9 @@ void LatticeTiles::clear_dead(FieldView out) const noexcept {
 }
 
 std::size_t LatticeTiles::bytes() const noexcept {
-  return chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
+  std::size_t pieces = 0;
+  for (const std::vector<std::int32_t>& of_block : pieces_) pieces += of_block.size();
+  return pieces * sizeof(std::int32_t) + chunks.size() * sizeof(LatticeChunk) + rows.size() * sizeof(LatticeRow) + blocks.size() * sizeof(LatticeBlock) +
          chunk_at_.size() * sizeof(std::int32_t) + complete_rows.size() + partly_dead_.size() * sizeof(partly_dead_[0]);
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 /// The points of a lattice in groups of eight, rows and blocks: what loops run over.
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "families/blocks.hpp"
@@ -50,6 +52,8 @@ struct LatticeTiles {
   BlockSequence sequence;
   Colouring colouring;
 
+  /// Pieces of PointMotion with all points that a loop over families and their gradients reads or writes for block b.
+  std::span<const std::int32_t> pieces(std::size_t b) const noexcept { return pieces_[b]; }
   /// Index into `chunks` of the chunk with this point; -1: none.
   std::int32_t chunk_of(std::int64_t point) const noexcept { return chunk_at_[static_cast<std::size_t>(point) / chunk_points]; }
   /// Whether a point of block b moves.
@@ -73,6 +77,7 @@ struct LatticeTiles {
   /// Which tiles a block touches, and its colour. tiles: by block.
   void colour(const LatticeTiling& tiling, const std::vector<std::int32_t>& tiles, const Body& body, const LatticeSlots& slots);
 
+  std::vector<std::vector<std::int32_t>> pieces_;  ///< by block
   std::vector<std::int32_t> chunk_at_;  ///< by group of eight cells
   std::vector<std::pair<std::int32_t, std::uint8_t>>
       partly_dead_;  ///< first cells of such groups in rows, and which of them live

@@ -8,6 +8,7 @@
 
 #include "families/blocks.hpp"
 #include "perikit/core/field.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/families/quiet_counts.hpp"
 
 namespace perikit {
@@ -29,15 +30,16 @@ class QuietBlocks {
   }
 
   /// At the beginning of an evaluation of `passes` passes: moves(b) says whether a point of block b moves. arrival: of the
-  /// displacements of points of other ranks; null: they are there.
+  /// displacements of points of other ranks, motion: of points; null: they are there. Where all blocks are looked at, all have moved.
   template <class Moves>
-  void look(int passes, const Moves& moves, Arrival* arrival = nullptr) {
+  void look(int passes, const Moves& moves, Arrival* arrival = nullptr, PointMotion* motion = nullptr) {
     if (distance_.empty()) return;
     begin(passes);
     if (all_move_) {
       wake_all();
       return count();
     }
+    if (motion) motion->finish();
     auto look_at = [&](std::size_t b) {
       const bool now = (!moved_.empty() && moved_[b]) || moves(b);
       if (!moved_.empty()) moved_[b] = now;

@@ -11,6 +11,7 @@
 #include "operators/bond_screen.hpp"
 #include "operators/laminates.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/operators/law_history.hpp"
 #include "perikit/operators/laws.hpp"
 
@@ -224,7 +225,8 @@ struct Pass {
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
   BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
-  Arrival* arrival = nullptr;  ///< of u at the points of other ranks; null: it is there
+  Arrival* arrival = nullptr;    ///< of u at the points of other ranks; null: it is there
+  PointMotion* motion = nullptr; ///< of u, where the space moves points; null: it is there
 
   /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
   /// points. both_ends: sums of far ends, too.

@@ -143,12 +143,13 @@ void BodyProblem::share(FieldView field) {
   if (ghosts_) ghosts_->forward(field);
 }
 
-EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) {
+EvaluationStatus BodyProblem::forces(PointMotion* motion, ConstFieldView u, FieldView force, double* energy, double time_step) {
   LawHistory* const history = terms().history();
   if (history) history->set_time_step(time_step);
   EvaluationStatus status;
   kept_.reset();
   const Sampling asked = std::exchange(along_, Sampling::nothing);
+  if (motion && (!motion->inside() || asked != Sampling::nothing || ghosts_ || images())) motion->finish();
   // Where histories go on or bonds fail between forces and samples these are others.
   if (asked != Sampling::nothing && !history && !ghosts_ && !parts_.fracture.damage()) {
     PointSamples samples{.asked = asked};
@@ -156,7 +157,7 @@ EvaluationStatus BodyProblem::evaluate_forces(ConstFieldView u, FieldView force,
     if (status.ok()) kept_ = std::move(samples);
     kept_at_ = fingerprint_of(u);
   } else if (!ghosts_) {
-    status = terms().forces(seen(u, seen_), force, energy);
+    status = terms().forces(seen(u, seen_), force, energy, nullptr, motion);
   } else if (!images()) {
     ghosts_->start(Seen::writable(u));
     status = terms().forces(Seen(u, ghosts()), force, energy, &*ghosts_);

@@ -24,6 +24,8 @@ class EvaluationSpace {
   virtual ~EvaluationSpace() = default;
   /// Visits the evaluation points, block by block. Adds what they do to pass.out, unless the pass is alone. What arrives has arrived then.
   virtual void run(Pass& pass) = 0;
+  /// Runs with Work::force move the points of Pass::motion, all of them.
+  virtual bool moves_points() const noexcept { return false; }
   /// Runs with Work::force may take samples along (BatchWork::sample_along), of bodies without histories and laminates.
   virtual bool samples_along() const noexcept { return false; }
   /// Marks the groups whose energies a run sums up together with those of marked ones (Pass::energies).

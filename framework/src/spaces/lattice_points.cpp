@@ -217,16 +217,19 @@ void LatticePoints<D>::run(Pass& pass) {
     quiet_.wake();
   else
     quiet_.look(
-        2, [&](std::size_t b) { return tiles_.moves(b, pass.u); }, pass.arrival);
+        2, [&](std::size_t b) { return tiles_.moves(b, pass.u); }, pass.arrival, pass.motion);
   if (pass.alone()) return parallel_for(blocks(), [&](std::size_t b) { one_by_one(b, pass); });
   rows_.resize(static_cast<std::size_t>(thread_count()));
   for (Rows& r : rows_)
     if (r.flux.size() == 0) r.flux = Field(D * D, padded(static_cast<std::size_t>(most_)));
   tiles_.colouring.for_each(
       [&](std::size_t b) {
-        if (quiet_.awake(b, 1)) by_rows(b, pass);
+        if (!quiet_.awake(b, 1)) return;
+        if (pass.motion) pass.motion->need(tiles_.pieces(b));
+        by_rows(b, pass);
       },
       pass.arrival);
+  if (pass.motion) pass.motion->finish();   // what no block reads
   tiles_.clear_dead(pass.out);
 }
 

@@ -16,6 +16,7 @@ class LatticePoints final : public EvaluationSpace {
   explicit LatticePoints(const SpaceParts& parts);
 
   void run(Pass& pass) override;
+  bool moves_points() const noexcept override { return true; }
   void complete(GroupMarks& marks) const override { tiles_.complete(marks); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
   void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed

@@ -292,6 +292,7 @@ template <int D>
 std::int64_t CloudPairs<D>::run(const PairPass& pass) {
   reset_bad();
   const bool vectors = pass.work == PairWork::force || pass.work == PairWork::tangent;
+  if (pass.motion) pass.motion->finish();
   ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival, pass.q.data);
   look(pass, [&](std::size_t b) { return blocks_.moves(pass.u, b); }, &arrival);
   if (fails_) {

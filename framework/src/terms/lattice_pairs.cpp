@@ -54,7 +54,11 @@ class LatticePairs final : public PairLoop {
     reset_bad();
     look(pass, [&](std::size_t b) { return families_.tiles.moves(b, pass.u); }, pass.arrival);
     if ((!pass.only || pass.local) && !adds(pass.work)) parallel_for(blocks(), [&](std::size_t b) { families_.tiles.clear(b, pass.out); });
-    each_block(pass, families_.tiles.colouring, pass.arrival, [&](auto work, std::size_t b) { run_block<work.value>(b, pass); });
+    each_block(pass, families_.tiles.colouring, pass.arrival, [&](auto work, std::size_t b) {
+      if (pass.motion) pass.motion->need(families_.tiles.pieces(b));
+      run_block<work.value>(b, pass);
+    });
+    if (pass.motion) pass.motion->finish();   // what no block reads
     return bad();
   }
 

@@ -142,13 +142,15 @@ void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double Group
   perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
 }
 
-std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, const SampleSums* along) {
+std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, const Beside& beside) {
   BatchWork work = this->work(Work::force, energy != nullptr, screen_);
-  if (along) work.sample_along(*along);
+  if (beside.samples) work.sample_along(*beside.samples);
   const bool dissipates = work.dissipates(), wanted = energy || dissipates;
   if (wanted) energies_ = no_energies();
   Pass pass{work, u, {}, force, nullptr, wanted ? energies_.data() : nullptr, -1, {}};
-  pass.arrival = arrival;
+  pass.arrival = beside.arrival;
+  pass.motion = beside.motion;
+  if (pass.motion && !space_->moves_points()) pass.motion->finish();
   space_->run(pass);
   if (energy) add_owned(energies_, &GroupEnergy::stored, *energy);
   if (dissipates) {
@@ -247,7 +249,7 @@ std::int64_t Mechanics::add_forces_and_samples(ConstFieldView u, FieldView force
   if (!space_->samples_along() || parts_.numbered()) return Term::add_forces_and_samples(u, force, energy, samples);
   Averages averages(parts_.families.body(), parts_.laws, samples);
   const SampleSums sums = averages.sums();
-  const std::int64_t bad = forces(u, force, energy, nullptr, &sums);
+  const std::int64_t bad = forces(u, force, energy, {.samples = &sums});
   averages.finish();
   return bad;
 }

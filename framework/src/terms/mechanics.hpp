@@ -14,10 +14,13 @@ class Mechanics final : public Term {
   explicit Mechanics(const SpaceParts& parts);
 
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, nullptr, nullptr);
+    return forces(u, force, energy, {});
   }
   std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, &arrival, nullptr);
+    return forces(u, force, energy, {.arrival = &arrival});
+  }
+  std::int64_t move_and_add_forces(PointMotion& motion, ConstFieldView u, FieldView force, ExactSum* energy) override {
+    return forces(u, force, energy, {.motion = &motion});
   }
   std::int64_t add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) override;
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
@@ -59,8 +62,13 @@ class Mechanics final : public Term {
   std::unique_ptr<VolumetricRows> make_volumetric_rows();
 
  private:
-  /// along: samples that the evaluation takes along; null: none.
-  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, const SampleSums* along);
+  /// What an evaluation of forces does beside; null: nothing.
+  struct Beside {
+    Arrival* arrival = nullptr;
+    PointMotion* motion = nullptr;
+    const SampleSums* samples = nullptr;   ///< that it takes along
+  };
+  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, const Beside& beside);
   std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   BatchWork work(Work kind, bool energy, BondScreen* screen = nullptr) const noexcept;
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.

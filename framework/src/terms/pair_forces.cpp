@@ -241,9 +241,10 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
 
 template <int D>
 std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                                       const std::uint8_t* only, bool local, Arrival* arrival) {
+                                       const std::uint8_t* only, bool local, Arrival* arrival, PointMotion* motion) {
   PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local};
   pass.arrival = arrival;
+  pass.motion = motion;
   const std::int64_t bad = loop_->run(pass);
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
@@ -276,14 +277,15 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
 }
 
 template <int D>
-std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival) {
+std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, PointMotion* motion) {
   if (energy) energies_.assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, false, arrival);
+    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, false, arrival, motion);
     if (bad >= 0) return bad;
   }
   PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
   pass.arrival = arrival;
+  if (!formulation_.dilatation) pass.motion = motion;   // else all have moved
   pass.screen = screen_;
   if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
   const std::int64_t bad = loop_->run(pass);

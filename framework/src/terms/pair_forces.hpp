@@ -23,10 +23,13 @@ class PairForces final : public Term {
   explicit PairForces(const PairParts& parts);
 
   std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, nullptr);
+    return forces(u, force, energy, nullptr, nullptr);
   }
   std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) override {
-    return forces(u, force, energy, &arrival);
+    return forces(u, force, energy, &arrival, nullptr);
+  }
+  std::int64_t move_and_add_forces(PointMotion& motion, ConstFieldView u, FieldView force, ExactSum* energy) override {
+    return forces(u, force, energy, nullptr, &motion);
   }
   std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
     return tangent_of(u, w, Kw, nullptr, nullptr);
@@ -60,7 +63,7 @@ class PairForces final : public Term {
     AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
     AlignedVector<double> energy, force;
   };
-  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival);
+  std::int64_t forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, PointMotion* motion);
   std::int64_t tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near);
   /// energies: those of the groups in `only` [J]; null: not wanted.
   std::int64_t forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, std::vector<double>* energies);
@@ -74,9 +77,9 @@ class PairForces final : public Term {
   void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; energies += V phi by group of eight points;
-  /// phi by point -> density. only, local, arrival: see PairPass; null for all.
+  /// phi by point -> density. only, local, arrival, motion: see PairPass; null for all.
   std::int64_t dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                          const std::uint8_t* only = nullptr, bool local = false, Arrival* arrival = nullptr);
+                          const std::uint8_t* only = nullptr, bool local = false, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
 
   const Families& families_;
   const Body& body_;

@@ -13,6 +13,7 @@
 #include "families/quiet_blocks.hpp"
 #include "families/stretch.hpp"
 #include "operators/bond_screen.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/operators/laws.hpp"
@@ -36,6 +37,7 @@ struct PairPass {
   const double* by_theta = nullptr;  ///< phi/theta d/m by point, where bonds are screened and there is a dilatation
   BondScreen* screen = nullptr;      ///< forces: where to mark groups; null: nowhere
   Arrival* arrival = nullptr;        ///< of u at the points of other ranks; null: it is there
+  PointMotion* motion = nullptr;     ///< of u; null: it is there
 };
 
 /// Point quantities that bonds need.
@@ -102,7 +104,7 @@ class PairLoop {
   virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   virtual std::size_t blocks() const noexcept = 0;
   /// Forces and tangent actions are added to `out`, the others overwrite it. Returns the internal index of a point with a bond of
-  /// zero or non-finite length, or -1.
+  /// zero or non-finite length, or -1. Moves the points of pass.motion, all of them.
   virtual std::int64_t run(const PairPass& pass) = 0;
   virtual std::size_t bytes() const noexcept = 0;
   QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
@@ -117,7 +119,7 @@ class PairLoop {
   void look(const PairPass& pass, const Moves& moves, Arrival* arrival) {
     reach_ = pass.q.data ? 2 : 1;
     if (!pass.only && (pass.work == PairWork::force || pass.work == PairWork::dilatation))
-      quiet_.look(reach_, moves, arrival);
+      quiet_.look(reach_, moves, arrival, pass.motion);
     else
       quiet_.wake();
   }

@@ -11,6 +11,7 @@
 #include "operators/point_flux.hpp"
 #include "perikit/core/exact_sum.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/families/quiet_counts.hpp"
 #include "perikit/operators/report.hpp"
 #include "perikit/operators/samples.hpp"
@@ -25,6 +26,11 @@ class Term {
   /// The same while displacements of points of other ranks are on their way, which have arrived when it returns.
   virtual std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
     arrival.finish();
+    return add_forces(u, force, energy);
+  }
+  /// The same of displacements that `motion` makes, which also sets force to zero on the points that it moves. All have moved when this returns.
+  virtual std::int64_t move_and_add_forces(PointMotion& motion, ConstFieldView u, FieldView force, ExactSum* energy) {
+    motion.finish();
     return add_forces(u, force, energy);
   }
   /// Forces and samples of the same displacements, each with the bits that it has alone.

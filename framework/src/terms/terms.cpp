@@ -152,10 +152,9 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   return status;
 }
 
-/// add(term, energy) adds the forces of a term.
+/// add(term, energy) adds the forces of a term to `force`, which is zero.
 template <class Add>
-EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, FieldView force, double* energy) {
-  fill(0, force);
+EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, double* energy) {
   ExactSum sum;
   if (criterion_) criterion_->begin_forces();
   std::int64_t bad = -1;
@@ -165,12 +164,14 @@ EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, FieldView force, 
   return status(bad);
 }
 
-EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival) {
+EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival, PointMotion* motion) {
+  if (!motion) fill(0, force);
   return forces_by(
       [&](Term& term, ExactSum* to) {
+        if (motion && motion->pending()) return term.move_and_add_forces(*motion, u, force, to);
         return arrival && arrival->pending() ? term.add_forces_meanwhile(*arrival, u, force, to) : term.add_forces(u, force, to);
       },
-      u, force, energy);
+      u, energy);
 }
 
 namespace {
@@ -185,7 +186,8 @@ void begin_samples(const Body& body, PointSamples& samples) {
 
 EvaluationStatus Terms::forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples) {
   begin_samples(parts_.families->body(), samples);
-  return forces_by([&](Term& term, ExactSum* to) { return term.add_forces_and_samples(u, force, to, samples); }, u, force, energy);
+  fill(0, force);
+  return forces_by([&](Term& term, ExactSum* to) { return term.add_forces_and_samples(u, force, to, samples); }, u, energy);
 }
 
 EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,

@@ -45,7 +45,12 @@ class BodyProblem final : public Problem {
   ~BodyProblem() override;
 
   void share(FieldView field) override;
-  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override;
+  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override {
+    return forces(nullptr, u, force, energy, time_step);
+  }
+  EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) override {
+    return forces(&motion, u, force, energy, time_step);
+  }
   EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override;
   EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override;
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
@@ -128,6 +133,8 @@ class BodyProblem final : public Problem {
     const Ghosts* ghosts_;   ///< null where there is nothing to clear
   };
 
+  /// motion: of u; null: it is there.
+  EvaluationStatus forces(PointMotion* motion, ConstFieldView u, FieldView force, double* energy, double time_step);
   /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
   Seen seen(ConstFieldView u, Field& memory);
   /// A field with the values of ghosts, without images.

@@ -7,6 +7,7 @@
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
+#include "perikit/core/point_motion.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/problem/damaged_part.hpp"
 #include "perikit/problem/image_map.hpp"
@@ -53,6 +54,11 @@ class Problem {
   /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and
   /// laws with history put theirs aside for `advance`; 0: nothing is kept.
   virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
+  /// The same of the displacements u that `motion` makes. It also sets force to zero on the points that it moves. All have moved when this returns.
+  virtual EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) {
+    motion.finish();
+    return evaluate_forces(u, force, energy, time_step);
+  }
   /// force <- what acts from outside at time (or load parameter) t [N], fully overwritten: loads, of which some follow the
   /// surface at u.
   virtual EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) = 0;

@@ -24,6 +24,7 @@ class Arrival;
 class BondCriterion;
 class Families;
 class Mechanics;
+class PointMotion;
 struct CloudConsistency;
 struct Interfaces;
 class Term;
@@ -59,8 +60,8 @@ class Terms {
   ~Terms();
 
   /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. arrival: of u at the
-  /// points of other ranks, which has come when it returns; null: it is there.
-  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr);
+  /// points of other ranks, which has come when it returns; null: it is there. motion: of u, which leaves force zero.
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
   /// `forces` and `sample` of the same displacements, bit for bit; where evaluation points are those of both, each is visited once.
   EvaluationStatus forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples);
   /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds:
@@ -136,7 +137,7 @@ class Terms {
 
  private:
   template <class Add>
-  EvaluationStatus forces_by(Add&& add, ConstFieldView u, FieldView force, double* energy);
+  EvaluationStatus forces_by(Add&& add, ConstFieldView u, double* energy);
   struct Assemblies;
   struct Failing;
   void bonds_changed(std::span<const std::int32_t> points);
