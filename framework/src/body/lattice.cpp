@@ -123,8 +123,8 @@ Lattice box_of(const Lattice& lattice, const std::array<std::int64_t, 3>& first,
 }
 
 LatticeTiling::LatticeTiling(const Lattice& lattice) {
+  constexpr std::int64_t segment = 32;  // groups
   const auto& n = lattice.whole;
-  const std::int64_t segment = n[1] * n[2] > 1 ? 32 : 64;  // groups
   const auto group = static_cast<std::int64_t>(padding);
   const std::int64_t groups = (n[0] + group - 1) / group, segments = (groups + segment - 1) / segment,
                      points = n[0] * n[1] * n[2];
