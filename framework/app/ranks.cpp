@@ -65,7 +65,7 @@ Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks
               0,
               0,
               static_cast<double>(simulation.problem().bytes()),
-              peak.bytes(),
+              peak.bytes() + (rank == 0 ? RunRecorder::bytes_of_pieces(body.points_of_all_ranks()) : 0),
               static_cast<double>(body.points_of_all_ranks()),
               body.lattice() == nullptr};
   share.ghosts = static_cast<double>(body.points()) - share.points;

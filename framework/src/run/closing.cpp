@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/numbered_rows.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/run/simulation.hpp"
 
@@ -25,6 +26,10 @@ std::string quiet_summary(const QuietCounts& counts) {
 }
 
 }  // namespace
+
+double RunRecorder::bytes_of_pieces(std::size_t points_of_all_ranks) noexcept {
+  return 60.0 * static_cast<double>(std::min(points_of_all_ranks, rows_of_piece));
+}
 
 std::string RunRecorder::closing(double set_up, double plan) const {
   BodyProblem& problem = simulation_.problem();

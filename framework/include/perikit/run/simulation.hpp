@@ -124,6 +124,8 @@ class RunRecorder final : public Observer {
   /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. Before the run set_up seconds
   /// went by, and `plan` seconds until it was known which steps it would make.
   std::string closing(double set_up, double plan) const;
+  /// What rank 0 takes beyond its part to write what other ranks have: 60 bytes a point (measured) of the pieces in which that comes.
+  static double bytes_of_pieces(std::size_t points_of_all_ranks) noexcept;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.
   std::int64_t resumed_step() const noexcept { return resumed_step_; }
 
