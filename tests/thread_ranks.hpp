@@ -2,6 +2,7 @@
 /// Ranks that are threads of one process: what a run on several ranks does, without MPI and its start.
 
 #include <algorithm>
+#include <atomic>
 #include <barrier>
 #include <cstdlib>
 #include <exception>
@@ -25,11 +26,15 @@ struct Meeting {
         counts(numbers.size()),
         bytes(numbers.size()) {}
   std::barrier<> barrier;
+  std::atomic<bool> failed{false};   ///< whether a rank has thrown, and comes no more
   std::vector<double> numbers;
   std::vector<std::span<const Message>> messages;
   std::vector<std::vector<std::int64_t>> counts;
   std::vector<std::vector<std::byte>> bytes;
 };
+
+/// Thrown on ranks that meet when another has thrown.
+struct OtherRankFailed {};
 
 class ThreadRank final : public Communicator {
  public:
@@ -103,6 +108,7 @@ class ThreadRank final : public Communicator {
   template <class Read>
   void together(Read&& read) {
     meeting_.barrier.arrive_and_wait();
+    if (meeting_.failed.load()) throw OtherRankFailed();
     read();
     meeting_.barrier.arrive_and_wait();
   }
@@ -111,8 +117,8 @@ class ThreadRank final : public Communicator {
   int rank_;
 };
 
-/// work(communicator) on so many ranks at once. What one of them throws is thrown again, the lowest one's where several do; the
-/// others must then throw, too, or meet no more.
+/// work(communicator) on so many ranks at once. What one of them throws is thrown again, the lowest one's where several do; where the others meet
+/// then, they throw, too.
 inline void on_ranks(int ranks, const std::function<void(ThreadRank&)>& work) {
   Meeting meeting(ranks);
   std::vector<std::exception_ptr> failures(static_cast<std::size_t>(ranks));
@@ -123,8 +129,11 @@ inline void on_ranks(int ranks, const std::function<void(ThreadRank&)>& work) {
       const CommunicatorScope scope(mine);
       try {
         work(mine);
+      } catch (const OtherRankFailed&) {
+        meeting.barrier.arrive_and_drop();
       } catch (...) {
         failures[static_cast<std::size_t>(r)] = std::current_exception();
+        meeting.failed.store(true);
         meeting.barrier.arrive_and_drop();
       }
     });

@@ -16,9 +16,9 @@
 #include "core/loop_order.hpp"
 #include "core/loop_shares.hpp"
 #include "families/quiet_blocks.hpp"
-#include "perikit/core/point_motion.hpp"
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/loop_times.hpp"
+#include "perikit/core/point_motion.hpp"
 
 using namespace perikit;
 

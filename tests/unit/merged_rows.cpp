@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <random>
+#include <stdexcept>
 
 #include "tests/thread_ranks.hpp"
 
@@ -71,4 +72,18 @@ TEST_CASE("merged rows: all keys once, in order, with their rows, a piece at a t
       check(ranks, most, "one after the other", [&](std::int64_t key) { return static_cast<int>(key * ranks / 3000); });
       check(ranks, most, "all on the last one", [&](std::int64_t) { return ranks - 1; });
     }
+}
+
+TEST_CASE("ranks: what one throws while the others meet ends them all, and is what is thrown") {
+  for (const int thrower : {0, 2}) {
+    const auto work = [&](ThreadRank& rank) {
+      std::vector<std::int64_t> numbers(4, 1);
+      rank.sum(numbers);
+      CHECK(numbers == std::vector<std::int64_t>(4, 3));
+      if (rank.rank() == thrower) throw std::runtime_error("it alone");
+      numbers.resize(5);
+      rank.sum(numbers);
+    };
+    CHECK_THROWS_WITH(on_ranks(3, work), "it alone");
+  }
 }

@@ -1,5 +1,7 @@
 #include "perikit/core/point_motion.hpp"
 
+#include <algorithm>
+
 #include "core/loop_shares.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"

@@ -2,7 +2,6 @@
 /// Points that move as a loop over them begins, each right before the loop reads it for the first time: what was written is in the caches then, and
 /// a step of an explicit scheme has one loop less.
 
-#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
