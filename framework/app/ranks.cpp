@@ -65,9 +65,10 @@ Share share_of(const Scene& scene, const Registry& registry, int rank, int ranks
               0,
               0,
               static_cast<double>(simulation.problem().bytes()),
-              peak.bytes() + (rank == 0 ? RunRecorder::bytes_of_pieces(body.points_of_all_ranks()) : 0),
+              peak.bytes(),
               static_cast<double>(body.points_of_all_ranks()),
               body.lattice() == nullptr};
+  if (rank == 0 && share.peak > 0) share.peak += RunRecorder::bytes_of_pieces(body.points_of_all_ranks());
   share.ghosts = static_cast<double>(body.points()) - share.points;
   const std::size_t materials = scene.regions.size() + 1;  // far points have one more
   for (const std::int32_t p : body.internal())
