@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+
 #include "perikit/core/spectral.hpp"
 #include "perikit/model/elastic_constants.hpp"
 #include "perikit/sdk/free_stretch.hpp"
+#include "perikit/sdk/volumetric.hpp"
 
 namespace perikit {
 
@@ -48,6 +51,16 @@ struct Hencky {
       const Tensor<T, S> dtau = add_diagonal((2.0 * mu) * rotate(e.vectors, log_change), lambda * inner(G, dH));
       return (dtau - P * transpose(dH)) * G;
     };
+  }
+
+  /// psi = mu dev h : dev h + kappa/2 (ln J)^2
+  template <class K>
+  std::array<K, 2> isochoric(const std::array<K, 2>& k) const noexcept {
+    return {-2.0 / 3 * k[1], k[1]};
+  }
+  template <class T, class K>
+  VolumeResponse<T> volume(const T& j, const K& k) const noexcept {
+    return volume_response(Volumetric::logarithmic, k[0] + 2.0 / 3 * k[1], j);
   }
 
   /// tau33 = 0 is linear in logarithms: ln(free stretch) = -lambda/(lambda + 2 mu) ln J over the plane, in a bar -lambda/(2

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -71,15 +72,23 @@ struct MooneyRivlin {
     const Tensor<T, S> square = second * deviator(gram(d));
     const Tensor<T, S> tau = add_diagonal(on_d * d - square, volumetric_kirchhoff(volumetric, kappa, j));
     const Tensor<T, S> G = (scale * root) * add_diagonal(cofactor_minus_identity(H), T(1.0)), P = tau * G;  // F^-T
-    const Tensor<T, S> by_volume = add_diagonal(                                                            // dtau for dJ/J = 1
-        T(-2.0 / 3) * (first * d) - T(4.0 / 3) * ((second * (1.0 + m)) * d - square),
-        volumetric_kirchhoff_slope(volumetric, kappa, j));
-    return [=](const Tensor<T, S>& dH) {
+    return [=, by_volume = add_diagonal(                                                                    // dtau for dJ/J = 1
+                   T(-2.0 / 3) * (first * d) - T(4.0 / 3) * ((second * (1.0 + m)) * d - square),
+                   volumetric_kirchhoff_slope(volumetric, kappa, j))](const Tensor<T, S>& dH) {
       const Tensor<T, S> de = T(2.0) * symmetric_part(dH + dH * transpose(H)), dd = deviator(de);
       const Tensor<T, S> turn = (second * (1.0 / 3.0)) * (trace(de) * d) - (2.0 * second) * deviator(symmetric_part(d * dd));
       const Tensor<T, S> dtau = on_d * dd + turn + inner(G, dH) * by_volume;
       return (dtau - P * transpose(dH)) * G;
     };
+  }
+
+  template <class K>
+  std::array<K, 3> isochoric(const std::array<K, 3>& k) const noexcept {
+    return {k[0], k[1], K(0.0)};
+  }
+  template <class T, class K>
+  VolumeResponse<T> volume(const T& j, const K& k) const noexcept {
+    return volume_response(volumetric, k[2], j);
   }
 
   template <class T, class S, class K>

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "perikit/core/tensor.hpp"
 #include "perikit/model/elastic_constants.hpp"
 #include "perikit/sdk/rubber_free_stress.hpp"
@@ -51,13 +53,22 @@ struct NeoHookean {
     const T a = mu * (root * root);
     const T c = volumetric_kirchhoff(volumetric, kappa, j) - a * (1.0 + m);
     const T c_by_volume = volumetric_kirchhoff_slope(volumetric, kappa, j) + (2.0 / 3) * a * (1.0 + m);  // dc for dJ/J = 1
-    const Tensor<T, S> F = add_diagonal(H, T(1.0)),
-                       G = (root * (root * root)) * add_diagonal(cofactor_minus_identity(H), T(1.0));  // F^-T
-    return [=](const Tensor<T, S>& dH) {
+    // Captured where they are made: copies of tensors would take a tenth of the time.
+    return [a, c, c_by_volume, F = add_diagonal(H, T(1.0)),
+            G = (root * (root * root)) * add_diagonal(cofactor_minus_identity(H), T(1.0))](const Tensor<T, S>& dH) {  // G: F^-T
       const T volume = inner(G, dH), shape = T(2.0 / 3) * a * inner(F, dH);
       const Tensor<T, S> turned = G * (transpose_times(dH, G));
       return a * dH + (T(-2.0 / 3) * a * volume) * F + (c_by_volume * volume - shape) * G - c * turned;
     };
+  }
+
+  template <class K>
+  std::array<K, 2> isochoric(const std::array<K, 2>& k) const noexcept {
+    return {k[0], K(0.0)};
+  }
+  template <class T, class K>
+  VolumeResponse<T> volume(const T& j, const K& k) const noexcept {
+    return volume_response(volumetric, k[1], j);
   }
 
   template <class T, class S, class K>

@@ -9,7 +9,7 @@ namespace perikit {
 /// Saint Venant-Kirchhoff solid: second Piola-Kirchhoff stress linear in the Green-Lagrange strain.
 ///   psi = lambda/2 (tr E)^2 + mu E:E,  E = (F^T F - I)/2,  S = lambda tr(E) I + 2 mu E,  P = F S
 struct SaintVenantKirchhoff {
-  static constexpr MaterialTraits traits{.constants = 2};
+  static constexpr MaterialTraits traits{.constants = 2, .green_linear = true};
 
   void constants(const MaterialInput& input, double* k) const {
     const Moduli moduli = elastic_constants(input);

@@ -27,6 +27,20 @@ inline Matrix product(const Matrix& a, const Matrix& b) {
   return r;
 }
 
+inline Matrix scaled(Matrix a, double factor) {
+  for (double& x : a) x *= factor;
+  return a;
+}
+inline Matrix transposed(const Matrix& a) { return {a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]}; }
+inline double determinant(const Matrix& a) {
+  return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
+}
+inline Matrix inverse(const Matrix& a) {
+  const Matrix r{a[4] * a[8] - a[5] * a[7], a[2] * a[7] - a[1] * a[8], a[1] * a[5] - a[2] * a[4], a[5] * a[6] - a[3] * a[8], a[0] * a[8] - a[2] * a[6],
+           a[2] * a[3] - a[0] * a[5], a[3] * a[7] - a[4] * a[6], a[1] * a[6] - a[0] * a[7], a[0] * a[4] - a[1] * a[3]};
+  return scaled(r, 1 / determinant(a));
+}
+
 /// Where component k of a space stands in the 3 x 3 matrix.
 inline std::span<const int> places(Space space) {
   static constexpr int solid[] = {0, 1, 2, 3, 4, 5, 6, 7, 8}, plane[] = {0, 1, 3, 4, 8}, line[] = {0, 4, 8};
@@ -165,6 +179,26 @@ struct Evaluation {
     for (const Field* f : {&psi, &P, &dP, &A, &dissipated})
       for (int c = 0; c < f->components(); ++c) r.push_back(f->component(c)[p]);
     return r;
+  }
+};
+
+/// What the volumetric part of a law says of n changes of volume: everything, or one output alone.
+struct Volumes {
+  Values psi, kirchhoff, slope;
+
+  Volumes(const Material& material, std::span<const double> constants, const std::vector<double>& j, double* VolumeBatch::*only = nullptr) {
+    const std::size_t size = padded(j.size());
+    Field in(1, size), out(3, size);
+    std::ranges::copy(j, in.data());
+    VolumeBatch batch{.n = static_cast<int>(j.size()), .j = in.data(), .constants = constants.data()};
+    int c = 0;
+    for (double* VolumeBatch::*output : {&VolumeBatch::psi, &VolumeBatch::kirchhoff, &VolumeBatch::slope}) {
+      if (!only || only == output) batch.*output = out.component(c);
+      ++c;
+    }
+    material.volumetric(batch);
+    for (Values* to : {&psi, &kirchhoff, &slope}) to->assign(j.size(), 0.0);
+    for (std::size_t p = 0; p < j.size(); ++p) psi[p] = out.component(0)[p], kirchhoff[p] = out.component(1)[p], slope[p] = out.component(2)[p];
   }
 };
 

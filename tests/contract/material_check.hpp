@@ -70,6 +70,11 @@ class MaterialCheck {
     for (const int k : places(space_)) H[c++] -= identity[k];
     return H;
   }
+  Matrix deformation(const Values& H) const {
+    Matrix F = extend(space_, H);
+    for (int i = 0; i < 3; ++i) F[4 * i] += 1;
+    return F;
+  }
   Matrix random_F() {
     const bool free = free_stretch(space_);
     return random_deformation(random_, space_, free ? options_.least_free : options_.least_stretch,

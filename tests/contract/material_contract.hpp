@@ -141,6 +141,75 @@ class MaterialContract : MaterialCheck {
     }
   }
 
+  /// A law that says it is decoupled, psi = psi_iso(J^(-1/3) F) + U(J): both parts, their stresses and tangents are those of the law.
+  void volumes() {
+    std::vector<double> shape = constants_;
+    if (free_stretch(space_) || !material_.isochoric_constants(constants_.data(), shape.data())) return;
+    CHECK_MESSAGE(material_.state_components(space_) == 0, label(), "a law with history is decoupled");
+    constexpr int n = 24;
+    const std::vector<Values> points = random_points(n), directions = random_directions(n);
+    std::vector<Values> grown;
+    std::vector<double> j;
+    for (const Values& H : points) {
+      const Matrix F = deformation(H);
+      j.push_back(determinant(F) - 1);
+      grown.push_back(gradient(scaled(F, uniform(random_, 0.5, 2.0))));
+    }
+    const Evaluation whole = evaluate(points, directions), part(material_, space_, shape, points, directions), other(material_, space_, shape, grown);
+    const Volumes volume(material_, constants_, j);
+    for (int p = 0; p < n; ++p) {
+      const double scale = stress_scale(whole, p);
+      const Matrix F = deformation(points[p]), dF = extend(space_, directions[p]);
+      const Matrix G = transposed(inverse(F)), turned = product(G, product(transposed(dF), G));
+      double rate = 0, power = 0;
+      for (int k = 0; k < 9; ++k) rate += G[k] * dF[k], power += extend(space_, part.at(part.P, p))[k] * F[k];
+      Matrix P = extend(space_, part.at(part.P, p)), dP = extend(space_, part.at(part.dP, p));
+      for (int k = 0; k < 9; ++k) {
+        P[k] += volume.kirchhoff[p] * G[k];
+        dP[k] += volume.slope[p] * rate * G[k] - volume.kirchhoff[p] * turned[k];
+      }
+      near("psi = psi_iso + U", {part.psi.data()[p] + volume.psi[p]}, whole.at(whole.psi, p), 1e-12, scale);
+      near("P = P_iso + tau F^-T", restrict_to(space_, P), whole.at(whole.P, p), 1e-12, scale);
+      near("dP = dP_iso + d(tau F^-T)", restrict_to(space_, dP), whole.at(whole.dP, p), 1e-12, scale * (1 + largest(G)));
+      near("psi_iso(a F) = psi_iso(F)", other.at(other.psi, p), part.at(part.psi, p), 1e-12, scale);
+      near("P_iso : F = 0", {power}, {0.0}, 1e-12, scale * (1 + largest(F)));
+    }
+    const double bulk = material_.small_strain(constants_.data()).bulk();
+    const Volumes rest(material_, constants_, {0.0, 1e-10});
+    CHECK_MESSAGE(rest.psi[0] == 0.0, label(), "U(1) = 0: ", rest.psi[0]);
+    CHECK_MESSAGE(rest.kirchhoff[0] == 0.0, label(), "tau = 0 at rest: ", rest.kirchhoff[0]);
+    near("the slope of tau at rest is the bulk modulus", {rest.slope[0]}, {bulk}, 1e-12, bulk);
+    near("tau of a small change of volume", {rest.kirchhoff[1]}, {1e-10 * bulk}, 1e-8, 1e-10 * bulk);
+    const Volumes alone(material_, constants_, j, &VolumeBatch::kirchhoff);
+    same_bits("tau alone", alone.kirchhoff, volume.kirchhoff);
+  }
+
+  /// A law that says it is linear in the Green strain grows as such laws do.
+  void growth() {
+    if (!traits_.green_linear || free_stretch(space_)) return;
+    constexpr int n = 24;
+    const std::vector<Values> points = random_points(n);
+    const double kappa = material_.small_strain(constants_.data()).bulk();
+    std::vector<Values> grown;
+    std::vector<double> by;
+    for (const Values& H : points) {
+      by.push_back(uniform(random_, 0.5, 2.0));
+      grown.push_back(gradient(scaled(deformation(H), by.back())));
+    }
+    const Evaluation one = evaluate(points), other = evaluate(grown);
+    for (int p = 0; p < n; ++p) {
+      const double a = by[p], e = (a * a - 1) / 2, scale = stress_scale(other, p) * (1 + std::pow(a, 4));
+      const Matrix F = deformation(points[p]);
+      double strain = -1.5;   // tr E
+      for (const double x : F) strain += 0.5 * x * x;
+      Values P = one.at(one.P, p);
+      const Values on_F = restrict_to(space_, F);
+      for (int c = 0; c < components_; ++c) P[c] = a * a * a * P[c] + 3 * kappa * a * e * on_F[c];
+      near("P(a F) = a^3 P(F) + 3 kappa a e F", other.at(other.P, p), P, 1e-12, scale);
+      near("psi(a F)", other.at(other.psi, p), {std::pow(a, 4) * one.psi.data()[p] + 3 * kappa * e * (a * a * strain + 1.5 * e)}, 1e-12, scale * (1 + largest(F)));
+    }
+  }
+
   /// A batch equals its points one at a time, to the bit, and each output is what it is where no other is asked for: a run that samples energies
   /// in some steps goes through the same states. Outputs are overwritten; nothing behind the padding is touched.
   void batches() {
@@ -257,7 +326,7 @@ inline void check_history(const Material& material, const std::vector<double>& c
 inline void check_material(const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
   using Contract = MaterialContract;
   for (const auto identity : {&Contract::reference_state, &Contract::small_strains, &Contract::derivatives, &Contract::tangent_action,
-                              &Contract::free_stretches, &Contract::confined, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
+                              &Contract::free_stretches, &Contract::confined, &Contract::volumes, &Contract::growth, &Contract::batches, &Contract::rotations, &Contract::units, &Contract::inadmissible}) {
     check_material(material, constants, options, identity);
   }
   check_history(material, constants, options);

@@ -82,6 +82,10 @@ TEST_CASE("material: the tangent action is the tangent times its direction, and 
 TEST_CASE("material: plane and uniaxial stress are plane and uniaxial strain at the stretch that they report") { in_every_space(&MaterialContract::free_stretches); }
 TEST_CASE("material: the promise that lateral components vanish changes nothing but the cost") { in_every_space(&MaterialContract::confined); }
 
+TEST_CASE("material: a law that tells shape and volume apart is the sum of both") { in_every_space(&MaterialContract::volumes); }
+
+TEST_CASE("material: a law that is linear in the Green strain grows as such laws do") { in_every_space(&MaterialContract::growth); }
+
 TEST_CASE("material: a batch is its points one at a time, writes all of its outputs and nothing else") { in_every_space(&MaterialContract::batches); }
 
 TEST_CASE("material: stress turns with the body, and an isotropic law has no directions") { in_every_space(&MaterialContract::rotations); }

@@ -21,6 +21,7 @@ const std::vector<Lie> lies{
     {"fixed_axes", "material", {"material: stress turns with the body, and an isotropic law has no directions"}},
     {"wrong_tangent", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
     {"wrong_stress", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
+    {"twice_the_bulk", "material", {"material: a law that tells shape and volume apart is the sum of both"}},
     {"half_told", "material", {"material: a law with history follows paths: objective, exact tangent, its history in its own place, its energy accounted for"}},
     {"forgotten_lane", "material", {"material: a batch is its points one at a time, writes all of its outputs and nothing else"}},
     {"one_sided", "kinematics", {"kinematics: bitwise the same for one, two and three threads, and to rounding without savings"}},

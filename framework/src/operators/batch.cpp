@@ -9,7 +9,6 @@
 
 #include "operators/bond_samples.hpp"
 #include "operators/lane_stresses.hpp"
-#include "operators/volume_stiffness.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -55,7 +54,7 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   LawBatch batch;
   batch.n = n;
   batch.H = s.H;
-  batch.confined = confined();
+  batch.confined = confined() && !selective_;
   batch.points = points;
   if (energy_ || screen_ || samples()) batch.psi = s.psi;
   batch.P = P;
@@ -152,7 +151,7 @@ int BatchWork::evaluate_laminates(BatchScratch& s, double* P, double* dP, const 
   batch.lane = lanes.lane;
   batch.laminate = lanes.point;
   batch.H = s.H;
-  batch.confined = confined();
+  batch.confined = confined() && !selective_;
   if (energy_ || screen_ || work_ == Work::sample) batch.psi = s.psi;
   batch.P = P;
   if (dP) batch.dH = s.dH;
@@ -175,65 +174,6 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   if (along_) add_samples(n, s, s.own_weight, *along_, true);
   for (int l = 0; l < n && tangent; l += pack_width) (-Pack::load(weight + l)).store(weight + l);
   s.stress_weight = weight;
-  return -1;
-}
-
-/// dH <- F: the rate of ln J is 3.
-void BatchWork::set_growth(int n, BatchScratch& s) const noexcept {
-  const int d = dimension(laws_.space()), components = tensor_components(laws_.space());
-  for (int c = 0; c < components; ++c) {
-    const double own = c >= d * d || c % (d + 1) == 0 ? 1.0 : 0.0;
-    for (int l = 0; l < n; ++l) s.dH[c * batch_points + l] = own + s.H[c * batch_points + l];
-  }
-}
-
-/// In place of the energies, with dH = F and other = A : F.
-void BatchWork::put_volume_stiffness(int n, BatchScratch& s) const noexcept {
-  for (int l = 0; l < n; ++l) s.psi[l] = volume_stiffness(tensor_components(laws_.space()), l, s.dH, s.P, s.other);
-}
-
-int BatchWork::selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept {
-  const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
-  const bool tangent = work_ == Work::tangent;
-  const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
-  selective_map(laws_.space(), batch, s.H, s.dH);
-  if (volume_stiffness_) set_growth(lanes, s);
-  double* const rate = tangent || volume_stiffness_ ? s.other : nullptr;
-  const bool one_law = this->one_law(s);
-  if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
-  if (ends == 2 && history_) {
-    for (int l = 0; l < lanes; ++l) {
-      if (s.first_number >= 0) s.number[l] = s.first_number + l;
-      s.number[lanes + l] = s.number[l] < 0 ? -1 : s.number[l] + s.far_number;
-    }
-    s.first_number = -1;
-  }
-  int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, rate);
-  if (bad >= 0) return bad % lanes;
-  if (laminates_ && s.one_law < 0) {
-    // What is mapped for either end is a laminate of its own: their owners' volumes differ.
-    LaminateLanes laminates;
-    find_laminates(n, s, true, laminates);
-    repeat_for_ends(lanes, s, ends, laminates);
-    if (laminates.n > 0) bad = evaluate_laminates(s, s.P, rate, laminates);
-    if (bad >= 0) return bad % lanes;
-  }
-  if (!one_law) {
-    // Only points that store nothing pass laws with a volume turned over: families at the rim of images are poor, and nobody asks for them.
-    const auto tidy = [](double* x, int lanes_of) {
-      for (int l = 0; l < lanes_of; l += pack_width) {
-        const Pack value = Pack::load(x + l);
-        select(value == value, value, Pack(0.0)).store(x + l);
-      }
-    };
-    tidy(s.growth, ends * lanes);
-    tidy(s.inverse, lanes);
-  }
-  if (volume_stiffness_) put_volume_stiffness(n, s);
-  add_energies(n, s.weight, s, 0, energy);
-  if (ends == 2) add_energies(n, s.far_weight, s, lanes, energy);
-  if (work_ == Work::sample && !pulled_back_) return -1;
-  selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
   return -1;
 }
 

@@ -59,6 +59,13 @@ struct BatchScratch {
   alignas(64) double pressure_rate[batch_points];
   alignas(64) double inverse[batch_points];
   alignas(64) double growth[batch_points];
+  // Of laws that are evaluated once for both ends: the weights of both together, and of those that are decoupled volume changes by end and what the
+  // laws make of them.
+  alignas(64) double bond_weight[batch_points];
+  alignas(64) double volume_change[batch_points];
+  alignas(64) double volumetric_psi[batch_points];
+  alignas(64) double kirchhoff[batch_points];
+  alignas(64) double kirchhoff_slope[batch_points];
   alignas(64) double weight[batch_points];       ///< of the owner's material [m^3]
   alignas(64) double far_weight[batch_points];   ///< of the far end's material, where both ends are evaluated at once
   alignas(64) double own_weight[batch_points];   ///< as `weight` came in, where samples are taken along
@@ -182,13 +189,29 @@ class BatchWork {
   void repeat_for_ends(int lanes, const BatchScratch& s, int ends, LaminateLanes& of) const noexcept;
   int evaluate_laminates(BatchScratch& s, double* P, double* dP, const LaminateLanes& lanes) const noexcept;
   bool one_law(const BatchScratch& s) const noexcept { return laws_.single() || s.one_law >= 0; }
-  bool confined() const noexcept { return !selective_ && (laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain); }
+  /// The gradients that the space gives have no lateral strain. Mapped ones have.
+  bool confined() const noexcept { return laws_.space() == Space::plane_strain || laws_.space() == Space::line_strain; }
   int evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy, const LaminateLanes* laminates) const noexcept;
   void add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept;
   void add_samples(int n, const BatchScratch& s, const double* weight, const SampleSums& sums, bool both_ends) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
   void leave_out_far(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept;
+  int mapped_pass(int n, BatchScratch& s, int ends) const noexcept;
+  int once_pass(int n, BatchScratch& s, int ends, std::size_t law, const double* counted) const noexcept;
+  int decoupled_pass(int n, BatchScratch& s, int ends, std::size_t law, const double* counted) const noexcept;
+  int green_linear_pass(int n, BatchScratch& s, int ends, std::size_t law, const double* counted) const noexcept;
+  int mixed_pass(int n, BatchScratch& s, int ends) const noexcept;
+  /// Which laws n bonds are evaluated by: one, or several.
+  struct BondLaws {
+    static constexpr std::int32_t each_end = -1, no_end = -2;
+    std::int32_t of[batch_points];   ///< a law that is evaluated once; or each end by itself, or neither, as both store nothing
+    bool one = true;             ///< both ends of all have the same one, which is evaluated once
+    bool any_each_end = false;   ///< some are evaluated for each end by itself
+    bool any_once = false;       ///< some once for both ends
+  };
+  void find_laws(int n, const BatchScratch& s, int ends, BondLaws& laws) const noexcept;
+  LawBatch own_gradients(int n, BatchScratch& s) const noexcept;
   void set_growth(int n, BatchScratch& s) const noexcept;
   void put_volume_stiffness(int n, BatchScratch& s) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;

@@ -13,7 +13,21 @@ Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std
   for (const MaterialRecord& record : records_) {
     state_ = std::max(state_, record.material->state_components(space));
     dissipates_ |= record.traits.dissipates;
+    growth_.push_back(growth_of(record, space));
   }
+}
+
+Laws::GrowthOfLaw Laws::growth_of(const MaterialRecord& record, Space space) {
+  if (!record.uniform || record.material->state_components(space) > 0) return {};
+  if (record.traits.green_linear) return {.known = Growth::green_linear, .kappa = record.material->small_strain(record.constants.data()).bulk()};
+  MaterialRecord isochoric = record;
+  if (!record.material->isochoric_constants(record.constants.data(), isochoric.constants.data())) return {};
+  return {.known = Growth::decoupled, .isochoric = std::move(isochoric)};
+}
+
+void Laws::evaluate_volumetric(std::size_t id, VolumeBatch batch) const noexcept {
+  batch.constants = records_[id].constants.data();
+  records_[id].material->volumetric(batch);
 }
 
 bool Laws::constant_tangent() const noexcept {

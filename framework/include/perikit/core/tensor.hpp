@@ -120,9 +120,8 @@ T trace(const Tensor<T, S>& a) noexcept {
 
 /// a + s I.
 template <class T, class S, class U>
-Tensor<T, S> add_diagonal(Tensor<T, S> a, const U& s) noexcept {
-  PERIKIT_UNROLL for (int i = 0; i < 3; ++i) a(i, i) = a(i, i) + s;
-  return a;
+Tensor<T, S> add_diagonal(const Tensor<T, S>& a, const U& s) noexcept {
+  return Tensor<T, S>::map([&](int k) { return row<S>(k) == column<S>(k) ? T(a[k] + s) : a[k]; });
 }
 
 /// a - tr(a)/3 I.

@@ -15,6 +15,7 @@ struct MaterialTraits {
   bool objective = true;      ///< false for small-strain laws
   bool isotropic = true;
   bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
+  bool green_linear = false;  ///< S is linear in the Green strain E, 3 kappa I of E = I (kappa of Moduli::bulk): P(a F) = a^3 P(F) + 3 kappa a (a^2 - 1)/2 F
   bool dissipates = false;    ///< psi is the energy that is stored; of laws with history, which say what their steps dissipate
 };
 
@@ -55,6 +56,17 @@ struct MaterialBatch {
   }
 };
 
+/// n changes of volume, for a law psi = psi_iso(J^(-1/3) F) + U(J) with the same constants everywhere. Arrays are 64-byte aligned and have
+/// padded(n) entries, all of which may be read and written. A null output is not wanted.
+struct VolumeBatch {
+  int n = 0;
+  const double* j = nullptr;          ///< J - 1 > -1 [-]
+  const double* constants = nullptr;
+  double* psi = nullptr;              ///< U [J/m^3]
+  double* kirchhoff = nullptr;        ///< tau = J U' [Pa]
+  double* slope = nullptr;            ///< J dtau/dJ [Pa]
+};
+
 /// ok, or the first point of the batch whose F is inadmissible (det F <= 0 or not finite).
 struct Status {
   int inadmissible = -1;
@@ -79,6 +91,13 @@ class Material {
   virtual int state_components(Space) const noexcept { return 0; }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;
+
+  /// Whether psi = psi_iso(J^(-1/3) F) + U(J): then writes the constants with which `evaluate` gives psi_iso, its stress and its tangent alone, in
+  /// spaces without free stretches. The selective map evaluates such a law once where it evaluates others for each end of a bond.
+  virtual bool isochoric_constants([[maybe_unused]] const double* constants, [[maybe_unused]] double* isochoric) const noexcept { return false; }
+  /// Overwrites every wanted output with those of U, of laws with isochoric constants; of the law's own constants. U(1) and tau are exactly zero
+  /// at rest.
+  virtual void volumetric([[maybe_unused]] const VolumeBatch& batch) const noexcept {}
 };
 
 }  // namespace perikit

@@ -84,7 +84,8 @@ class Laws {
   /// Some points are `far`, and whether this one is.
   bool any_far() const noexcept { return records_.back().far; }
   bool far(std::size_t p) const noexcept { return ids_[p] + std::size_t{1} == records_.size(); }
-  const MaterialRecord& record_of(std::size_t p) const noexcept { return records_[ids_.empty() ? 0 : ids_[p]]; }
+  std::size_t id_of(std::size_t p) const noexcept { return ids_.empty() ? 0 : ids_[p]; }
+  const MaterialRecord& record_of(std::size_t p) const noexcept { return records_[id_of(p)]; }
   const std::vector<MaterialRecord>& records() const noexcept { return records_; }
   Moduli moduli(std::size_t p) const;
   double density(std::size_t p) const noexcept;
@@ -96,14 +97,37 @@ class Laws {
   Status evaluate_law(std::size_t id, const LawBatch& batch, LawScratch& scratch) const noexcept {
     return evaluate_one(records_[id], batch, scratch);
   }
+  /// What a law with the same constants everywhere and without history knows of F that grows alike in all directions.
+  enum class Growth {
+    unknown,
+    decoupled,     ///< Material::isochoric_constants
+    green_linear,  ///< MaterialTraits::green_linear
+  };
+  Growth growth(std::size_t id) const noexcept { return growth_[id].known; }
+  /// Of a law that is green_linear [Pa].
+  double bulk_modulus(std::size_t id) const noexcept { return growth_[id].kappa; }
+  /// The isochoric part of a decoupled law on all lanes.
+  Status evaluate_isochoric(std::size_t id, const LawBatch& batch, LawScratch& scratch) const noexcept {
+    return evaluate_one(growth_[id].isochoric, batch, scratch);
+  }
+  /// Its volumetric part; constants are filled in.
+  void evaluate_volumetric(std::size_t id, VolumeBatch batch) const noexcept;
 
  private:
   /// One law on all lanes, whose results at points that store nothing are made zero.
   Status evaluate_among_silent(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
   Status evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
 
+  struct GrowthOfLaw {
+    Growth known = Growth::unknown;
+    double kappa = 0;
+    MaterialRecord isochoric;
+  };
+  static GrowthOfLaw growth_of(const MaterialRecord& record, Space space);
+
   Space space_;
   std::vector<MaterialRecord> records_;
+  std::vector<GrowthOfLaw> growth_;
   std::span<const std::uint16_t> ids_;
   std::size_t stride_;
   bool single_;

@@ -20,7 +20,11 @@
 ///
 /// Faster, where a root or a division stands at the beginning of all of them: invariants(H), which psi, P and tangent then take as a third
 /// argument (perikit/sdk/differentiation.hpp; rubber_invariants.hpp has those of rubber). In plane and uniaxial stress: the free stretch, its equation,
-/// the tangent that it leaves, or constants with which zero lateral strain has the same stress (perikit/sdk/free_stretch.hpp).
+/// the tangent that it leaves, or constants with which zero lateral strain has the same stress (perikit/sdk/free_stretch.hpp). Under the selective
+/// map, of laws psi = psi_iso(J^(-1/3) F) + U(J): the constants of psi_iso alone, and U,
+///
+///     template <class K> std::array<K, n> isochoric(const std::array<K, n>& k) const noexcept;
+///     template <class T, class K> VolumeResponse<T> volume(const T& j, const K& k) const noexcept;    // j = J - 1; perikit/sdk/volumetric.hpp
 
 #include <algorithm>
 #include <array>
@@ -33,6 +37,7 @@
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/history.hpp"
+#include "perikit/sdk/volumetric.hpp"
 
 // Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
 // checks in the inlined bodies would take minutes to compile.
@@ -43,6 +48,13 @@
 #endif
 
 namespace perikit {
+
+/// psi = psi_iso(J^(-1/3) F) + U(J), and the law tells both.
+template <class Law>
+concept HasVolume = requires(const Law& law, const std::array<double, Law::traits.constants>& k) {
+  { law.isochoric(k) } -> std::same_as<std::array<double, Law::traits.constants>>;
+  { law.volume(0.0, k) } -> std::same_as<VolumeResponse<double>>;
+};
 
 template <class Law>
 class LawMaterial final : public Material {
@@ -69,6 +81,28 @@ class LawMaterial final : public Material {
     if (offset_at_rest_.load(std::memory_order_relaxed)) [[unlikely]]
       take_off_rest(space, batch);
     return status;
+  }
+
+  bool isochoric_constants([[maybe_unused]] const double* constants, [[maybe_unused]] double* isochoric) const noexcept override {
+    if constexpr (HasVolume<Law>) {
+      std::array<double, Law::traits.constants> k;
+      std::copy_n(constants, k.size(), k.begin());
+      k = law_.isochoric(k);
+      std::copy_n(k.begin(), k.size(), isochoric);
+    }
+    return HasVolume<Law>;
+  }
+  void volumetric([[maybe_unused]] const VolumeBatch& batch) const noexcept override {
+    if constexpr (HasVolume<Law>) {
+      Constants k;
+      for (std::size_t i = 0; i < k.size(); ++i) k[i] = batch.constants[i];
+      for (int p = 0; p < batch.n; p += pack_width) {
+        const auto part = law_.volume(Pack::load(batch.j + p), k);
+        if (batch.psi) part.energy.store(batch.psi + p);
+        if (batch.kirchhoff) part.kirchhoff.store(batch.kirchhoff + p);
+        if (batch.slope) part.slope.store(batch.slope + p);
+      }
+    }
   }
 
  private:

@@ -28,4 +28,15 @@ T volumetric_kirchhoff_slope(Volumetric form, const K& kappa, const T& j) noexce
   return form == Volumetric::quadratic ? T(kappa * ((1.0 + j) * (1.0 + 2.0 * j))) : T(kappa);
 }
 
+/// U(J), tau = J U' and J dtau/dJ.
+template <class T>
+struct VolumeResponse {
+  T energy, kirchhoff, slope;
+};
+
+template <class T, class K>
+VolumeResponse<T> volume_response(Volumetric form, const K& kappa, const T& j) noexcept {
+  return {volumetric_energy(form, kappa, j), volumetric_kirchhoff(form, kappa, j), volumetric_kirchhoff_slope(form, kappa, j)};
+}
+
 }  // namespace perikit
