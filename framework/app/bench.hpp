@@ -12,6 +12,7 @@ struct BenchOptions {
   std::vector<int> dimensions = {3};
   std::vector<std::string> lateral = {"strain"};                ///< of planes and lines: "strain", "stress", what is zero across them
   std::vector<int> cells = {32};                                ///< points along each side, or along x, y and z
+  int threads = 1;
   bool threads_model = false;                                   ///< what measured blocks would take on more threads, instead of the table
   bool assembly = false;                                        ///< time the assembly of the tangent too: it may need much memory
   std::string json;                                             ///< file that the figures are written to as well

@@ -89,7 +89,7 @@ void add_commands(CLI::App& app, Options& options) {
       ->excludes("--assembly")
       ->excludes("--json")
       ->excludes("--operations");
-  bench_command->add_option("--threads", options.threads, "Threads; default: 1")->default_val(1)->check(CLI::Range(1, 1024));
+  bench_command->add_option("--threads", options.bench.threads, "Threads")->capture_default_str()->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
   new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();

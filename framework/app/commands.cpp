@@ -37,7 +37,9 @@ Scene read(const Options& options, Registry& registry) {
     set_thread_count(options.threads);
   else if (communicator().size() > 1)
     set_thread_count(cores_of_rank());
-  return read_scene(options.scene, registry, {options.overrides, options.trust});
+  Scene scene = read_scene(options.scene, registry, {options.overrides, options.trust});
+  if (options.threads > 0) scene.threads = options.threads;
+  return scene;
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -199,7 +201,7 @@ void plot(const Options& options) {
 
 void bench(const Options& options) {
   const auto registry = open_registry(options);
-  if (options.threads > 0) set_thread_count(options.threads);
+  set_thread_count(options.bench.threads);
   bench(*registry, options.bench);
 }
 

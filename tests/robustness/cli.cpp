@@ -179,6 +179,15 @@ TEST_CASE("cli: --set, --explain, --quiet and --threads") {
   CHECK(desk.perikit("run scene.toml --quiet --threads 1 -o one").status == 0);
   CHECK(desk.perikit("run scene.toml --quiet --threads 2 -o two").status == 0);
   CHECK(desk.text("one/history.csv") == desk.text("two/history.csv"));
+  // All cores, which OpenMP's variable limits, unless the scene says how many, or the command line, which has the last word.
+  const auto threads = [&](const std::string& more, const std::string& count) {
+    const Result run = desk.perikit("run scene.toml -o threads " + more, "OMP_NUM_THREADS=3");
+    CHECK_MESSAGE(contains(run.out, " a point and step, " + count + ")"), more, ": no '", count, "' in\n", run.out);
+  };
+  threads("", "3 threads");
+  threads("--set run.threads=2", "2 threads");
+  threads("--threads 1", "1 thread");
+  threads("--threads 4 --set run.threads=2", "4 threads");
 }
 
 TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and warnings, here and in run.log") {

@@ -6,6 +6,7 @@
 
 #include "core/numbered_rows.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/parallel.hpp"
 #include "perikit/run/simulation.hpp"
 
 namespace perikit {
@@ -40,8 +41,8 @@ std::string RunRecorder::closing(double set_up, double plan) const {
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
   if (steps > 0) {
-    text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step)\n", steps, points,
-                        steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9);
+    text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step, {} thread{})\n", steps, points,
+                        steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9, thread_count(), thread_count() > 1 ? "s" : "");
   }
   if (problem.ghosts())
     text += fmt::format("exchange      {:.2f} s spent in waiting for other ranks, by the one that waited longest\n",
