@@ -113,10 +113,15 @@ void LocalStencil<D>::multiply(int begin, int end) noexcept {
     for (int p = 0; p < packs;) {
       const auto first = static_cast<std::size_t>(p * pack_width);
       double* out = moments_.data() + first * lanes_ + static_cast<std::size_t>(q);
+      const double* columns = columns_.data() + first;
       const int left = packs - p, take = left == 3 ? 3 : std::min(left, 2);
-      (take == 3   ? multiply_tile<3>
-       : take == 2 ? multiply_tile<2>
-                   : multiply_tile<1>)(weight, row_, bonds_, columns_.data() + first, width_, out, lanes_);
+      // Calls, not a choice among function pointers: g++ 12 compiles a conditional over three of them wrongly for many Intel processors
+      // (-mtune=skylake and its like), so that the second function runs where the third is meant.
+      switch (take) {
+        case 3: multiply_tile<3>(weight, row_, bonds_, columns, width_, out, lanes_); break;
+        case 2: multiply_tile<2>(weight, row_, bonds_, columns, width_, out, lanes_); break;
+        default: multiply_tile<1>(weight, row_, bonds_, columns, width_, out, lanes_);
+      }
       p += take;
     }
   }
