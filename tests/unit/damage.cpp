@@ -161,3 +161,26 @@ TEST_CASE("[[interface]]: the criterion of [damage] with other numbers") {
   refused("{ type = \"critical_energy\", energy_release_rate = 0.5, limit = \"equal\" }",
           "interface.0.damage.limit: found another value than in [damage]");
 }
+
+TEST_CASE("[damage] second_law: its default follows from the kinematics and its stabilization, and the resolved scene shows it") {
+  const auto resolved = [](const std::string& kinematics, const std::string& key = {}) {
+    return parse_scene("format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 1]\n"
+                       "[family]\nhorizon_ratio = 3\n[kinematics]\n" + kinematics + "\n"
+                       "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.3\n"
+                       "[damage]\ntype = \"max_stress\"\nstrength = 1.0\n" + key + "[integrator]\ntype = \"newton\"\n",
+                       "scene.toml", parts())
+        .resolved;
+  };
+  const auto says = [](const std::string& text, const char* value) { return text.find(std::string("\nsecond_law = ") + value + "\n") != std::string::npos; };
+  for (const char* const kinematics : {"type = \"conventional\"", "type = \"bond_augmented\"", "type = \"sub_horizon\"", "type = \"selective\"\nbase = { type = \"non_spherical\" }"}) {
+    INFO(kinematics);
+    CHECK(says(resolved(kinematics), "true"));
+    CHECK(says(resolved(kinematics, "second_law = false\n"), "false"));
+  }
+  for (const char* const kinematics : {"type = \"conventional\"\nstabilization = \"silling\"", "type = \"conventional\"\nstabilization = \"wan\"", "type = \"baqp\"",
+                                       "type = \"bond_based\"", "type = \"non_spherical\""}) {
+    INFO(kinematics);
+    CHECK(says(resolved(kinematics), "false"));
+    CHECK(says(resolved(kinematics, "second_law = true\n"), "true"));
+  }
+}

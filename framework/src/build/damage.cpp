@@ -13,7 +13,6 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/problem/ghosts.hpp"
-#include "terms/failure_energy.hpp"
 
 namespace perikit {
 
@@ -133,9 +132,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   damage->law = factory.damage(*scene.damage);
   const bool gradually = gradual(scene, *damage->law, quasi_static);
   const ParameterValues& values = scene.damage->values;
-  damage->second_law = values.has("second_law") ? values.boolean("second_law")
-                                                : creates_energy(parts.formulation, parts.stabilization != nullptr,
-                                                                 parts.families->body().dimension()) != nullptr;
+  damage->second_law = values.boolean("second_law");   // the scene reader knows the default
   refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr);
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cctype>
 
+#include "perikit/model/formulation.hpp"
 #include "scene/expression_names.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml_text.hpp"
+#include "terms/failure_energy.hpp"
 
 namespace perikit {
 
@@ -238,8 +240,9 @@ void SceneReader::read_parts(const toml::table& root) {
         reader_.errors.add(reader_.position(root), parameter.name, "found nothing; allowed: " + allowed(parameter));
       continue;
     }
-    const auto part = reader_.part(parameter.kind, *node, parameter.name);
+    auto part = reader_.part(parameter.kind, *node, parameter.name);
     if (!part) continue;
+    if (parameter.kind == Kind::damage) part = with_second_law(part);
     writer_.part(*part);
     switch (parameter.kind) {
       case Kind::kinematics:
@@ -258,6 +261,22 @@ void SceneReader::read_parts(const toml::table& root) {
         scene_.integrator = part;
     }
   }
+}
+
+/// The criterion with damage.second_law, whose default follows from the kinematics and its stabilization. A catalogue that describes parts and
+/// cannot make them leaves it open.
+std::shared_ptr<const PartValues> SceneReader::with_second_law(std::shared_ptr<const PartValues> criterion) {
+  const auto* const factory = dynamic_cast<const PartFactory*>(&parts_);
+  if (criterion->values.has("second_law") || !factory || !scene_.kinematics || reader_.dimension == 0 || !reader_.errors.empty()) return criterion;
+  auto complete = std::make_shared<PartValues>(*criterion);
+  try {
+    const Formulation formulation = make_formulation(factory->kinematics(*scene_.kinematics));
+    const bool on = creates_energy(formulation, scene_.stabilization != nullptr, reader_.dimension) != nullptr;
+    complete->values.set("second_law", on, criterion->values.position("type"), false);
+  } catch (const InputError& error) {
+    reader_.errors.add(scene_.kinematics->values.position("type"), error);
+  }
+  return complete;
 }
 
 const toml::table* SceneReader::section(const toml::table& parent, const std::string& key, const std::string& path,

@@ -29,6 +29,7 @@ class SceneReader {
   void read_sets(const toml::table& root);
   void read_family(const toml::table& root);
   void read_parts(const toml::table& root);
+  std::shared_ptr<const PartValues> with_second_law(std::shared_ptr<const PartValues> criterion);
   void read_regions(const toml::table& root);
   void read_interfaces(const toml::table& root);
   void read_cracks(const toml::table& root);
