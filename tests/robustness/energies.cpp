@@ -61,6 +61,29 @@ TEST_CASE("energies: a run that loses its energy ends with status 1 and the ener
   CHECK(contains(desk.text("out/run.log"), "the energies do not add up any more"));
 }
 
+TEST_CASE("energies: loads and motions that grow from zero have done no work after their first step, and run") {
+  const std::string moved = "[[boundary]]\nset = \"right\"\nvelocity = [0.1, \"free\"]\n";
+  for (const std::string growth : {"t", "t^2", "sin(3*t)", "1 - exp(-t)", "(t > 0.5 ? 1 : 0)"})
+    for (const std::string acts :
+         {"[[load]]\nset = \"right\"\nforce = [\"0.01*GROWTH\", 0]\n", "[[load]]\nset = \"all\"\nface = \"+x\"\npressure = \"0.01*GROWTH\"\nfollower = true\n",
+          "[[boundary]]\nset = \"right\"\ndisplacement = [\"0.01*GROWTH\", \"free\"]\n"})
+      for (const std::string rows : {"", " --set output.history_every=2"}) {
+        const std::string with = replaced(acts, "GROWTH", growth);
+        INFO(with, rows);
+        const Desk desk(replaced(replaced(plate, moved, with), "end_time = 1.0", "end_time = 2.0"));
+        const Result run = desk.perikit("run scene.toml --quiet -o out --threads 1" + rows);
+        CHECK_MESSAGE(run.status == 0, run.err);
+        // A step that is too long is found all the same, and soon: energies double from step to step.
+        if (growth != "t" || !rows.empty()) continue;
+        const Result unstable = desk.perikit("run scene.toml --quiet -o out --threads 1 --set integrator.allow_unstable=true --set "
+                                             "integrator.end_time=2000.0" + step(1.5 * stable_step(desk)));
+        CHECK_MESSAGE(unstable.status == 1, unstable.err);
+        const std::string before = "the run failed: step ";
+        REQUIRE_MESSAGE(contains(unstable.err, before), unstable.err);
+        CHECK_MESSAGE(std::stod(unstable.err.substr(unstable.err.find(before) + before.size())) <= 60, unstable.err);
+      }
+}
+
 TEST_CASE("energies: what a long but stable step does to the fastest motions is a warning, also after a stop") {
   const Desk desk(replaced(replaced(plate, "velocity = [0.1, \"free\"]", "velocity = [0, \"free\"]"), "[integrator]", rattling));
   const std::string warning = "warning: the energies were off by up to ";

@@ -258,6 +258,28 @@ TEST_CASE("laminates of one material are this material, and series springs in on
   CHECK(made->stress(0) == doctest::Approx(1e-3 / (0.25 / 10 + 0.75)).epsilon(1e-13));
 }
 
+TEST_CASE("laminates of strains of any size: down to those that have no digits, and up to squares beyond all numbers") {
+  for (const Space space : {Space::line_stress, Space::plane_stress, Space::plane_strain, Space::solid}) {
+    std::vector<MaterialRecord> records{record<LinearElastic>(1e6, 0.25), record<LinearElastic>(1e9, 0.3)};
+    const Laws laws(space, std::move(records), ids, 8);
+    const auto made = std::make_unique<Case>(laws, laminate(dimension(space), 0.37, {1, 0, 0}));
+    std::vector<double> unit(static_cast<std::size_t>(tensor_components(space)));
+    unit[0] = 1;
+    made->set(unit);
+    REQUIRE(made->evaluate() < 0);
+    const double stress = made->stress(0);
+    for (const double size : {0.0, 5e-324, 3e-320, 1e-310, 1e-300, 1e-290, 1e-160, 1e-150, 1e-20, 1e100}) {
+      INFO("strain ", size);
+      std::vector<double> H = unit;
+      H[0] = size;
+      made->set(H);
+      REQUIRE(made->evaluate() < 0);
+      const double few = 1e-13 * stress * size + 1e-300;   // of strains without digits stresses have none
+      CHECK(std::abs(made->stress(0) - stress * size) <= few);
+    }
+  }
+}
+
 TEST_CASE("laminates: at rest nothing is stored, bitwise; what is turned over is refused; others are left alone") {
   std::vector<MaterialRecord> records{record<NeoHookean>(10.0, 0.2), record<NeoHookean>(1.0, 0.3)};
   const Laws laws(Space::plane_strain, std::move(records), ids, 8);

@@ -140,6 +140,36 @@ TEST_CASE("a part that only bonds longer than the springs join to the rest, and 
   }
 }
 
+TEST_CASE("images behind held faces, planes of symmetry and periodic sides: in every space, as newton") {
+  registry();
+  const std::string spaces[] = {"dimension = 1\nline = \"strain\"", "dimension = 1\nline = \"stress\"", "dimension = 2\nplane = \"strain\"", "dimension = 2\nplane = \"stress\"",
+                                "dimension = 3"};
+  for (const std::string& space : spaces) {
+    const int d = space[12] - '0';
+    const auto vector = [&](const std::string& x, const std::string& rest) { return "[" + x + (d > 1 ? ", " + rest : "") + (d > 2 ? ", " + rest : "") + "]"; };
+    const std::string sides[] = {
+        fmt::format("[[boundary]]\nface = \"-x\"\ndisplacement = {}\n[[boundary]]\nface = \"+x\"\ndisplacement = {}\n", vector("0", "0"), vector("0.02", "\"free\"")),
+        fmt::format("[[symmetry]]\naxis = \"x\"\nat = 0\n[[boundary]]\nset = \"end\"\ndisplacement = {}\n", vector("0.02", "0.01")),
+        d == 1 ? "" : fmt::format("[[periodic]]\naxis = \"y\"\n[[boundary]]\nface = \"-x\"\ndisplacement = {}\n[[load]]\nset = \"end\"\nforce = {}\n", vector("0", "0"), vector("1e3", "0"))};
+    for (const std::string& side : sides) {
+      if (side.empty()) continue;
+      INFO(space, " ", side);
+      std::vector<std::unique_ptr<Simulation>> found;
+      for (const std::string integrator : {"newton", "jfnk", "kinsol"}) {
+        found.push_back(contract::build(fmt::format(
+            "format = 1\n[body]\n{}\n[body.lattice]\nspacing = 0.1\nlower = {}\nupper = {}\n[sets]\nend = \"x > 0.8\"\n[family]\nhorizon_ratio = 2.015\n"
+            "[kinematics]\ntype = \"baqp\"\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1e6\npoisson_ratio = 0.3\n{}"
+            "[integrator]\ntype = \"{}\"\nsteps = 1\n{}",
+            space, vector("0", "0"), vector("1", "0.6"), side, integrator, integrator == "newton" ? "" : "preconditioner = \"companion\"\n")));
+        const Protocol protocol = run(*found.back());
+        CHECK(protocol.reports.back().residual <= 1e-8);
+        CHECK(distance(*found.front(), *found.back()) < 1e-7);
+      }
+      CHECK(mean(*found.front(), "end", 0) > 1e-3);
+    }
+  }
+}
+
 TEST_CASE("nearly incompressible: more iterations, still an answer") {
   const Protocol easy = run(*block("type = \"baqp\"", 9, companion, 0.25)),
                  hard = run(*block("type = \"baqp\"", 9, companion, 0.49));

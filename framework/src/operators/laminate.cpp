@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace perikit {
 
@@ -38,6 +39,8 @@ void solve(int d, const double* L, double* x) noexcept {
 constexpr double least_share = 1e-3;
 constexpr int most_iterations = 100;
 constexpr double smallest_step = 1e-12;
+/// Strains below are as good as none: the front of rounding that runs ahead of a wave has strains without digits, where no iteration ends.
+constexpr double smallest_strain = std::numeric_limits<double>::min() / std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
@@ -156,7 +159,7 @@ bool LaminateScratch::look(const LaminatePoint& laminate, int k, int iteration) 
   double delta[3] = {};
   for (int i = 0; i < d; ++i) delta[i] = -gradient[i];
   solve(d, search.factor, delta);
-  double size = 0, scale = 0, norm[2] = {};
+  double size = 0, scale = smallest_strain, norm[2] = {};
   for (int s = 0; s < 2; ++s) {
     for (int e = 0; e < d; ++e) norm[s] = std::max(norm[s], std::abs(laminate.direction[s][e]));
     for (int c = 0; c < d * d; ++c) scale = std::max(scale, std::abs(side_[s].H[c * batch_points + k]));

@@ -17,6 +17,7 @@ struct SpringModuli {
   double stretch, slide;
 };
 SpringModuli spring_moduli(Space space, const Moduli& moduli) {
+  if (moduli.mu == 0) return {0, 0};   // images behind faces store nothing: the springs to them are those of the points in front
   const double mu = moduli.mu, plane = 2 * moduli.lambda * mu / (moduli.lambda + 2 * mu);
   const double lambda = space == Space::plane_stress ? plane : moduli.lambda, d = dimension(space);
   if (space == Space::line_strain) return {lambda + 2 * mu, 0};

@@ -55,7 +55,7 @@ std::string RunRecorder::closing(double set_up, double plan) const {
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J{}, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, by_laws, e.external_work);
   if (EnergyBalance last{.initial = done_.energies.initial}; problem.state().step > 0) {
-    last.add(e);
+    last.add(e, simulation_.dynamic() ? energy_of_load_kick(problem, time_step_) : 0.0);
     text += fmt::format("; balance off by {:.2g} of the largest", last.share());
   }
   std::vector<std::string> warnings = warnings_;

@@ -244,6 +244,7 @@ std::vector<std::string> RunRecorder::fields_due(bool row, bool frame) const {
 
 void RunRecorder::step_done(const StepReport& report) {
   if (report.step <= resumed_step_) return;   // an integrator without steps reports its one state again
+  time_step_ = report.time_step;
   done_.end_time = report.end_time;
   done_.steps_expected = report.steps_expected;
   if (done_.frame_spacing == 0) done_.frame_spacing = report.end_time / static_cast<double>(simulation_.scene().output.frames.value_or(default_frames));

@@ -74,11 +74,15 @@ struct EnergyBalance {
   double largest = 0;  ///< the largest of all the energies that were seen [J]
   double off = 0;      ///< the largest imbalance that was seen [J]
 
-  /// The imbalance of `energies` [J], which becomes part of the record.
-  double add(const Energies& energies) noexcept;
+  /// The imbalance of `energies` [J], which becomes part of the record. kick: what the loads of this moment leave of it in explicit runs,
+  /// energy_of_load_kick; it is taken off.
+  double add(const Energies& energies, double kick) noexcept;
   /// off over largest; 0 where there was no energy.
   double share() const noexcept { return largest > 0 ? off / largest : 0.0; }
 };
+
+/// Of an explicit run: the kinetic energy that half a step of the present loads alone gives to a body at rest [J].
+double energy_of_load_kick(BodyProblem& problem, double time_step);
 
 /// Where the output of a run stands: what a checkpoint holds besides the state.
 struct OutputProgress {
@@ -186,6 +190,7 @@ class RunRecorder final : public Observer {
   double output_seconds_ = 0;
   std::int64_t first_step_ = 0, frames_written_ = 0, rows_written_ = 0, checkpoints_written_ = 0;
   double first_time_ = 0;
+  double time_step_ = 0;   ///< of the last step that was reported
   std::vector<std::string> warnings_;
   std::set<std::string> strange_fields_;   ///< that were not finite somewhere
   bool shares_frames_ = false;             ///< ranks write frames together
