@@ -6,10 +6,15 @@ function(perikit_compile_options target)
                          -Wno-missing-field-initializers $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized -Wno-uninitialized -Wno-stringop-overflow>)
   if(PERIKIT_NATIVE)
     target_compile_options(${target} PRIVATE -march=native)
+    target_compile_definitions(${target} PRIVATE PERIKIT_NATIVE)
   else()
     target_compile_options(${target} PRIVATE -march=${PERIKIT_LEVEL})
   endif()
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    # A level is tuned for no processor: so it is tested. The loader of a machine that has not this level refuses what is linked here.
+    if(NOT PERIKIT_NATIVE)
+      target_link_options(${target} PRIVATE -Wl,-z,${PERIKIT_LEVEL})
+    endif()
     target_compile_options(${target} PRIVATE -mprefer-vector-width=512)
     # Tensors are copied in whole registers. The default for levels of the architecture is half of one: what was written in one piece and is read
     # in two, or the other way about, makes the reader wait.

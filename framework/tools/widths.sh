@@ -9,12 +9,12 @@ table=$(realpath -m "${1:?widths.sh TABLE [ROUNDS [OPTION...]]}")
 rounds=${2:-3}
 options=("${@:3}")
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-read -ra levels <<< "${LEVELS:-native x86-64-v3 x86-64-v2}"
+read -ra levels <<< "${LEVELS:-x86-64-v4 x86-64-v3 x86-64-v2}"
 export OMP_WAIT_POLICY=passive
 
 for level in "${levels[@]}"; do
   tree=build/widths/$level
-  if [[ $level == native ]]; then processor=(-DPERIKIT_NATIVE=ON); else processor=(-DPERIKIT_NATIVE=OFF -DPERIKIT_LEVEL="$level"); fi
+  if [[ $level == native ]]; then processor=(-DPERIKIT_NATIVE=ON); else processor=(-DPERIKIT_LEVEL="$level"); fi
   # shellcheck disable=SC2086
   cmake -S . -B "$tree" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPERIKIT_TESTS=OFF "${processor[@]}" ${CMAKE_ARGUMENTS:-} > /dev/null
   cmake --build "$tree" --target perikit-program parts

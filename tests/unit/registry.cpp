@@ -127,6 +127,33 @@ TEST_CASE("ABI, build and symbols are compared before any object crosses") {
                             PERIKIT_BUILD_ID));
 }
 
+TEST_CASE("a library for another level of the processor is refused with both levels and the remedy") {
+  const std::string own = fmt::format(", this program for level {}: cmake -D perikit_DIR=/", PERIKIT_LEVEL);
+#if defined(__x86_64__)
+  const std::string level = PERIKIT_LEVEL;
+  check_refused(built("other_level"), fmt::format("built for level {}x86-64{}", level.starts_with("native-") ? "native-" : "", own));
+#endif
+  // A manifest says so without the library being opened: this one would end the program.
+  const Folder folder;
+  const fs::path library = folder.copy("crashing_constructor", "other.so");
+  write_manifest(library, {{Kind::influence, "other", ""}});
+  std::string text = bytes(manifest_path(library));
+  const std::string id = PERIKIT_LEVEL " " PERIKIT_SIMD_ID;
+  REQUIRE(text.find(id) != std::string::npos);
+  folder.write("other.parts", text.replace(text.find(id), id.size(), "x86-64-v9 simd1024"));
+  Registry registry;
+  registry.add_folder(folder.path);
+  CHECK(registry.names(Kind::influence).empty());
+  REQUIRE(registry.refused().size() == 1);
+  CHECK_MESSAGE(registry.refused()[0].reason.find("built for level x86-64-v9" + own) == 0, registry.refused()[0].reason);
+  // Where the compiler differs too, that is said instead.
+  folder.write("other.parts", text.replace(text.find("cxx11abi"), 8, "cxx17abi"));
+  Registry another;
+  another.add_folder(folder.path);
+  REQUIRE(another.refused().size() == 1);
+  CHECK(another.refused()[0].reason.find("built as '") == 0);
+}
+
 TEST_CASE("a failed registration leaves nothing behind") {
   check_refused(built("throwing_registration"), "licence server unreachable");
   check_refused(built("throwing_number"), "no std::exception");

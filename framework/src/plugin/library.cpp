@@ -1,5 +1,6 @@
 #include "plugin/library.hpp"
 
+#include <dlfcn.h>
 #include <elf.h>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -52,12 +53,24 @@ bool complete(std::ifstream& in, std::uint64_t size) {
   return std::ranges::all_of(program, [&](const Elf64_Phdr& p) { return inside(p.p_offset, p.p_filesz, size); });
 }
 
+/// How a library becomes one of this program's level.
+std::string remedy() {
+  static const char here = 0;
+  Dl_info own{};
+  const fs::path folder = ::dladdr(&here, &own) != 0 && own.dli_fname ? fs::path(own.dli_fname).parent_path() : fs::path();
+  return fmt::format("cmake -D perikit_DIR={} in its build folder, and build it again; or take the perikit of its level",
+                     (folder / "cmake" / "perikit").string());
+}
+
 dll::shared_library load(const fs::path& file) try {
   // Never unloaded: live objects, std::functions and kept exceptions hold the library's code.
   constexpr auto mode = static_cast<dll::load_mode::type>(RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   return dll::shared_library(file, mode);
 } catch (const dll::fs::system_error& error) {
-  throw Refusal(fmt::format("the loader refuses it: {}", error.what()));  // its text is dlerror's; its code means nothing
+  // Its text is dlerror's; its code means nothing.
+  const std::string text = error.what();
+  const bool level = text.find("CPU ISA level") != std::string::npos;
+  throw Refusal(fmt::format("the loader refuses it: {}{}", text, level ? fmt::format("; this program is for level {}: {}", PERIKIT_LEVEL, remedy()) : ""));
 }
 
 /// Exit status of a child that came to its own end; a library that calls exit() leaves another one.
@@ -109,6 +122,22 @@ class Report {
 };
 
 constexpr int crash_signals[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
+
+/// A build id in two: the level with its packs ("x86-64-v4"), and all other words.
+struct SplitBuildId {
+  std::string level, rest;
+};
+
+SplitBuildId split(const std::string& build_id) {
+  SplitBuildId id;
+  std::istringstream words(build_id);
+  for (std::string word; words >> word;) {
+    if (word.starts_with("x86-64") || word.starts_with("armv") || word.starts_with("native-")) id.level = word;
+    else if (word.starts_with("simd") && !id.level.empty()) continue;   // follows from the level
+    else id.rest += word + " ";
+  }
+  return id;
+}
 
 constexpr char refused = '!';   ///< begins the report of a library that is refused; others are a line "kind name" for each part
 
@@ -193,6 +222,9 @@ void check_abi(int version, const std::string& build_id) {
     throw Refusal(fmt::format("ABI version {}, this program has {}", version, PERIKIT_ABI_VERSION));
   }
   if (build_id == PERIKIT_BUILD_ID) return;
+  const SplitBuildId its = split(build_id), own = split(PERIKIT_BUILD_ID);
+  if (its.level != own.level && its.rest == own.rest)
+    throw Refusal(fmt::format("built for level {}, this program for level {}: {}", its.level, own.level, remedy()));
   const bool same_toolchain = build_id.starts_with(PERIKIT_TOOLCHAIN_ID);
   throw Refusal(fmt::format("built as '{}', this program as '{}'{}", build_id, PERIKIT_BUILD_ID,
                             same_toolchain ? ": perikit's headers are others now; build it again" : ""));

@@ -3,7 +3,7 @@
 ///
 ///   format = 1
 ///   abi = 1
-///   build_id = "gcc12 libstdc++-cxx11abi1 simd512 headers-0123456789ab"
+///   build_id = "gcc12 libstdc++-cxx11abi1 x86-64-v4 simd512 headers-0123456789ab"
 ///   size = 48216                       # of the library [bytes]
 ///   checksum = "ab12..."               # Fingerprint of the library
 ///   part = [ { kind = "material", name = "neo_hookean", summary = "..." } ]

@@ -2,7 +2,7 @@
 /// The C symbols that every perikit library exports. They are read and compared before any C++ object crosses the boundary.
 ///
 ///   int         perikit_abi_version()     equals PERIKIT_ABI_VERSION
-///   const char* perikit_build_id()        compiler, C++ library ABI, SIMD width, hash of the public headers: see PERIKIT_BUILD_ID
+///   const char* perikit_build_id()        compiler, C++ library ABI, level of the processor, SIMD width, hash of the public headers: see PERIKIT_BUILD_ID
 ///   void        perikit_register(void*)   called with a perikit::Registrar*
 ///
 /// PERIKIT_PLUGIN(registrar) { registrar.material({...}, ...); } writes all three.
@@ -17,6 +17,27 @@
 
 #define PERIKIT_STRINGIFY_(x) #x
 #define PERIKIT_STRINGIFY(x) PERIKIT_STRINGIFY_(x)
+
+/// The level of the architecture that this is compiled for. Program and parts must be of one level: they share packs of numbers and inline
+/// functions, and of a mixture nobody has tested anything.
+#if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512CD__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
+#define PERIKIT_ARCHITECTURE "x86-64-v4"
+#elif defined(__AVX2__) && defined(__BMI__) && defined(__BMI2__) && defined(__F16C__) && defined(__FMA__) && defined(__LZCNT__) && defined(__MOVBE__)
+#define PERIKIT_ARCHITECTURE "x86-64-v3"
+#elif defined(__SSE4_2__) && defined(__SSSE3__) && defined(__POPCNT__)
+#define PERIKIT_ARCHITECTURE "x86-64-v2"
+#elif defined(__x86_64__)
+#define PERIKIT_ARCHITECTURE "x86-64"
+#elif defined(__aarch64__)
+#define PERIKIT_ARCHITECTURE "armv" PERIKIT_STRINGIFY(__ARM_ARCH) "-a"
+#else
+#define PERIKIT_ARCHITECTURE "unknown"
+#endif
+#if defined(PERIKIT_NATIVE)
+#define PERIKIT_LEVEL "native-" PERIKIT_ARCHITECTURE   // for one processor
+#else
+#define PERIKIT_LEVEL PERIKIT_ARCHITECTURE
+#endif
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
 #define PERIKIT_SIMD_ID "simd512"
@@ -38,8 +59,8 @@
 #define PERIKIT_COMPILER_ID "gcc" PERIKIT_STRINGIFY(__GNUC__)
 #endif
 
-#define PERIKIT_TOOLCHAIN_ID PERIKIT_COMPILER_ID " " PERIKIT_STDLIB_ID " " PERIKIT_SIMD_ID
-/// As in "gcc12 libstdc++-cxx11abi1 simd512 headers-0123456789ab".
+#define PERIKIT_TOOLCHAIN_ID PERIKIT_COMPILER_ID " " PERIKIT_STDLIB_ID " " PERIKIT_LEVEL " " PERIKIT_SIMD_ID
+/// As in "gcc12 libstdc++-cxx11abi1 x86-64-v4 simd512 headers-0123456789ab".
 #define PERIKIT_BUILD_ID PERIKIT_TOOLCHAIN_ID " headers-" PERIKIT_HEADERS_ID
 
 #define PERIKIT_EXPORT extern "C" __attribute__((visibility("default")))

@@ -1,0 +1,1 @@
+#include "good.cpp"   // sound, but compiled for another level of the processor: CMakeLists.txt
