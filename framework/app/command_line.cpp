@@ -37,6 +37,11 @@ void add_commands(CLI::App& app, Options& options) {
   CLI::App* check_command =
       add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check);
   with_scene(check_command);
+  check_command->get_option("scene")->required(false);
+  CLI::Option* machine = check_command->add_flag("--machine", options.machine,
+                                                 "Instead of a scene: whether this build computes on this machine what it should")
+                             ->excludes("scene");
+  check_command->add_option("--write", options.machine_values, "Write the values of this build, which others compare theirs with, to this file")->needs(machine);
   check_command->add_option("--ranks", options.ranks, "Predict what each of so many ranks holds and exchanges")
       ->check(CLI::Range(1, 100000));
   CLI::App* study_command =

@@ -12,12 +12,14 @@
 #include "bench.hpp"
 #include "data_folder.hpp"
 #include "describe.hpp"
+#include "machine_check.hpp"
 #include "new_project.hpp"
 #include "peak_memory.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/plugin/abi.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
 #include "ranks.hpp"
@@ -73,7 +75,7 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 
 }  // namespace
 
-std::string version() { return PERIKIT_VERSION; }
+std::string version() { return PERIKIT_VERSION " (" PERIKIT_LEVEL ")"; }
 
 void run(const Options& options) {
   const auto registry = open_registry(options);
@@ -129,6 +131,12 @@ void run(const Options& options) {
 
 void check(const Options& options) {
   const auto registry = open_registry(options);
+  if (options.machine) {
+    if (!options.machine_values.empty()) return store_machine_values(*registry, options.machine_values);
+    fmt::print("{}\n", check_machine(*registry, data_folder() / "machine_values.csv"));
+    return;
+  }
+  if (options.scene.empty()) throw InputError("check: found no scene; allowed: a scene file, or --machine");
   const Scene scene = read(options, *registry);
   std::string summary;
   if (options.ranks > 1 && !one_rank_holds(scene)) {
@@ -147,7 +155,7 @@ void check(const Options& options) {
   }
   fmt::print("{}\n", scene.resolved);
   // The summary as comments: what is printed is itself a scene.
-  std::istringstream lines(summary);
+  std::istringstream lines(fmt::format("perikit       {}\n{}", version(), summary));
   for (std::string line; std::getline(lines, line);) fmt::print("# {}\n", line);
 }
 

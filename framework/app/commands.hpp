@@ -15,10 +15,11 @@ enum Exit { done = 0, run_failed = 1, input_refused = 2 };
 struct Options {
   void (*command)(const Options&) = nullptr;  ///< one of those below
   std::filesystem::path scene, output, library;
+  std::filesystem::path machine_values;   ///< of check --machine: the file to write
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0, jobs = 1, ranks = 1;
-  bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false;
+  bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false, machine = false;
   std::string kind, part;
   bool history = false;           ///< of a new material
   PlotOptions plot;
@@ -28,6 +29,7 @@ struct Options {
   BenchOptions bench;
 };
 
+/// "0.1.0 (x86-64-v4)": with the level that it is built for.
 std::string version();
 
 // What the program does, each under the name of its command. They throw InputError and RunError.

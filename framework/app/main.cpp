@@ -21,6 +21,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "machine_check.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/core/messages.hpp"
@@ -95,6 +96,8 @@ int status_of(int argc, char** argv) {
     return end_with(app::input_refused, e.what());
   } catch (const RunError& e) {
     return end_with(app::run_failed, fmt::format("the run failed: {}", e.what()));
+  } catch (const app::WrongBuild& e) {
+    return end_with(app::run_failed, e.what());
   } catch (const std::bad_alloc&) {
     return end_with(app::run_failed, "the run failed: not enough memory");
   } catch (const std::exception& e) {

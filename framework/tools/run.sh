@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# From a fresh checkout to results: packages, build, and the quick start scene into out/quickstart. Options go to setup.sh.
+# From a fresh checkout to results: packages, build, the quick start scene into out/quickstart, and a check that what was built computes what it should.
+# Options go to setup.sh.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -7,3 +8,4 @@ framework/tools/setup.sh "$@"
 cmake --preset release -DPERIKIT_TESTS=OFF
 cmake --build --preset release
 build/release/bin/perikit run configs/quickstart.toml -o out/quickstart
+build/release/bin/perikit check --machine
