@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "body/near_ranks.hpp"
 #include "families/families.hpp"
@@ -15,7 +16,23 @@ namespace perikit {
 
 namespace {
 
-using Shares = std::map<std::int32_t, double>;
+/// By point.
+struct Share {
+  double area = 0;
+  std::int32_t group = 0;  ///< of the samples
+};
+using Shares = std::map<std::int32_t, Share>;
+
+FaceShares in_order(const Shares& shares, SurfaceSamples samples) {
+  FaceShares all;
+  for (const auto& [p, share] : shares) {
+    all.points.push_back(p);
+    all.share.push_back(share.area);
+    samples.group.push_back(share.group);
+  }
+  all.samples = std::move(samples);
+  return all;
+}
 
 /// A face of a load's set.
 struct Face {
@@ -125,7 +142,7 @@ class Columns {
 /// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
 /// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
 /// Of a part of a body with all ranks, which must all call it.
-Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
+FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
   const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis) : Field();
@@ -135,13 +152,21 @@ Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const Term
   const Columns columns(body, face, points, images, 2 * layers);
   Shares shares;
   ExactSum total;
+  SurfaceSamples samples;
+  std::int32_t group = 0;
   const auto add = [&](std::int32_t p, double share) {
     if (p < 0) return;
-    shares[p] += share;
+    shares[p].area += share;
+    shares[p].group = group;
     if (body.owns(static_cast<std::size_t>(p))) total.add(share);
   };
   for (const End& end : columns.faces()) {
     const std::int64_t depth = columns.depth(end);
+    Point middle = end.x;
+    middle[static_cast<std::size_t>(face.axis)] += 0.5 * face.outward * body.spacing();
+    const std::int32_t outermost = columns.below(end, 0);
+    const bool mine = !(end.kind & End::image) && outermost >= 0 && body.owns(static_cast<std::size_t>(outermost));
+    group = add_cell(body.dimension(), face.axis, middle, body.spacing(), mine ? area : 0.0, samples);
     if (!exact || (depth == 1 && !(end.kind & End::image))) {
       add(columns.below(end, 0), depth > 1 ? 1.5 * area : area);
       if (depth > 1) add(columns.below(end, 1), -0.5 * area);
@@ -153,14 +178,14 @@ Shares on_lattice(std::vector<std::int32_t> points, const Face& face, const Term
   }
   const double wanted = static_cast<double>(counted(columns.own_faces()).all) * area, found = total_of(body, total);
   if (exact)
-    for (auto& [p, value] : shares) value *= wanted / found;
-  return shares;
+    for (auto& [p, share] : shares) share.area *= wanted / found;
+  return in_order(shares, std::move(samples));
 }
 
 /// A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
 /// the set holds a second layer, linear weights over both put the resultant on the face. Of a part of a body that is found with
 /// all ranks, which must all call it.
-Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const Body& body) {
+FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const Body& body) {
   const double dx = body.spacing();
   const auto along = [&](std::int32_t p) {
     return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)];
@@ -185,21 +210,28 @@ Shares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const
   second = largest(second ? 1 : 0) > 0;
   const double total = total_of(body, areas), m0 = total_of(body, volumes), m1 = total_of(body, moments), m2 = total_of(body, squares);
   Shares shares;
+  SurfaceSamples samples;
   for (const std::int32_t p : points) {
     const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
     if (depth > 2.2 * dx) continue;
-    shares[p] = second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0;
+    Point foot = body.position(static_cast<std::size_t>(p));
+    foot[static_cast<std::size_t>(face.axis)] += face.outward * depth;
+    // A point of the outer layer has a square cell of the face.
+    const double area = depth <= 1.2 * dx ? v / dx : 0.0,
+                 side = body.dimension() == 2 ? area / body.frame().section : std::sqrt(area);
+    const std::int32_t group = add_cell(body.dimension(), face.axis, foot, side, area, samples);
+    shares[p] = {second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0, group};
   }
-  return shares;
+  return in_order(shares, std::move(samples));
 }
 
 }  // namespace
 
-Shares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
+FaceShares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const Face face(load);
   const std::vector<std::int32_t>& points = parts.families->body().set(load.set);
-  Shares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts.families->body());
-  if (counted(std::ssize(shares)).all == 0 && communicator().complete()) {
+  FaceShares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts.families->body());
+  if (counted(std::ssize(shares.points)).all == 0 && communicator().complete()) {
     throw InputError(
         load.position, "load.face",
         fmt::format("found \"{}\", on which no point of the set \"{}\" lies; allowed: a face of the set", load.face, load.set));

@@ -2,18 +2,26 @@
 /// Tractions as forces on points.
 
 #include <cstdint>
-#include <map>
+#include <vector>
 
 #include "perikit/problem/image_map.hpp"
+#include "perikit/problem/surface_rule.hpp"
 #include "perikit/scene/scene.hpp"
 #include "perikit/terms/terms.hpp"
 
 namespace perikit {
 
+/// What points carry of a face.
+struct FaceShares {
+  std::vector<std::int32_t> points;  ///< internal indices
+  std::vector<double> share;         ///< areas [m^2]
+  SurfaceSamples samples;            ///< of the face
+};
+
 /// The area [m^2] of the face of `load` that each point of its set, or below it, carries: exact in total, by point of the body of parts.families.
 /// Images (null: none) of these points beside the face carry their part of it. Of a part of a body it finds what points
 /// carry whose forces are complete, with all ranks, which must all call it. Throws InputError where no point of the set lies on the face.
-std::map<std::int32_t, double> face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
+FaceShares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
 
 /// The area [m^2] that each point has of faces across `axis` in the eyes of the kinematics: its force along the axis where a
 /// stress of 1 along the axis is the same everywhere, positive at the upper face and negative at the lower one. Loads in

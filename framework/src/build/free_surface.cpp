@@ -27,7 +27,7 @@ double dot(const Point& a, const Point& b) {
 std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
   // Of a part no more than families are there.
   const double reach = std::min(2 * body.spacing(), body.horizon());
-  const FamilyLists near = find_families(body.rows(), body.points(), body.dimension(), reach);
+  const FamilyLists near = find_families(body.rows(), body.points(), body.dimension(), reach, [&](std::size_t p) { return body.image(p) ? -1 : body.number(p); });
   std::vector<std::int32_t> found;
   for (const std::int32_t p : body.owned()) {
     const auto i = static_cast<std::size_t>(p);
@@ -57,16 +57,19 @@ std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
 
 }  // namespace
 
-CellFaces::CellFaces(const Body& body) : area(body.stride(), Point{}), count(body.stride(), 0) {
-  const Lattice& lattice = *body.lattice();
-  const double face = body.uniform_volume() / body.spacing();
-  for (const std::int32_t p : body.internal())
+void over_free_faces(const Body& body, std::span<const std::int32_t> points, const FreeFace& visit) {
+  for (const std::int32_t p : points)
     for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k)
-      for (const int sign : {-1, 1}) {
-        if (occupied(body, p, k, sign)) continue;
-        area[static_cast<std::size_t>(p)][static_cast<std::size_t>(lattice.axis[k])] += sign * face;
-        ++count[static_cast<std::size_t>(p)];
-      }
+      for (const int sign : {-1, 1})
+        if (!occupied(body, p, k, sign)) visit(p, static_cast<std::size_t>(body.lattice()->axis[k]), sign);
+}
+
+CellFaces::CellFaces(const Body& body) : area(body.stride(), Point{}), count(body.stride(), 0) {
+  const double face = body.uniform_volume() / body.spacing();
+  over_free_faces(body, body.internal(), [&](std::int32_t p, std::size_t axis, int sign) {
+    area[static_cast<std::size_t>(p)][axis] += sign * face;
+    ++count[static_cast<std::size_t>(p)];
+  });
 }
 
 std::vector<std::int32_t> free_surface(const Body& body) {

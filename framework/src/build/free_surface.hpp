@@ -2,12 +2,18 @@
 /// Which points of a body lie at its free surface.
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "perikit/body/body.hpp"
 
 namespace perikit {
+
+/// The free faces of the cells of some points of a lattice: those with no point, and no image, behind them. axis: of the input.
+using FreeFace = std::function<void(std::int32_t p, std::size_t axis, int sign)>;
+void over_free_faces(const Body& body, std::span<const std::int32_t> points, const FreeFace& visit);
 
 /// Sum of the outward area vectors of the free faces of each point's cell on a lattice [m^2]: those with no point, and no image,
 /// behind them. By internal index; the number of free faces beside it. Of a part right where it has what is around a cell.

@@ -25,10 +25,10 @@ Load distributed(const LoadDescription& description, const TermParts& parts, con
   const Body& body = parts.families->body();
   Load load;
   if (description.type == LoadDescription::Type::traction) {
-    for (const auto& [p, share] : face_shares(description, parts, images)) {
-      load.points.push_back(p);
-      load.share.push_back(share);
-    }
+    FaceShares shares = face_shares(description, parts, images);
+    load.points = std::move(shares.points);
+    load.share = std::move(shares.share);
+    load.rule = std::make_shared<SurfaceRule>(body, load.points, load.share, std::move(shares.samples));
     return load;
   }
   load.points = body.set(description.set);
@@ -51,20 +51,15 @@ void refuse_pressure(const Scene& scene, const LoadDescription& load, const Term
         "allowed: a boundary that holds a set");
 }
 
-/// A pressure that does not follow: a load along each axis.
-std::vector<Load> loads_along_axes(const SpaceTimeFunction& value, const SurfaceAreas& areas, int dimension) {
-  std::vector<Load> loads;
-  for (int axis = 0; axis < dimension; ++axis) {
-    Load& load = loads.emplace_back();
-    load.components.push_back({axis, value});
-    for (std::size_t k = 0; k < areas.points.size(); ++k) {
-      const double area = areas.area[k][static_cast<std::size_t>(axis)];
-      if (area == 0) continue;
-      load.points.push_back(areas.points[k]);
-      load.share.push_back(-area);
-    }
+Pressure pressure_on(const Body& body, const SpaceTimeFunction& value, SurfaceAreas areas) {
+  Pressure pressure{value, std::move(areas.points), std::move(areas.area)};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!areas.samples[axis]) continue;
+    std::vector<double> share;
+    for (const Point& area : pressure.area) share.push_back(area[axis]);
+    pressure.rules[axis] = std::make_shared<SurfaceRule>(body, pressure.points, std::move(share), std::move(*areas.samples[axis]));
   }
-  return loads;
+  return pressure;
 }
 
 }  // namespace
@@ -72,17 +67,15 @@ std::vector<Load> loads_along_axes(const SpaceTimeFunction& value, const Surface
 Loads build_loads(const Scene& scene, const TermParts& parts, const ImageMap* images, bool quasi_static) {
   const Body& body = parts.families->body();
   std::vector<Load> loads;
-  std::vector<FollowingPressure> pressures;
+  std::vector<Pressure> pressures;
   for (const LoadDescription& description : scene.loads) {
     refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
     if (description.type == LoadDescription::Type::pressure) {
       refuse_pressure(scene, description, parts);
       const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
-      SurfaceAreas areas = surface_areas(description, parts, images);
-      if (description.follower)
-        pressures.push_back({value, std::move(areas.points), std::move(areas.area)});
-      else
-        std::ranges::move(loads_along_axes(value, areas, body.dimension()), std::back_inserter(loads));
+      Pressure pressure = pressure_on(body, value, surface_areas(description, parts, images));
+      pressure.follows = description.follower;
+      pressures.push_back(std::move(pressure));
       continue;
     }
     Load load = distributed(description, parts, images);

@@ -20,11 +20,13 @@ double length(const Point& a) {
 
 SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const auto axis = static_cast<std::size_t>(load.face[1] - 'x');
+  const double outward = load.face[0] == '+' ? 1 : -1;
+  FaceShares shares = face_shares(load, parts, images);
   SurfaceAreas areas;
-  for (const auto& [p, share] : face_shares(load, parts, images)) {
-    areas.points.push_back(p);
-    areas.area.emplace_back()[axis] = load.face[0] == '+' ? share : -share;
-  }
+  areas.points = std::move(shares.points);
+  for (const double share : shares.share) areas.area.emplace_back()[axis] = outward * share;
+  for (double& weight : shares.samples.weight) weight *= outward;
+  areas.samples[axis] = std::move(shares.samples);
   return areas;
 }
 
@@ -89,6 +91,26 @@ void correct_total(const Body& body, const std::vector<std::uint8_t>& in_set, Su
   }
 }
 
+/// The free cell faces of the set, and the places of the points that carry them.
+void add_samples(const Body& body, const std::vector<std::uint8_t>& in_set, SurfaceAreas& areas) {
+  const double area = body.uniform_volume() / body.spacing();
+  std::array<SurfaceSamples, 3> samples;
+  over_free_faces(body, body.owned(), [&](std::int32_t p, std::size_t axis, int sign) {
+    if (!in_set[static_cast<std::size_t>(p)]) return;
+    Point middle = body.position(static_cast<std::size_t>(p));
+    middle[axis] += 0.5 * sign * body.spacing();
+    add_cell(body.dimension(), static_cast<int>(axis), middle, body.spacing(), sign * area, samples[axis]);
+  });
+  for (std::size_t axis = 0; axis < static_cast<std::size_t>(body.dimension()); ++axis) {
+    for (const std::int32_t p : areas.points) {
+      samples[axis].place.push_back(body.position(static_cast<std::size_t>(p)));
+      samples[axis].weight.push_back(0);
+      samples[axis].group.push_back(samples[axis].end_group());
+    }
+    areas.samples[axis] = std::move(samples[axis]);
+  }
+}
+
 }  // namespace
 
 SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
@@ -125,6 +147,7 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
   }
   for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
   if (body.lattice() && !images) correct_total(body, in_set, found);
+  if (body.lattice()) add_samples(body, in_set, found);
   return found;
 }
 

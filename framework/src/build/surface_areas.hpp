@@ -1,9 +1,12 @@
 #pragma once
 /// The free surface of a set as area vectors of points: what pressures act on.
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "perikit/problem/image_map.hpp"
+#include "perikit/problem/surface_rule.hpp"
 #include "perikit/scene/scene.hpp"
 #include "perikit/terms/terms.hpp"
 
@@ -13,6 +16,7 @@ namespace perikit {
 struct SurfaceAreas {
   std::vector<std::int32_t> points;
   std::vector<Point> area;
+  std::array<std::optional<SurfaceSamples>, 3> samples;  ///< of the faces across each axis, where they are known
 };
 
 /// What of the free surface each point has that lies nearest to a surface point of the load's set, or (face) of that side of the
