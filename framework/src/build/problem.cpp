@@ -16,6 +16,7 @@
 #include "build/materials.hpp"
 #include "build/questionable.hpp"
 #include "build/several_ranks.hpp"
+#include "build/thin_pieces.hpp"
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -222,6 +223,8 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   refuse_order(scene, of_terms.formulation, *parts.families);
+  const auto ghosts = partition ? std::make_unique<Ghosts>(*partition, 1) : nullptr;
+  refuse_thin_pieces(scene, *parts.families, ghosts.get());
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
