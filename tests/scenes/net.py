@@ -1,0 +1,125 @@
+"""Random valid scenes against what every scene must come to.
+
+    net.py PROGRAM FOLDER [--first SEED] [--count N] [--seeds FILE] [--explicit] [--no-shrink]
+
+Seeds are tried one after the other; seeds that FOLDER/done.csv lists are not tried again. Failing scenes are kept, made small, in FOLDER/failing."""
+
+import argparse
+import collections
+import os
+import re
+import shutil
+import sys
+import time
+
+from generate import Generator
+from scene_text import scene_text
+from smaller import smaller
+from tables import read_tables
+from trial import Trial, call, without_digits, write_scene
+
+
+def repaired(program, folder, scene, attempts=8):
+    """The scene without the keys that `check` refuses: rules that bind several keys are the program's. Returns it with the refusals."""
+    refusals = []
+    for _ in range(attempts):
+        shutil.rmtree(folder, ignore_errors=True)
+        checked = call(program, ["check", write_scene(scene, folder)])
+        if checked.status != 2:
+            return scene, refusals, checked
+        refusals.append(checked.first_line)
+        match = re.search(r"scene\.toml:\d+:\d+: ([\w.\[\]]+): ", checked.words)
+        if not match or not drop(scene, match.group(1).split(".")):
+            return None, refusals, checked
+    return None, refusals, checked
+
+
+def drop(scene, path):
+    """Removes a key; where its section is needed and the key is, nothing can be done."""
+    at, parents = scene, []
+    for word in path:
+        word = int(word) if isinstance(at, list) and word.isdigit() else word
+        if isinstance(at, list) and isinstance(word, int) and word < len(at) or isinstance(at, dict) and word in at:
+            parents.append((at, word))
+            at = at[word]
+        else:
+            break
+    while parents:
+        holder, word = parents.pop()
+        if word in ("type", "set", "integrator", "kinematics", "material", "family", "body", "format", "lattice"):
+            continue
+        del holder[word]
+        if holder == [] and parents:
+            upper, name = parents.pop()
+            del upper[name]
+        return True
+    return False
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("folder")
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seeds")
+    parser.add_argument("--explicit", action="store_true")
+    parser.add_argument("--no-shrink", action="store_true")
+    options = parser.parse_args()
+    tables = read_tables(options.program)
+    os.makedirs(options.folder + "/failing", exist_ok=True)
+    done_file = options.folder + "/done.csv"
+    done = set()
+    if os.path.exists(done_file) and not options.seeds:
+        with open(done_file) as file:
+            done = {int(line.split(",")[0]) for line in file}
+    seeds = range(options.first, options.first + options.count)
+    if options.seeds:
+        with open(options.seeds) as file:
+            seeds = [int(word) for line in file for word in line.split("#")[0].split()]
+    kinds, refused, failed = collections.Counter(), collections.Counter(), []
+    began = time.time()
+    for seed in seeds:
+        if seed in done:
+            continue
+        folder = "%s/%d" % (options.folder, seed)
+        scene = Generator(tables, seed, options.explicit).scene()
+        scene, refusals, checked = repaired(options.program, folder, scene)
+        for words in refusals:
+            refused[without_digits(words.split(": ", 1)[-1])[:160]] += 1
+        if scene is None:
+            outcome = "refused"
+            if checked.status not in (0, 2):
+                outcome = "check ends with %d" % checked.status
+        else:
+            trial = Trial(options.program, folder, scene)
+            findings = trial.try_scene()
+            outcome = "status %d" % trial.status
+            if trial.status == 1:
+                outcome += ": " + without_digits(trial.words.split(": ", 1)[-1])[:110]
+            for kind, words in findings:
+                print("FAILED  seed %d: %s: %s" % (seed, kind, words), flush=True)
+            if findings:
+                failed.append(seed)
+                kind, words = findings[0]
+                outcome = "FAILED " + kind
+                small = scene if options.no_shrink else smaller(options.program, folder + "_small", scene, kind)
+                write_scene(small, "%s/failing/%d" % (options.folder, seed))
+                with open("%s/failing/%d/finding" % (options.folder, seed), "w") as file:
+                    file.write("%s: %s\n" % (kind, words))
+                print(scene_text(small), flush=True)
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(folder + "_small", ignore_errors=True)
+        kinds[outcome] += 1
+        with open(done_file, "a") as file:
+            file.write("%d,%s\n" % (seed, outcome.replace(",", ";").replace("\n", " ")))
+    print("\n%d scenes in %.0f s" % (sum(kinds.values()), time.time() - began))
+    for outcome, count in kinds.most_common():
+        print("%5d  %s" % (count, outcome))
+    print("keys that `check` refused and that were taken out:")
+    for words, count in refused.most_common(30):
+        print("%5d  %s" % (count, words))
+    sys.exit(1 if failed or not kinds else 0)
+
+
+main()

@@ -1,0 +1,45 @@
+"""Scenes as dictionaries, and their text."""
+
+SUB_SECTIONS = {"body": ("lattice", "points")}
+
+
+def value_text(value):
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(value_text(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join("%s = %s" % (key, value_text(item)) for key, item in value.items()) + " }"
+    if isinstance(value, float):
+        return repr(value) if "." in repr(value) or "e" in repr(value) else repr(value) + ".0"
+    return str(value)
+
+
+def section_text(header, content):
+    return "\n".join([header] + ["%s = %s" % (key, value_text(value)) for key, value in content.items()]) + "\n"
+
+
+def scene_text(scene):
+    """TOML. Lists of dictionaries become arrays of tables, dictionaries of the top level become sections."""
+    plain = {key: value for key, value in scene.items() if not isinstance(value, (dict, list)) and key != "files"}
+    out = section_text("", plain).lstrip("\n")
+    for name, value in scene.items():
+        if name == "files" or name in plain:
+            continue
+        for item in value if isinstance(value, list) else [value]:
+            subs = SUB_SECTIONS.get(name, ())
+            rest = {key: content for key, content in item.items() if key not in subs and not is_tables(content)}
+            out += section_text("[[%s]]" % name if isinstance(value, list) else "[%s]" % name, rest)
+            for sub in subs:
+                if sub in item:
+                    out += section_text("[%s.%s]" % (name, sub), item[sub])
+            for key, content in item.items():
+                if is_tables(content):
+                    out += "".join(section_text("[[%s.%s]]" % (name, key), entry) for entry in content)
+    return out
+
+
+def is_tables(value):
+    return isinstance(value, list) and len(value) > 0 and isinstance(value[0], dict)
