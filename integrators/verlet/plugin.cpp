@@ -11,9 +11,9 @@ PERIKIT_PLUGIN(registrar) {
       .at_most(1.0);
   table
       .choice("estimate", {"eigenvalue", "bond_based"},
-              "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula.")
+              "Stable step from the largest eigenvalue of the tangent, or from the bond-based formula where that is shorter.")
       .by_default("\"eigenvalue\"");
-  table.integer("check_every", "Steps between new estimates where the stiffness can grow; a tenth of it while bonds fail.")
+  table.integer("check_every", "Most steps between new estimates where the stiffness can grow; sooner where the body is stretched or bonds fail.")
       .by_default("500")
       .at_least(1);
   allow_unstable_parameter(table);

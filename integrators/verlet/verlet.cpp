@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/sdk/stable_step.hpp"
+#include "stretch_watch.hpp"
 
 namespace perikit {
 
@@ -177,20 +179,22 @@ double Verlet::safety(const Problem& problem) const {
   return options_.safety > 0 ? options_.safety : problem.bonds().empty() ? 0.9 : 0.5;
 }
 
-double Verlet::stable_step(Problem& problem) const {
-  if (options_.bond_based) return safety(problem) * bond_based_time_step(problem.body(), problem.laws());
-  const double eigenvalue = largest_eigenvalue(problem, problem.state().displacement());
-  return eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
+double Verlet::tolerated(const Problem& problem) const {
+  const double share = safety(problem);
+  return std::max(share, std::min(1.2 * share, 0.97));
 }
 
-/// Whether bonds that have failed leave a step stable; where it cannot be told from the part around them, or they do not, the
-/// whole body must be asked.
-bool Verlet::stays_stable(Problem& problem, double step) const {
-  if (options_.bond_based) return true;
+double Verlet::step_of(const Problem& problem, double eigenvalue) const {
+  const double step = eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
+  return options_.bond_based ? std::min(step, safety(problem) * bond_based_time_step(problem.body(), problem.laws())) : step;
+}
+
+double Verlet::eigenvalue_around_failed_bonds(Problem& problem, double step) const {
   const std::unique_ptr<DamagedPart> part = problem.damaged_part();
-  if (!part) return false;
-  const double eigenvalue = largest_eigenvalue(problem, *part, problem.state().displacement());
-  return eigenvalue > 0 && safety(problem) * 2 / std::sqrt(eigenvalue) >= step;
+  if (!part) return 0;
+  const double most = 2 * tolerated(problem) / step, limit = most * most;
+  const double found = largest_eigenvalue(problem, *part, problem.state().displacement(), limit);
+  return found < limit ? 0 : found;
 }
 
 double Verlet::steps_to_end(double time, double step) const {
@@ -205,28 +209,38 @@ double Verlet::first_step(Problem& problem) {
   if (options_.time_step > 0) return options_.time_step;
   const ConstFieldView u = problem.state().displacement();
   if (planned_.problem != &problem || !std::equal(u.data, u.data + u.size(), planned_.displacement.begin(), planned_.displacement.end()))
-    planned_ = {&problem, stable_step(problem), {u.data, u.data + u.size()}};
-  return planned_.step;
+    planned_ = {&problem, largest_eigenvalue(problem, u), {u.data, u.data + u.size()}};
+  return step_of(problem, planned_.eigenvalue);
 }
 
 std::string Verlet::plan(Problem& problem) {
   check_time_step(problem, options_.values);
   const double dt = first_step(problem);
   const double steps = steps_to_end(0, dt);
-  return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s)", steps,
-                     options_.end_time / steps, options_.end_time, bond_based_time_step(problem.body(), problem.laws()));
+  const std::string doubt = bond_based_doubt(problem);
+  return fmt::format("{:.0f} steps of {:.4g} s to {:.4g} s (bond-based estimate of the stable step, P 3.58: {:.4g} s){}{}", steps,
+                     options_.end_time / steps, options_.end_time, bond_based_time_step(problem.body(), problem.laws()), doubt.empty() ? "" : "; ", doubt);
+}
+
+std::string Verlet::bond_based_doubt(const Problem& problem) const {
+  if (!options_.bond_based || options_.time_step > 0 || !(planned_.eigenvalue > 0)) return {};
+  const double estimate = bond_based_time_step(problem.body(), problem.laws()), stable = 2 / std::sqrt(planned_.eigenvalue);
+  if (estimate <= stable) return {};
+  return fmt::format("the bond-based estimate of the stable step, {:.4g} s, is longer than the longest stable step at the start, {:.4g} s, which is "
+                     "taken in its place",
+                     estimate, stable);
 }
 
 void Verlet::run(Problem& problem, Observer& observer) {
   State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
-  const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
+  const std::span<double> plan = state.declare_numbers("verlet_plan", 5);
   double& first = plan[0];     // step at which the plan was made
   double& start = plan[1];     // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
   double& counter = plan[4];   // steps of the plan
-  double& broke = plan[5];     // whether bonds have failed since the last estimate
+  StretchWatch watch(state.declare_numbers("verlet_stretches", StretchWatch::numbers));
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
     first = static_cast<double>(state.step);
@@ -234,12 +248,20 @@ void Verlet::run(Problem& problem, Observer& observer) {
     counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
+  // By how much the largest eigenvalue may rise before the step is longer than is tolerated.
+  const auto headroom = [&](double eigenvalue) {
+    const double most = 2 * tolerated(problem) / dt;
+    return eigenvalue > 0 ? most * most / eigenvalue : std::numeric_limits<double>::infinity();
+  };
+  const bool watched = estimated && !problem.constant_stiffness();
   const bool fresh = dt == 0;
   if (fresh) {
     check_time_step(problem, options_.values, &observer);
     make_plan(first_step(problem));   // before the fields of the steps are there: it has its own
-    planned_ = {};
+    if (watched) watch.estimated(problem.stretches(state.displacement()), 0, headroom(planned_.eigenvalue));
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
+    if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
+    planned_ = {};
   }
   Stepper stepper(problem);
   const FieldView v = state.velocity();
@@ -289,7 +311,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     stepper.prescribed_speed(t_next, speeds);
     stepper.add_work_of_loads(dt, old_external);
     // Forces, velocity and energies are those of the bonds that are left.
-    if (problem.advance(dt, stepper.half())) broke = 1;
+    const bool fewer = problem.advance(dt, stepper.half());
     stepper.add_work_of_constraints(dt);
     last_dt = dt;
     if (sample) {
@@ -297,16 +319,17 @@ void Verlet::run(Problem& problem, Observer& observer) {
       problem.constraints().prescribe_velocity(t_next, v);
     }
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
-    // Bonds that fail may raise the largest eigenvalue near them, and soon; anything else changes it slowly.
-    const auto at_every = [&](std::int64_t steps) { return state.step % std::max<std::int64_t>(1, steps) == 0; };
-    const bool all = at_every(options_.check_every), near = broke != 0 && at_every(options_.check_every / 10);
-    if (near || all) broke = 0;
-    if (estimated && !last && !problem.constant_stiffness() && (all || (near && !stays_stable(problem, dt)))) {
-      const double stable = stable_step(problem);
-      if (stable < dt) {
-        make_plan(stable);
-        observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s",
-                                 state.step, counter, dt));
+    // The largest eigenvalue rises at once where bonds fail, soon where the body is stretched or compressed fast, and slowly else.
+    if (watched && !last) {
+      const double failed = fewer ? eigenvalue_around_failed_bonds(problem, dt) : 0;
+      const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
+      if (failed > 0 || stretched || state.step % options_.check_every == 0) {
+        const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
+        if (const double stable = step_of(problem, eigenvalue); stable < dt) {
+          make_plan(stable);
+          observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
+        }
+        watch.estimated(problem.stretches(state.displacement()), state.step, headroom(eigenvalue));
       }
     }
     observer.step_done(report());

@@ -7,7 +7,7 @@ struct VerletOptions {
   double end_time = 0;             ///< [s]
   double time_step = 0;            ///< [s]; 0: estimated
   double safety = 0;               ///< to the estimated stable step; 0: found
-  bool bond_based = false;         ///< estimate by P 3.58 instead of the eigenvalue
+  bool bond_based = false;         ///< estimate by P 3.58, at most the stable step
   std::int64_t check_every = 500;  ///< steps between estimates of a nonlinear body
   ParameterValues values{};        ///< where they come from, for messages
 };
@@ -24,8 +24,14 @@ class Verlet final : public Integrator {
  private:
   /// 0.9; half of the stable step where bonds may fail: what a crack takes per area is then within a few per cent of small steps.
   double safety(const Problem& problem) const;
-  double stable_step(Problem& problem) const;
-  bool stays_stable(Problem& problem, double step) const;
+  /// The share of the longest stable step at which a step that was planned with less is planned anew.
+  double tolerated(const Problem& problem) const;
+  /// The step to take where this is the largest eigenvalue.
+  double step_of(const Problem& problem, double eigenvalue) const;
+  /// The largest eigenvalue around the bonds that failed in the last step; 0 where it tolerates steps of this length.
+  double eigenvalue_around_failed_bonds(Problem& problem, double step) const;
+  /// A warning where the bond-based estimate, asked for, is longer than the stable step of the beginning; else empty.
+  std::string bond_based_doubt(const Problem& problem) const;
   /// That of the beginning, estimated once for plan() and run(), which take it of the same displacement.
   double first_step(Problem& problem);
   /// Equal steps of at most `step` from `time` to the end. Throws InputError for more than can be counted.
@@ -33,7 +39,7 @@ class Verlet final : public Integrator {
   VerletOptions options_;
   struct {
     const Problem* problem = nullptr;   ///< null: not estimated
-    double step = 0;                    ///< [s]
+    double eigenvalue = 0;              ///< [1/s^2]
     std::vector<double> displacement;   ///< for which it was
   } planned_;
 };

@@ -30,6 +30,7 @@ class ForwardingProblem : public Problem {
   bool advance(double time_step, FieldView velocity) override { return of_.advance(time_step, velocity); }
   std::unique_ptr<WeakeningBonds> weakening_bonds() override { return of_.weakening_bonds(); }
   std::unique_ptr<DamagedPart> damaged_part() override { return of_.damaged_part(); }
+  StretchRange stretches(ConstFieldView u) override { return of_.stretches(u); }
   std::vector<std::byte> bonds() const override { return of_.bonds(); }
   void restore_bonds(std::span<const std::byte> bonds) override { of_.restore_bonds(bonds); }
 

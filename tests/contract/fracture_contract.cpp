@@ -531,6 +531,34 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
       }
 }
 
+TEST_CASE("kinematics: stretches are those of bonds between neighbours that have not failed") {
+  for (const bool cloud : {false, true})
+    for (const int d : {1, 2, 3}) {
+      INFO(d, "D ", cloud ? "cloud" : "lattice");
+      const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .cells = 9, .conditions = limit}, "type = \"baqp\""));
+      BodyProblem& problem = simulation->problem();
+      const Body& body = problem.body();
+      const FieldView u = problem.state().displacement();
+      const auto range = [&](double least, double largest) {
+        const StretchRange found = problem.stretches(u);
+        CHECK(found.least == doctest::Approx(least).epsilon(1e-12));
+        CHECK(found.largest == doctest::Approx(largest).epsilon(1e-12));
+      };
+      range(1, 1);
+      set_field(body, u, [](const Point& x) { return Point{5 - 0.3 * x[0], -0.3 * x[1], -0.3 * x[2]}; });
+      range(0.7, 1);
+      set_field(body, u, [](const Point& x) { return Point{0.01 * x[0], 0.01 * x[1], 0.01 * x[2]}; });
+      range(1, 1.01);
+      if (d > 1) set_field(body, u, [](const Point& x) { return Point{-x[0] - x[1], x[0] - x[1], 0}; });   // a turn by 90 degrees
+      if (d > 1) range(1, 1);
+      // Half of the body flies away: no bond holds it.
+      set_field(body, u, [](const Point& x) { return Point{x[0] < 4.5 ? 0.0 : 50.0, 0, 0}; });
+      CHECK(problem.stretches(u).largest > 10);
+      CHECK(problem.terms().update_bonds(u).changed > 0);
+      range(1, 1);
+    }
+}
+
 TEST_CASE("kinematics: points without bonds are free masses") {
   for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true})

@@ -19,6 +19,7 @@ except ImportError:
 from scene_text import scene_text
 
 SECONDS = 100   # of one run; scenes are small
+FEW_STEPS = 30   # runs of fewer steps are too short to tell an unstable step from a coarse one
 STATICS = ("newton", "jfnk", "kinsol", "dynamic_relaxation")
 
 
@@ -79,7 +80,7 @@ class Trial:
 
     def __init__(self, program, folder, scene, only=None):
         self.program, self.folder, self.scene, self.only = program, folder, scene, only
-        self.findings, self.words, self.status = [], "", None
+        self.findings, self.words, self.status, self.imbalance = [], "", None, 0.0
 
     def found(self, kind, words):
         self.findings.append((kind, words))
@@ -97,7 +98,7 @@ class Trial:
     def try_scene(self):
         shutil.rmtree(self.folder, ignore_errors=True)
         self.path = write_scene(self.scene, self.folder)
-        checked = call(self.program, ["check", self.path]) if self.wants("check") or self.only is None else None
+        checked = call(self.program, ["check", self.path]) if self.wants("check") else None
         done, out = self.run("out")
         self.status, self.words = done.status, done.words
         if done.status not in (0, 1, 2):
@@ -148,9 +149,11 @@ class Trial:
     # -- values -------------------------------------------------------------------------------------------------------------------------------
 
     def look_at_values(self, out):
+        with open(out + "/run.log") as log:
+            told = re.findall(r"warning: frame \d+: (\w+) is not finite", log.read())
         for path in frames(out):
             for name, values in read(path)[0].items():
-                if not numpy.all(numpy.isfinite(values)):
+                if name not in told and not numpy.all(numpy.isfinite(values)):
                     self.found("not finite", "%s of frame %s" % (name, os.path.basename(path)))
                     return
         if self.scene["integrator"]["type"] == "verlet":
@@ -161,13 +164,13 @@ class Trial:
     def look_at_energies(self, out):
         rows = history(out)
         parts = [rows[name] for name in ("strain_energy", "kinetic_energy", "dissipated_energy", "external_work")]
-        if len(parts[0]) < 2 or not self.conservative():
+        if not self.conservative():
             return
         total = parts[0] + parts[1] + parts[2] - parts[3]
         off = numpy.max(numpy.abs(total - total[0]))
         largest = max(numpy.max(numpy.abs(part)) for part in parts)
         self.imbalance = off / largest if largest > 0 else 0.0
-        if self.imbalance > 0.5:
+        if self.imbalance > 0.5 and len(total) >= FEW_STEPS:
             self.found("energy", "off by %.2g of the largest energy" % self.imbalance)
 
     def part_name(self, section):

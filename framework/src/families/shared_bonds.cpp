@@ -36,6 +36,24 @@ void SharedBonds::mark(GroupMarks& marks) const {
     if (const std::int32_t p = body_.at_place(marked); p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
 }
 
+std::vector<std::uint8_t> SharedBonds::points_beside(std::span<const std::int32_t> points) const {
+  constexpr auto group = static_cast<std::int64_t>(padding);
+  std::vector<std::int64_t> groups;
+  for (const std::int32_t p : points) groups.push_back(place(p) / group);
+  if (part()) groups = told_to_all(gathered<std::int64_t>(groups));
+  std::ranges::sort(groups);
+  const auto rest = std::ranges::unique(groups);
+  groups.erase(rest.begin(), rest.end());
+  if (groups.empty()) return {};
+  std::vector<std::uint8_t> marks(body_.stride(), 0);
+  for (const std::int64_t g : groups)
+    for (std::int64_t at = g * group; at < (g + 1) * group; ++at) {
+      const std::int64_t p = part() ? body_.at_place(at) : at;
+      if (p >= 0 && body_.alive(static_cast<std::size_t>(p))) marks[static_cast<std::size_t>(p)] = 1;
+    }
+  return marks;
+}
+
 std::vector<NamedChange> SharedBonds::outward(std::span<const BondChange> changes) const {
   std::vector<NamedChange> own;
   for (const BondChange& change : changes)

@@ -11,6 +11,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
 #include "problem/history_record.hpp"
+#include "problem/near_bonds.hpp"
 #include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
 #include "problem/weak_springs.hpp"
@@ -421,7 +422,7 @@ void BodyProblem::carry(ByteReader& snapshot) {
 }
 
 std::size_t BodyProblem::bytes() const noexcept {
-  return body().bytes() + terms().report().bytes + values_.state.bytes() + masses().bytes();
+  return body().bytes() + terms().report().bytes + values_.state.bytes() + masses().bytes() + (near_bonds_ ? near_bonds_->bytes() : 0);
 }
 
 }  // namespace perikit

@@ -1,5 +1,6 @@
 #include "perikit/problem/damaged_part.hpp"
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/problem/body_problem.hpp"
 
@@ -7,16 +8,18 @@ namespace perikit {
 
 class BodyProblem::Damaged final : public DamagedPart {
  public:
-  Damaged(BodyProblem& problem, GroupRings groups) : problem_(problem), groups_(std::move(groups)), inside_(problem.make_field()) {
+  /// whole: the part is the whole body, whatever the rings.
+  Damaged(BodyProblem& problem, GroupRings rings, bool whole) : problem_(problem), rings_(std::move(rings)), whole_(whole), inside_(problem.make_field()) {
     for (const std::int32_t p : problem_.body().owned())
-      for (int c = 0; c < inside_.components() && groups_.inside[static_cast<std::size_t>(p) / padding]; ++c) inside_.component(c)[p] = 1;
+      for (int c = 0; c < inside_.components(); ++c) inside_.component(c)[p] = whole || rings_.inside[static_cast<std::size_t>(p)] ? 1 : 0;
   }
 
   ConstFieldView inside() const override { return inside_; }
 
   EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    if (whole_) return problem_.tangent_action(u, w, Kw);
     EvaluationStatus status =
-        problem_.terms().tangent_of(groups_, problem_.seen(u, problem_.seen_), problem_.seen(w, problem_.seen_direction_), Kw);
+        problem_.terms().tangent_of(rings_, problem_.seen(u, problem_.seen_), problem_.seen(w, problem_.seen_direction_), Kw);
     problem_.describe(status);
     problem_.finish(Kw, status);
     return status;
@@ -24,16 +27,17 @@ class BodyProblem::Damaged final : public DamagedPart {
 
  private:
   BodyProblem& problem_;
-  GroupRings groups_;
+  GroupRings rings_;
+  bool whole_;
   Field inside_;
 };
 
 std::unique_ptr<DamagedPart> BodyProblem::damaged_part() {
-  // Forces on images go to sources elsewhere.
-  if (!parts_.fracture.damage() || images()) return nullptr;
-  GroupRings groups = terms().near_failed_bonds();
-  if (groups.inside.empty()) return nullptr;
-  return std::make_unique<Damaged>(*this, std::move(groups));
+  if (!parts_.fracture.damage()) return nullptr;
+  GroupRings rings = terms().near_failed_bonds();
+  if (communicator().largest(rings.inside.empty() ? 0 : 1) == 0) return nullptr;
+  // Forces on images go to sources elsewhere: the tangent of a part would lack them.
+  return std::make_unique<Damaged>(*this, std::move(rings), images() != nullptr);
 }
 
 }  // namespace perikit

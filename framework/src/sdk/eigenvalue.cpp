@@ -5,15 +5,30 @@
 #include <cmath>
 #include <vector>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 
 namespace perikit {
 
 namespace {
 
-/// action(w, Kw): Kw <- K w; false where u is inadmissible.
-template <class Action>
-double lanczos(Problem& problem, Action&& action, ConstFieldView scale, FieldView vector, bool warm) {
+struct RitzValue {
+  double value, residual;
+};
+
+/// The largest eigenvalue of the tridiagonal matrix with this diagonal and these entries beside it, and the bound of its residual.
+RitzValue largest_ritz_value(const std::vector<double>& alpha, const std::vector<double>& beta, double next) {
+  const auto order = static_cast<Eigen::Index>(alpha.size());
+  const Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(alpha.data(), order);
+  const Eigen::VectorXd off = Eigen::Map<const Eigen::VectorXd>(beta.data(), order - 1);
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
+  ritz.computeFromTridiagonal(diagonal, off);
+  return {ritz.eigenvalues()(order - 1), next * std::abs(ritz.eigenvectors()(order - 1, order - 1))};
+}
+
+}  // namespace
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
   Field last = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
@@ -35,20 +50,13 @@ double lanczos(Problem& problem, Action&& action, ConstFieldView scale, FieldVie
   double bound = 0;
   for (int k = 0; k < most; ++k) {
     for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
-    if (!action(w, Kw)) return 0.0;
+    if (!problem.tangent_action(u, w, Kw).ok()) return 0.0;
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
     alpha.push_back(dot(Kw, q));
     const double b = beta.empty() ? 0.0 : beta.back();
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] -= alpha.back() * q.data[i] + b * before.data[i];
     const double next = norm(Kw);
-    // Largest Ritz value and its residual bound.
-    const auto order = static_cast<Eigen::Index>(alpha.size());
-    Eigen::VectorXd diagonal = Eigen::Map<Eigen::VectorXd>(alpha.data(), order);
-    Eigen::VectorXd off = order > 1 ? Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(beta.data(), order - 1)) : Eigen::VectorXd(0);
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-    ritz.computeFromTridiagonal(diagonal, off);
-    const double value = ritz.eigenvalues()(order - 1);
-    const double residual = next * std::abs(ritz.eigenvectors()(order - 1, order - 1));
+    const auto [value, residual] = largest_ritz_value(alpha, beta, next);
     bound = value + residual;
     const bool converged = k >= (warm ? 5 : 12) && residual <= 0.02 * value;
     if (converged || k + 1 == most || next <= 1e-14 * std::abs(value)) break;
@@ -61,17 +69,39 @@ double lanczos(Problem& problem, Action&& action, ConstFieldView scale, FieldVie
   return bound;
 }
 
-}  // namespace
-
-double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
-  return lanczos(problem, [&](ConstFieldView w, FieldView Kw) { return problem.tangent_action(u, w, Kw).ok(); }, scale, vector, warm);
-}
-
-double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale) {
-  Field of_part = problem.make_field(), vector = problem.make_field();
-  copy(scale, of_part);
-  mask(part.inside(), of_part);
-  return lanczos(problem, [&](ConstFieldView w, FieldView Kw) { return part.tangent_action(u, w, Kw).ok(); }, of_part, vector, false);
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale, double enough) {
+  // Parts are small: vectors hold their entries alone.
+  Field w = problem.make_field(), Kw = problem.make_field();
+  fill_with_noise(part.inside(), 1, problem.body().places(), w);
+  std::vector<std::size_t> entries;
+  for (std::size_t k = 0; k < w.size(); ++k)
+    if (w.data()[k] != 0 && scale.data[k] != 0) entries.push_back(k);
+    else w.data()[k] = 0;
+  const std::size_t n = entries.size();
+  std::vector<double> q(n), before(n), Kq(n), alpha, beta;
+  const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    return total_over_ranks(exact_sum(n, [&](std::size_t k) { return a[k] * b[k]; }));
+  };
+  for (std::size_t k = 0; k < n; ++k) q[k] = w.data()[entries[k]];
+  const double size = std::sqrt(product(q, q));
+  if (!(size > 0)) return 0;   // nothing is free
+  for (double& value : q) value /= size;
+  constexpr int most = 80;
+  for (int step = 0;; ++step) {
+    for (std::size_t k = 0; k < n; ++k) w.data()[entries[k]] = scale.data[entries[k]] * q[k];
+    if (!part.tangent_action(u, w, Kw).ok()) return 0;
+    for (std::size_t k = 0; k < n; ++k) Kq[k] = scale.data[entries[k]] * Kw.data()[entries[k]];
+    alpha.push_back(product(Kq, q));
+    const double b = beta.empty() ? 0.0 : beta.back();
+    for (std::size_t k = 0; k < n; ++k) Kq[k] -= alpha.back() * q[k] + b * before[k];
+    const double next = std::sqrt(product(Kq, Kq));
+    const auto [value, residual] = largest_ritz_value(alpha, beta, next);
+    const bool converged = step >= 12 && residual <= 0.02 * value, below = step >= 2 && value + residual < enough;
+    if (below || converged || step + 1 == most || next <= 1e-14 * std::abs(value)) return value + residual;
+    beta.push_back(next);
+    std::swap(before, q);
+    for (std::size_t k = 0; k < n; ++k) q[k] = Kq[k] / next;
+  }
 }
 
 }  // namespace perikit

@@ -33,8 +33,8 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u) {
   return largest_eigenvalue(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0);
 }
 
-double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u) {
-  return largest_eigenvalue(problem, part, u, root_of_masses(problem));
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, double enough) {
+  return largest_eigenvalue(problem, part, u, root_of_masses(problem), enough);
 }
 
 void allow_unstable_parameter(ParameterTable& table) {

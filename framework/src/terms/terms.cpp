@@ -85,6 +85,7 @@ struct Terms::Assemblies {
 struct Terms::Failing {
   Fracture fracture;
   Field force;  ///< work field, 0 between its uses
+  std::vector<std::int32_t> ends = {};  ///< of bonds that changed in the last update
 
   Fracture::Body body(Terms& terms);
   FieldView work(ConstFieldView like, const Body& body) {
@@ -229,28 +230,40 @@ EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw
   return status(bad);
 }
 
+namespace {
+
+/// A family that is left with this share of its influence, and with a shape tensor of this condition, has gradients that are about as stiff as
+/// before: half of a family, as it is left beside a crack, is as stiff as a whole one.
+constexpr double enough_left = 0.4, round_enough = 4.0;
+
+/// Whether the gradients of the point may have become stiffer than those of whole families.
+bool may_be_stiff(const TermParts& parts, std::size_t p) {
+  const Formulation& f = parts.formulation;
+  if (f.weighted || f.order > 1) return true;   // parts of the family and moments of higher order degenerate before the shape tensor does
+  return !(parts.families->left(p) > enough_left && parts.families->condition(p) < round_enough);
+}
+
+}  // namespace
+
 GroupRings Terms::near_failed_bonds() const {
+  if (!failing_) return {};
   const Families& families = *parts_.families;
-  const Body& body = families.body();
-  const SharedBonds shared(body);
-  std::vector<std::int32_t> lost;
-  for (const std::int32_t p : body.owned())
-    if (families.lost_bonds(static_cast<std::size_t>(p))) lost.push_back(p);
-  if (communicator().largest(lost.empty() ? 0 : 1) == 0) return {};
-  GroupRings groups{families.groups_of(lost), {}, {}};
-  shared.mark(groups.inside);
-  const auto around = [&](const GroupMarks& marks) {
-    GroupMarks wider = families.around(marks);
-    shared.mark(wider);
-    return wider;
-  };
-  groups.inside = around(groups.inside);
-  groups.only = groups.inside;
+  std::vector<std::int32_t> stiff;
+  // Ranks know whole families of their own points alone.
+  for (const std::int32_t p : failing_->ends)
+    if (families.body().owns(static_cast<std::size_t>(p)) && may_be_stiff(parts_, static_cast<std::size_t>(p))) stiff.push_back(p);
+  GroupRings rings;
+  rings.inside = SharedBonds(families.body()).points_beside(stiff);
+  if (rings.inside.empty()) return {};
+  std::vector<std::int32_t> points;
+  for (std::size_t p = 0; p < rings.inside.size(); ++p)
+    if (rings.inside[p]) points.push_back(static_cast<std::int32_t>(p));
+  rings.only = families.groups_of(points);
   int steps = 2;
   for (const auto& term : terms_) steps = std::max(steps, term->steps());
-  for (int k = 1; k < steps; ++k) groups.only = around(groups.only);
-  groups.near = families.around(groups.only);
-  return groups;
+  for (int k = 1; k < steps; ++k) rings.only = families.around(rings.only);
+  rings.near = families.around(rings.only);
+  return rings;
 }
 
 EvaluationStatus Terms::tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw) {
@@ -337,7 +350,9 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
 
 BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
   if (!failing_) return {};
-  return failing_->fracture.update(u, time_step, begin, reaction, failing_->body(*this));
+  BondUpdate update = failing_->fracture.update(u, time_step, begin, reaction, failing_->body(*this));
+  failing_->ends = update.ends;
+  return update;
 }
 
 bool Terms::settling() const noexcept { return failing_ && failing_->fracture.settling(); }

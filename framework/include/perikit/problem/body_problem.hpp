@@ -18,6 +18,7 @@ namespace perikit {
 class ByteReader;
 class Companion;
 class Families;
+class NearBonds;
 class WeakSprings;
 
 /// Everything behind the operations of a problem; later members refer to earlier ones.
@@ -67,6 +68,7 @@ class BodyProblem final : public Problem {
   bool advance(double time_step, FieldView velocity = {}) override;
   std::unique_ptr<WeakeningBonds> weakening_bonds() override;
   std::unique_ptr<DamagedPart> damaged_part() override;
+  StretchRange stretches(ConstFieldView u) override;
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
@@ -162,6 +164,7 @@ class BodyProblem final : public Problem {
   std::uint64_t kept_at_ = 0;            ///< fingerprint of their displacements
   BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
   std::unique_ptr<Companion> companion_;        ///< made when asked for
+  std::unique_ptr<NearBonds> near_bonds_;       ///< made when asked for
   std::unique_ptr<WeakSprings> weak_springs_;   ///< null unless pieces are watched
 };
 

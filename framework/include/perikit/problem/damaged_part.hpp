@@ -1,13 +1,13 @@
 #pragma once
-/// The part of a body where bonds have failed.
+/// The part of a body where bonds fail.
 
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
 
-/// Points whose bonds have failed or weakened since the set-up, and what lies in their families: what failed bonds did to the stiffness, they
-/// did there. Its tangent costs as much of that of the body as it is of the body, and two families around it.
+/// Points whose bonds failed or weakened in the last update: what that did to the stiffness, it did at them. Of bodies with images all points.
+/// Its tangent costs as much of that of the body as it is of the body, and the families around it.
 class DamagedPart {
  public:
   virtual ~DamagedPart() = default;

@@ -29,6 +29,11 @@ struct ProblemValues {
   const ImageMap* images = nullptr;   ///< null: the body has none. They are not owned; their displacements are constrained
 };
 
+/// Of bonds; 1, 1 where there are none.
+struct StretchRange {
+  double least = 1, largest = 1;
+};
+
 /// Values are the same for all who look at a problem; operations may be wrapped by those who look on or interfere.
 class Problem {
  public:
@@ -93,9 +98,12 @@ class Problem {
   /// Bonds that weaken gradually, for solvers that forecast how far they do; as long as it lives, advance() leaves that to it. Null where none
   /// do, and on several ranks. The problem must outlive it.
   virtual std::unique_ptr<WeakeningBonds> weakening_bonds() = 0;
-  /// Where bonds have failed or weakened since the set-up, as they are now; null where none have, and in bodies with images. The problem
-  /// must outlive it. All ranks must call it.
+  /// Where the last update let bonds fail or weaken and the stiffness may have grown by that; null where it has not. The problem must
+  /// outlive it. All ranks must call it.
   virtual std::unique_ptr<DamagedPart> damaged_part() = 0;
+  /// The least and the largest stretch of intact bonds between neighbouring points at u: how far the body has deformed, at about a hundredth
+  /// of the cost of forces. All ranks must call it.
+  virtual StretchRange stretches(ConstFieldView u) = 0;
   /// With [damage]: the bonds as they are on this rank, to return to where a step is given up. Empty without.
   virtual std::vector<std::byte> bonds() const = 0;
   /// Bonds of `bonds`, not empty. All ranks must call it.

@@ -10,7 +10,8 @@ namespace perikit {
 /// the mask itself for statics). vector: start on entry where `warm`, rich in the top of the spectrum on return.
 /// 0 where nothing moves or u is inadmissible.
 double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm);
-/// That of the rows and columns of a part of the body, from noise: not above that of the body.
-double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale);
+/// That of the rows and columns of a part of the body, from noise: not above that of the body. Once it is known to lie below `enough`, a bound
+/// below `enough` is returned, mostly after three tangent actions.
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale, double enough = 0);
 
 }  // namespace perikit

@@ -12,8 +12,8 @@ namespace perikit {
 /// Central differences are stable up to steps of 2 over its root.
 double largest_eigenvalue(Problem& problem, ConstFieldView u);
 
-/// That of a part of the body alone: not above that of the body, and as large where failed bonds have raised it. Nothing is kept.
-double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u);
+/// That of a part of the body alone: not above that of the body. Where it is found to lie below `enough`, any bound below that. Nothing is kept.
+double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, double enough);
 
 /// Adds the key allow_unstable to the table of an explicit integrator that has a key time_step.
 void allow_unstable_parameter(ParameterTable& table);

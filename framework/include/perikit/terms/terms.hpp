@@ -48,8 +48,8 @@ struct TermParts {
   std::vector<TermMaker> further;                      ///< what acts beside the formulation
 };
 
-/// By group of eight points (internal index / 8): those that are meant, those whose evaluation points act on these, and where these need
-/// point gradients.
+/// The points that are meant, by point; and by group of eight points (internal index / 8) those whose evaluation points act on these, and where
+/// these need point gradients.
 struct GroupRings {
   std::vector<std::uint8_t> inside, only, near;
 };
@@ -69,10 +69,10 @@ class Terms {
   /// On one rank.
   EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                 FieldView force, double* energy);
-  /// The groups of points whose bonds have failed or weakened since the set-up and of what lies in their families, on all ranks
-  /// the same; empty where none have.
+  /// The points whose bonds failed or weakened in the last update, on any number of ranks the same; empty where none did, or where
+  /// their families are left with so much that their gradients are no stiffer than before.
   GroupRings near_failed_bonds() const;
-  /// The tangent of those groups alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
+  /// The tangent of those points alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
   /// anything elsewhere.
   EvaluationStatus tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw);
   /// Kw <- -d(force)/du w [N], fully overwritten.
