@@ -77,7 +77,7 @@ def main():
     print("| kinematics | kernel | " + " | ".join("horizon %g%s" % (round(r), ", turned by %d degrees" % d if d else "") for r, d in cases) + " |")
     print("|" + "---|" * (2 + len(cases)))
     for name, kinematics in KINEMATICS.items():
-        for kernel in ("constant",) if options.solid else KERNELS.get(name, ("constant", "gaussian", "cubic_spline")):
+        for kernel in ("constant",) if options.solid else KERNELS.get(name, ("constant", "inverse", "cone", "gaussian", "cubic_spline")):
             cells = []
             for ratio, degrees in cases:
                 folder = options.out / ("%s_%s_%d_%d%s" % (name.replace(", ", "_"), kernel, round(ratio), degrees, "_solid" if options.solid else ""))

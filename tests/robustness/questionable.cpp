@@ -115,11 +115,18 @@ TEST_CASE("questionable: a field that is not finite is told of") {
       run.out);
 }
 
-TEST_CASE("questionable: bonds that are so short that cracks follow the lattice") {
-  const std::string scene = plate + "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n", cubic = "--set family.influence=cubic_spline ";
-  warned(scene, cubic + "--set family.horizon_ratio=3.015",
-         "bonds are 1.29 spacings long on average, weighted by influence \"cubic_spline\": cracks follow the lattice");
-  silent(scene, cubic + "--set family.horizon_ratio=4.015");
-  silent(scene, "--set family.horizon_ratio=3.015");
-  silent(plate, cubic + "--set family.horizon_ratio=3.015");
+TEST_CASE("questionable: faces of a crack that pass through each other are told of, once") {
+  const std::string crack = "[[crack]]\nsegment = [[4, -1], [4, 6]]\n";
+  const auto run = [](const std::string& scene, const std::string& options = {}) {
+    const Result result = Desk(scene).perikit("run scene.toml -o out " + options);
+    CHECK_MESSAGE(result.status == 0, result.err);
+    return result.out;
+  };
+  const std::string pressed = run(replaced(plate, "velocity = [0.1", "velocity = [-0.5") + crack);
+  const std::string words = "faces of cracks pass through each other at ";
+  const std::size_t first = pressed.find("warning: time 0.2: " + words);
+  CHECK_MESSAGE(first != std::string::npos, pressed);
+  CHECK(contains(pressed, "warnings      1"));
+  CHECK(!contains(run(plate + crack), words));
+  CHECK(!contains(run(replaced(plate, "velocity = [0.1", "velocity = [-0.1")), words));
 }

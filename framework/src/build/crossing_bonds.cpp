@@ -6,39 +6,14 @@
 #include <optional>
 #include <vector>
 
+#include "families/regular_family.hpp"
 #include "perikit/core/rank_values.hpp"
+#include "perikit/problem/ghosts.hpp"
 #include "terms/energy_shares.hpp"
 
 namespace perikit {
 
 namespace {
-
-/// A whole family of a regular lattice with the spacing of the body.
-FamilyArrays regular_family(const Families& families) {
-  const Body& body = families.body();
-  Lattice lattice;
-  lattice.dimension = body.dimension();
-  lattice.spacing = body.spacing();
-  const auto d = static_cast<std::size_t>(body.dimension());
-  for (std::size_t a = 0; a < 3; ++a) lattice.extent[a] = a < d ? std::int64_t{1} << 20 : 1;
-  const auto offsets = family_offsets(lattice, body.horizon());
-  FamilyArrays family;
-  family.resize(body.dimension(), static_cast<int>(offsets.size()));
-  std::vector<double> r, omega(offsets.size(), 1.0);
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    double square = 0;
-    for (std::size_t a = 0; a < d; ++a) {
-      family.xi[a][k] = offsets[k][a] * body.spacing();
-      square += family.xi[a][k] * family.xi[a][k];
-    }
-    family.length[k] = std::sqrt(square);
-    family.volume[k] = body.section() * std::pow(body.spacing(), body.dimension());
-    r.push_back(std::min(1.0, family.length[k] / body.horizon()));
-  }
-  if (families.needs().influence) families.influence()->evaluate(r, omega);
-  std::copy(omega.begin(), omega.end(), family.omega.begin());
-  return family;
-}
 
 /// length(k): xi.n of bond k on the average over what is counted, 0 where it does not cross.
 template <class Length>
@@ -72,29 +47,56 @@ std::optional<CrossingBonds> mean_of_all(const std::vector<OfPoint>& mine) {
   return mean.front();
 }
 
-double ball_volume(const Body& body) {
-  constexpr double unit[] = {0, 2, std::numbers::pi, 4 * std::numbers::pi / 3};
-  return body.section() * unit[body.dimension()] * std::pow(body.horizon(), body.dimension());
+/// Whether a family has points on all sides: along the axes and their diagonals it reaches to within 1.3 spacings of the horizon. Unlike the volume of
+/// a family, that does not ask for more neighbours than points of an irregular cloud have on the mean.
+bool has_all_sides(const Body& body, const FamilyArrays& family) {
+  const int d = body.dimension(), y_reach = d > 1, z_reach = d > 2;
+  const double least = body.horizon() - 1.3 * body.spacing();
+  for (int z = -z_reach; z <= z_reach; ++z)
+    for (int y = -y_reach; y <= y_reach; ++y)
+      for (int x = -1; x <= 1; ++x) {
+        const int direction[] = {x, y, z};
+        const double length = std::sqrt(static_cast<double>(x * x + y * y + z * z));
+        if (length == 0) continue;
+        const auto reaches = [&](std::size_t k) {
+          double along = 0;
+          for (int a = 0; a < d; ++a) along += family.xi[a][k] * direction[a];
+          return along >= least * length;
+        };
+        bool reached = false;
+        for (std::size_t k = 0; k < family.far.size() && !reached; ++k) reached = reaches(k);
+        if (!reached) return false;
+      }
+  return true;
 }
 
 }  // namespace
 
-CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation) {
+CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition) {
   const Body& body = families.body();
   const int d = body.dimension();
   AlignedVector<double> share;
   // Half of the mean of |cos| over all directions: 1/4 in 3D, 1/pi in 2D, 1/2 in 1D.
   const double mean = d == 3 ? 0.25 : d == 2 ? 1 / std::numbers::pi : 0.5;
   if (!body.lattice()) {
-    std::vector<OfPoint> points;
     FamilyArrays family;
+    Field all_sides = body.make_field(1);
     for (const std::int32_t p : body.owned()) {
-      if (families.normaliser(static_cast<std::size_t>(p), BondWeight::volume) < 0.95 * ball_volume(body)) continue;
+      families.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
+      all_sides.data()[p] = has_all_sides(body, family) ? 1 : 0;
+    }
+    if (partition) Ghosts(*partition, 1).forward(all_sides);
+    // No surface cuts the family of a point of whose neighbours each has points on all sides; thin bodies have no such point.
+    std::vector<OfPoint> whole, others;
+    for (const std::int32_t p : body.owned()) {
+      if (all_sides.data()[p] == 0) continue;
       families.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
       energy_shares(formulation, d, family, share);
-      points.push_back({body.number(static_cast<std::size_t>(p)), count(family, share, [&](std::size_t k) { return mean * family.length[k]; })});
+      const bool is_whole = std::ranges::all_of(family.far, [&](std::int32_t far) { return all_sides.data()[far] != 0; });
+      (is_whole ? whole : others).push_back({body.number(static_cast<std::size_t>(p)), count(family, share, [&](std::size_t k) { return mean * family.length[k]; })});
     }
-    if (const std::optional<CrossingBonds> of_all = mean_of_all(points)) return *of_all;
+    for (const std::vector<OfPoint>& points : {whole, others})
+      if (const std::optional<CrossingBonds> of_all = mean_of_all(points)) return *of_all;
   }
   const FamilyArrays family = regular_family(families);
   energy_shares(formulation, d, family, share);

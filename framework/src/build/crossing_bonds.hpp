@@ -2,6 +2,7 @@
 /// Counting the bonds that cross a plane.
 
 #include "families/families.hpp"
+#include "perikit/body/partition.hpp"
 #include "perikit/model/formulation.hpp"
 
 namespace perikit {
@@ -13,8 +14,9 @@ struct CrossingBonds {
   double plain = 0, shares = 0;
 };
 
-/// On a lattice without jitter, for a plane along the lattice: the weakest. Else the mean over all planes and over the points
-/// whose families have at least 0.95 of the volume of a ball; of a lattice of the same spacing where there is no such point.
-CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation);
+/// On a lattice without jitter, for a plane along the lattice: the weakest. Else the mean over all planes and over the points with whole families, which
+/// no surface cuts; in thin bodies over those with points on all sides; of a lattice of the same spacing where there is no such point. partition: null
+/// where one rank has the whole body. All ranks must call it.
+CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition = nullptr);
 
 }  // namespace perikit

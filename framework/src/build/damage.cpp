@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "body/interfaces.hpp"
 #include "build/crossing_bonds.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
@@ -73,9 +74,41 @@ bool gradual(const Scene& scene, const Damage& criterion, bool quasi_static) {
   return true;
 }
 
-/// Limits of the bonds between regions: those of the weaker material for the numbers of the interface.
+/// Regions may overlap: the last one has a point, as it has its material. Side 0 is the rest.
+std::uint16_t side_of(const Scene& scene, const std::string& name) {
+  for (std::size_t r = scene.regions.size(); r-- > 0;)
+    if (scene.regions[r].set == name) return static_cast<std::uint16_t>(r + 1);
+  return 0;
+}
+
+/// Sides by point, of all points of this rank and of images.
+std::vector<std::uint16_t> find_sides(const Scene& scene, const Body& body, const ImageMap* images, const Partition* partition) {
+  Field sides = body.make_field(1);
+  for (const RegionDescription& region : scene.regions)
+    for (const std::int32_t p : body.set(region.set)) sides.data()[p] = side_of(scene, region.set);
+  if (partition) Ghosts(*partition, 1).forward(sides);
+  if (images) images->copy_from_sources(sides);
+  std::vector<std::uint16_t> side(body.stride());
+  std::transform(sides.data(), sides.data() + sides.size(), side.begin(), [](double of_point) { return static_cast<std::uint16_t>(of_point); });
+  return side;
+}
+
+/// See BodyDamage::distance.
+Field distances_from_interfaces(const Body& body, const Interfaces* interfaces) {
+  Field distance = body.make_field(1);
+  fill(infinite, distance);
+  if (!interfaces) return distance;
+  for (const Interface& interface : interfaces->all)
+    for (std::size_t k = 0; k < interface.point.size(); ++k) {
+      double& nearest = distance.data()[interface.point[k]];
+      nearest = std::min(nearest, std::abs(interface.distance[k]));
+    }
+  return distance;
+}
+
+/// Limits of the bonds between regions by the numbers of the interface, with the material of either side: the least of that side.
 void build_interfaces(const Scene& scene, const PartFactory& factory, const TermParts& parts, DamagePoint at,
-                      const ImageMap* images, const Partition* partition, BodyDamage& damage) {
+                      const ImageMap* images, BodyDamage& damage) {
   const Body& body = parts.families->body();
   const InterfaceDescription& first = scene.interfaces.front();
   const auto refuse = [](const InterfaceDescription& interface, const std::string& message) {
@@ -86,39 +119,27 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
     refuse(first, fmt::format("found with \"{}\", whose bonds weaken by more numbers than two limits; allowed: criteria that break bonds at "
                               "once, or weaken them between their limits alone", scene.damage->type));
   if (images) refuse(first, "found in a body with held faces, symmetry or periodic sides; allowed: bodies without");
-  // Regions may overlap: the last one has a point, as it has its material. Side 0 is the rest.
-  const auto side_of = [&](const std::string& name) {
-    for (std::size_t r = scene.regions.size(); r-- > 0;)
-      if (scene.regions[r].set == name) return static_cast<std::uint16_t>(r + 1);
-    return std::uint16_t{0};
-  };
-  damage.side.assign(body.stride(), 0);
-  for (const RegionDescription& region : scene.regions)
-    for (const std::int32_t p : body.set(region.set)) damage.side[static_cast<std::size_t>(p)] = side_of(region.set);
-  if (partition) {
-    Field sides = body.make_field(1);
-    std::copy(damage.side.begin(), damage.side.end(), sides.data());
-    Ghosts(*partition, 1).forward(sides);
-    std::transform(sides.data(), sides.data() + sides.size(), damage.side.begin(), [](double side) { return static_cast<std::uint16_t>(side); });
-  }
   for (const InterfaceDescription& interface : scene.interfaces) {
-    InterfaceDamage own{side_of(interface.between[0]), side_of(interface.between[1]), {infinite, infinite}};
+    InterfaceDamage own{{side_of(scene, interface.between[0]), side_of(scene, interface.between[1])}, {{{infinite, infinite}, {infinite, infinite}}}};
     const auto law = factory.damage(*interface.damage);
     if (law->traits().bits != of_body.bits)
       refuse(interface, fmt::format("found bonds that {}, unlike those of [damage]; allowed: the same for both",
                                     of_body.bits ? "weaken" : "break at once"));
     for (const std::int32_t index : body.owned()) {
       const auto p = static_cast<std::size_t>(index);
-      if (damage.side[p] != own.a && damage.side[p] != own.b) continue;
+      const auto place = std::ranges::find(own.sides, damage.side[p]);
+      if (place == own.sides.end()) continue;
+      DamageLimits& of_side = own.limits[static_cast<std::size_t>(place - own.sides.begin())];
       at.moduli = parts.laws->moduli(p);
       try {
         const DamageLimits limits = law->limits(at);
-        own.limits = {std::min(own.limits.onset, limits.onset), std::min(own.limits.failure, limits.failure)};
+        of_side = {std::min(of_side.onset, limits.onset), std::min(of_side.failure, limits.failure)};
       } catch (const std::domain_error& error) {
         refuse(interface, error.what());
       }
     }
-    for (double* limit : {&own.limits.onset, &own.limits.failure}) *limit = -communicator().largest(-*limit);
+    for (DamageLimits& of_side : own.limits)
+      for (double* limit : {&of_side.onset, &of_side.failure}) *limit = -communicator().largest(-*limit);
     damage.interfaces.push_back(own);
   }
 }
@@ -142,7 +163,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   DamagePoint at{{body.space(), body.section(), body.horizon(), {}},
                  mean_bond_length(*parts.families->influence(), body.dimension(), body.horizon())};
   if (!damage->by_stretch()) {
-    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation);
+    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation, partition);
     at.crossing = crossing.plain;
     at.crossing_shares = crossing.shares;
   }
@@ -164,7 +185,9 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     if (gradually) damage->crack_speed.data()[p] = rayleigh_speed(at.moduli, laws.density(p));
     equal = equal && limits.onset == limits.failure;
   }
-  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, partition, *damage);
+  if (!scene.interfaces.empty() || (damage->by_stretch() && !scene.regions.empty())) damage->side = find_sides(scene, body, images, partition);
+  if (damage->by_stretch() && !damage->side.empty()) damage->distance = distances_from_interfaces(body, parts.interfaces.get());
+  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, *damage);
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
   const std::array limits_of_points{&damage->onset, &damage->failure, &damage->crack_speed};

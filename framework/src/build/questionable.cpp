@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <exception>
 
 #include "build/conditions.hpp"
+#include "families/normalised_influence.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
@@ -89,48 +89,17 @@ void find_jumps(const Scene& scene, const Body& body, bool quasi_static, State& 
   }
 }
 
-/// Values at equal steps in (0, 1].
-std::array<double, 64> sampled(const InfluenceFunction& influence) {
-  std::array<double, 64> r, omega;
-  for (std::size_t k = 0; k < r.size(); ++k) r[k] = static_cast<double>(k + 1) / static_cast<double>(r.size());
-  influence.evaluate(r, omega);
-  return omega;
-}
-
 void find_no_neighbours(const Scene& scene, const Families& families, std::vector<std::string>& found) {
   const Body& body = families.body();
   if (!families.needs().influence) return;
   const double r = std::min(1.0, body.spacing() / body.horizon());
   double omega = 0;
   families.influence()->evaluate({&r, 1}, {&omega, 1});
-  const double largest = std::ranges::max(sampled(*families.influence()));
-  if (omega >= 0.01 * largest) return;
+  if (omega >= 0.01) return;   // of its largest value
   found.push_back(
       fmt::format("influence \"{}\" is {:.2g} of its largest value at the nearest neighbours, {:.4g} of the horizon away: "
                   "families are almost empty; a larger horizon helps",
-                  scene.influence->type, omega / largest, r));
-}
-
-/// Bonds that are hardly longer than the spacing know few directions, and cracks run along these (framework/docs/fracture.md,
-/// "Kernels that follow the lattice").
-void find_short_bonds(const Scene& scene, const Families& families, std::vector<std::string>& found) {
-  constexpr double least = 1.45;  // spacings
-  const Body& body = families.body();
-  if (!scene.damage || !families.needs().influence || !families.lattice() || body.dimension() == 1) return;
-  double sum = 0, weight = 0;
-  std::array<double, 1> r, omega;
-  for (const auto& offset : family_offsets(*body.lattice(), body.horizon())) {
-    double square = 0;
-    for (const auto cells : offset) square += static_cast<double>(cells) * static_cast<double>(cells);
-    r[0] = std::min(1.0, std::sqrt(square) * body.spacing() / body.horizon());
-    families.influence()->evaluate(r, omega);
-    sum += omega[0] * std::sqrt(square);
-    weight += omega[0];
-  }
-  if (sum >= least * weight) return;
-  found.push_back(fmt::format("bonds are {:.3g} spacings long on average, weighted by influence \"{}\": cracks follow the lattice; "
-                              "a larger horizon_ratio or another influence helps, or a cloud",
-                              sum / weight, scene.influence->type));
+                  scene.influence->type, omega, r));
 }
 
 }  // namespace
@@ -142,7 +111,6 @@ std::vector<std::string> questionable(const Scene& scene, const Families& famili
   find_held_loads(scene, families.body(), constraints, found);
   find_jumps(scene, families.body(), quasi_static, state, found);
   find_no_neighbours(scene, families, found);
-  find_short_bonds(scene, families, found);
   return found;
 }
 
@@ -152,9 +120,9 @@ void refuse_no_influence(const Scene& scene, const InfluenceFunction& influence)
     const ParameterValues& values = scene.influence->values;
     return InputError(values.position("type"), values.path().empty() ? "family.influence" : values.path(), message);
   };
-  std::array<double, 64> omega;
+  double largest = 0;
   try {
-    omega = sampled(influence);
+    largest = largest_influence(influence);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
@@ -162,7 +130,7 @@ void refuse_no_influence(const Scene& scene, const InfluenceFunction& influence)
   } catch (...) {
     throw refused(fmt::format("influence '{}' failed: it threw something that is no std::exception", type));
   }
-  if (std::ranges::any_of(omega, [](double value) { return value > 0; })) return;
+  if (largest > 0) return;
   throw refused(fmt::format("found \"{}\", which is positive at no distance up to the horizon: no point would have a family; allowed: an influence that is "
                             "positive somewhere",
                             type));

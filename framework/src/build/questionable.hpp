@@ -10,8 +10,7 @@
 namespace perikit {
 
 /// What a scene says that is allowed and can hardly be meant, one sentence each: cracks that cut nothing, loads on points that
-/// are held, boundaries and initial values that do not fit, an influence function that leaves out the nearest neighbours, or
-/// all but these where bonds may fail.
+/// are held, boundaries and initial values that do not fit, an influence function that leaves out the nearest neighbours.
 std::vector<std::string> questionable(const Scene& scene, const Families& families, const Constraints& constraints,
                                       bool quasi_static, State& state);
 

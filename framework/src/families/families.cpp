@@ -4,11 +4,13 @@
 
 #include "families/cloud_families.hpp"
 #include "families/lattice_families.hpp"
+#include "families/normalised_influence.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
 
 std::unique_ptr<Families> Families::make(const Body& body, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs) {
+  if (needs.influence) influence = normalised(std::move(influence));
   if (body.lattice()) return std::make_unique<LatticeFamilies>(body, std::move(influence), needs);
   return std::make_unique<CloudFamilies>(body, std::move(influence), needs);
 }

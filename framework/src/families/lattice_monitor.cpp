@@ -166,10 +166,10 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
       const Stretch<D> bond(xi, Pack(length_[s]), du);
       Pack left = weaker(own_onset, Pack::load(onset + far)) - bond.e * Pack(1 / length_[s]);
       if (!damage_.side.empty())
-        for (int k = 0; k < pack_width; ++k)
-          if (bits >> k & 1)
-            left.v[k] =
-                damage_.limits(static_cast<std::size_t>(p + k), static_cast<std::size_t>(far + k)).onset - bond.e[k] / length_[s];
+        for (int k = 0; k < pack_width; ++k) {
+          const auto here = static_cast<std::size_t>(p + k), there = static_cast<std::size_t>(far + k);
+          if (bits >> k & 1 && damage_.between_sides(here, there)) left.v[k] = damage_.limits(here, there).onset - bond.e[k] / length_[s];
+        }
       if (bits != (1u << pack_width) - 1) {
         for (int k = 0; k < pack_width; ++k)
           if (!(bits >> k & 1)) left.v[k] = never[k];

@@ -21,11 +21,6 @@ LatticeSlots::LatticeSlots(const Lattice& lattice, double horizon, const Influen
   }
   omega.assign(r.size(), 1.0);
   if (influence) influence->evaluate(r, omega);
-  // Results never depend on a factor of omega; this one keeps its sums near 1.
-  const double top = omega.empty() ? 1.0 : *std::max_element(omega.begin(), omega.end());
-  if (top > 0) {
-    for (double& w : omega) w /= top;
-  }
   ascending.resize(shifts.size());
   std::iota(ascending.begin(), ascending.end(), std::uint16_t{0});
   std::sort(ascending.begin(), ascending.end(), [&](std::uint16_t a, std::uint16_t b) { return shifts[a] < shifts[b]; });

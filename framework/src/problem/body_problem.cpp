@@ -10,6 +10,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
+#include "problem/crossed_faces.hpp"
 #include "problem/history_record.hpp"
 #include "problem/near_bonds.hpp"
 #include "problem/loose_points.hpp"
@@ -318,6 +319,16 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
   weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
   find_pieces(true);
   return weak_springs_->names();
+}
+
+std::string BodyProblem::crossed_faces() {
+  if (!parts_.fracture.damage() && body().cracks().empty()) return {};
+  CrossedFaces found = find_crossed_faces(*parts_.families, seen(state().displacement(), seen_));
+  communicator().sum({&found.points, 1});
+  if (found.points == 0) return {};
+  return fmt::format("faces of cracks pass through each other at {} points, by up to {:.2g} of the distance of both sides: bonds that have failed or are "
+                     "cut resist no pressure, and there is no contact",
+                     found.points, communicator().largest(found.deepest));
 }
 
 std::vector<std::byte> BodyProblem::bonds() const {

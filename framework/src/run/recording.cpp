@@ -362,9 +362,18 @@ void RunRecorder::write_frame(const StepReport& report) {
   }
   fields_.renew();
   ++frames_written_;
+  if (!faces_crossed_) look_for_crossed_faces(report);
   if (shared)
     if (const std::string error = first_message(shared->close()); !error.empty()) throw RunError(error);
   if (first_) writer_->end();
+}
+
+void RunRecorder::look_for_crossed_faces(const StepReport& report) {
+  const std::string crossed = simulation_.problem().crossed_faces();
+  if (crossed.empty()) return;
+  faces_crossed_ = true;
+  log(fmt::format("warning: {} {:.6g}: {}; what comes after is right only where faces that meet carry nothing", simulation_.dynamic() ? "time" : "load",
+                  report.time, crossed));
 }
 
 void RunRecorder::write_history(const StepReport& report, bool counts) {

@@ -58,7 +58,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   AlignedVector<double> share;
   screen_.limit = infinite;
   for (const std::int32_t p : body_.internal()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
-  for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.limits.onset);
+  for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.least());
   screen_.over_share = traits_.bound == ValueBound::energy_over_share;
   screen_.near.assign(body_.stride() / padding, 0);
   screen_.density.assign(body_.stride(), infinite);

@@ -125,7 +125,7 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
   if (!damage.by_stretch()) return nullptr;
   double least = std::numeric_limits<double>::max();
   for (const std::int32_t p : body_.internal()) least = std::min(least, damage.onset.data()[p]);
-  for (const InterfaceDamage& i : damage.interfaces) least = std::min(least, i.limits.onset);
+  for (const InterfaceDamage& i : damage.interfaces) least = std::min(least, i.least());
   return loop_->watch(least);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "families/regular_family.hpp"
 #include "terms/family_point.hpp"
 
 namespace perikit {
@@ -26,34 +27,6 @@ std::array<double, D> axial_stiffness(const PairKinematics& law, double modulus,
   return sum;
 }
 
-/// A whole family of a regular lattice with the spacing of the body.
-template <int D>
-FamilyArrays regular_family(const Families& families) {
-  const Body& body = families.body();
-  Lattice lattice;
-  lattice.dimension = D;
-  lattice.spacing = body.spacing();
-  lattice.extent.fill(std::int64_t{1} << 20);
-  for (std::size_t a = D; a < 3; ++a) lattice.extent[a] = 1;
-  const auto offsets = family_offsets(lattice, body.horizon());
-  FamilyArrays family;
-  family.resize(D, static_cast<int>(offsets.size()));
-  std::vector<double> r, omega(offsets.size(), 1.0);
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    double square = 0;
-    for (std::size_t a = 0; a < D; ++a) {
-      family.xi[a][k] = offsets[k][a] * body.spacing();
-      square += family.xi[a][k] * family.xi[a][k];
-    }
-    family.length[k] = std::sqrt(square);
-    family.volume[k] = body.section() * std::pow(body.spacing(), D);
-    r.push_back(std::min(1.0, family.length[k] / body.horizon()));
-  }
-  if (families.needs().influence) families.influence()->evaluate(r, omega);
-  std::copy(omega.begin(), omega.end(), family.omega.begin());
-  return family;
-}
-
 }  // namespace
 
 double weighted_volume(const FamilyArrays& family, bool whole) {
@@ -67,7 +40,7 @@ template <int D>
 Field surface_correction(const Families& families, const PairKinematics& law, const Laws& laws) {
   const Body& body = families.body();
   Field correction = body.make_field(D);
-  const FamilyArrays regular = regular_family<D>(families);
+  const FamilyArrays regular = regular_family(families);
   FamilyArrays family;
   // Pre-cracks weaken a body on purpose: the correction is that of the uncut family.
   families.each_class([&](std::span<const std::int32_t> points) {

@@ -67,7 +67,7 @@ PartDescription description() {
       .source =
           "Silling, Askari, Computers & Structures 83 (2005) 1526; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. "
           "5.6-5.8",
-      .limits = "bonds in compression never break; a bond between two materials has the smaller limit of theirs"};
+      .limits = "bonds in compression never break; a bond across two materials fails where it holds as much as bonds of either at their limit"};
   part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").positive();
   part.parameters.number("stretch", "-", "Critical stretch s_c itself.").positive();
   part.parameters.boolean("consistent", "With energy_release_rate: for bonds whose energy is shared out by the influence function (correspondence models).")

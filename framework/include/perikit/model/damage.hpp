@@ -57,8 +57,9 @@ struct BondStates {
   double* value = nullptr;  ///< to be compared with the limits; fully overwritten
 };
 
-/// b is 1 up to `onset` and 0 beyond `failure`; equal where bonds break at once. A bond has the limits of its weaker end; bonds
-/// of points that must not fail have infinite ones.
+/// b is 1 up to `onset` and 0 beyond `failure`; equal where bonds break at once. A bond has the limits of its weaker end; a limit of stretch
+/// stands for the energy of the bond, so that between two materials the stiffness of the bond itself counts (BodyDamage::limits). Bonds of points
+/// that must not fail have infinite limits.
 struct DamageLimits {
   double onset = 0, failure = 0;
 };

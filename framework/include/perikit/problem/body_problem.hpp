@@ -106,6 +106,8 @@ class BodyProblem final : public Problem {
     return parts_.fracture.summary(terms().bond_checks(), e.dissipated - e.dissipated_by_laws);
   }
   const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
+  /// Faces of cracks that have passed through each other, in words; empty: none. All ranks must call it.
+  std::string crossed_faces();
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
 

@@ -148,6 +148,7 @@ class RunRecorder final : public Observer {
   std::vector<std::string> fields_due(bool row, bool frame) const;
   bool last(std::int64_t step, double time) const;
   void write_frame(const StepReport& report);
+  void look_for_crossed_faces(const StepReport& report);
   /// The frame that was begun, open for this rank to write a share of it; null where rank 0 writes all of it.
   std::unique_ptr<SharedFile> shared_frame();
   /// Of a state that is sampled. RunError where the energies of a dynamic run are far from adding up. recorded: the state counts
@@ -192,6 +193,7 @@ class RunRecorder final : public Observer {
   double first_time_ = 0;
   double time_step_ = 0;   ///< of the last step that was reported
   std::vector<std::string> warnings_;
+  bool faces_crossed_ = false;             ///< a warning said so
   std::set<std::string> strange_fields_;   ///< that were not finite somewhere
   bool shares_frames_ = false;             ///< ranks write frames together
 };
