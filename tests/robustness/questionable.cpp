@@ -122,7 +122,8 @@ TEST_CASE("questionable: faces of a crack that pass through each other are told 
     CHECK_MESSAGE(result.status == 0, result.err);
     return result.out;
   };
-  const std::string pressed = run(replaced(plate, "velocity = [0.1", "velocity = [-0.5") + crack);
+  const std::string pressed =
+      run(replaced(plate, "velocity = [0.1", "velocity = [-0.5") + crack + "[initial]\nvelocity = [\"x > 4 ? -0.5 : 0\", 0]\n");
   const std::string words = "faces of cracks pass through each other at ";
   const std::size_t first = pressed.find("warning: time 0.2: " + words);
   CHECK_MESSAGE(first != std::string::npos, pressed);
