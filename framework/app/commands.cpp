@@ -85,6 +85,7 @@ void run(const Options& options) {
   auto line = std::make_unique<SetUpLine>(show);
   Simulation simulation(scene, *registry, [&](const std::string& step) { line->write(step); });
   line.reset();
+  simulation.tell_limits(*registry);
   const double set_up = seconds_since(start);
   const auto planning = std::chrono::steady_clock::now();
   const bool first = communicator().rank() == 0;     // which alone speaks

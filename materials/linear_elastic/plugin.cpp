@@ -21,6 +21,6 @@ PERIKIT_PLUGIN(registrar) {
                       .equations = "psi = lambda/2 (tr e)^2 + mu e:e,  e = (H + H^T)/2\n"
                                    "P = lambda tr(e) I + 2 mu e",
                       .source = "Chowdhury et al., eq. 5; Partmann et al., eq. 2.36",
-                      .limits = "small strains and small rotations only: not objective by definition"},
+                      .limits = "for small strains and rotations: not objective by definition; beyond them saint_venant_kirchhoff and hencky take the same constants"},
                      [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<LinearElastic>>(); });
 }

@@ -154,6 +154,11 @@ def cases(everything, work):
         # Steps of a given length where families are too poor for the estimate to mean anything.
         step = "\ntime_step = 0.02" if "order 2" in name and dimension == 3 else ""
         yield "%s, %dD %s" % (name, dimension, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], dimension, cloud, 'type = "verlet"\n' + short + step), ranks, threads
+    # Bars whose groups of eight points a rank's border cuts.
+    for name in KINEMATICS if everything else ("conventional", "silling", "bond_augmented"):
+        for cells in (62, 91, 140) if everything else (62,):
+            bar = scene(KINEMATICS[name], 1, False, 'type = "verlet"\nend_time = 2.0\ntime_step = 0.05', cells=[cells])
+            yield "%s, bar of %d points" % (name, cells), bar.replace("ratio = 3.015", 'ratio = 4.0\ninfluence = "cone"'), (2, 3), (1,)
     # Rows of four chunks, of which a rank has runs that begin elsewhere.
     for name in KINEMATICS if everything else ("projection", "silling"):
         if "selective" not in name and "order" not in name:

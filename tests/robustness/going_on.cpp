@@ -135,3 +135,28 @@ TEST_CASE("going on: frames and history that were changed before the checkpoint 
     digit = digit == '7' ? '8' : '7';
   });
 }
+
+TEST_CASE("going on: results of another body are refused where it differs first") {
+  const std::string from = "[initial]\nfrom = \"out/results.h5\"\n";
+  const Desk desk(plate);
+  REQUIRE(desk.perikit("run scene.toml --quiet -o out").status == 0);
+  desk.write("next.toml", plate + from);
+  CHECK(desk.perikit("check next.toml").status == 0);
+  const auto other = [&](const std::string& options, const std::string& words) {
+    const Result result = desk.perikit("check next.toml " + options);
+    CHECK(result.status == 2);
+    CHECK_MESSAGE(contains(result.err, "next.toml:"), result.err);
+    CHECK_MESSAGE(contains(result.err, words), "no '", words, "' in ", result.err);
+  };
+  // As many points of half the size; points that are shifted, in another order, without their volumes, in space.
+  other("--set body.lattice.spacing=0.5 --set body.lattice.upper=[4,2.5] --set 'sets.right=\"x > 3\"' --set 'sets.left=\"x < 1\"'",
+        "results of another body: its point 0 lies at (0.5, 0.5, 0) and has 1 m^3, that of this scene lies at (0.25, 0.25, 0) and has 0.25 m^3");
+  other("--set body.lattice.jitter=0.001", "results of another body: its point 0 lies at (0.5, 0.5, 0)");
+  other("--set body.thickness=2", "its point 0 lies at (0.5, 0.5, 0) and has 1 m^3, that of this scene lies at (0.5, 0.5, 0) and has 2 m^3");
+  other("--set body.lattice.lower=[0,0] --set body.lattice.upper=[5,8] --set 'sets.right=\"x > 3\"'", "its point 5 lies at (5.5, 0.5, 0)");
+  // What is rounded otherwise is the same body.
+  CHECK(desk.perikit("check next.toml --set body.lattice.spacing=1.00000000001").status == 0);
+  // Results that have lost the body.
+  fs::remove(desk.path("out/reference.h5"));
+  other("", "reference");
+}

@@ -131,3 +131,78 @@ TEST_CASE("questionable: faces of a crack that pass through each other are told 
   CHECK(!contains(run(plate + crack), words));
   CHECK(!contains(run(replaced(plate, "velocity = [0.1", "velocity = [-0.1")), words));
 }
+
+TEST_CASE("questionable: a box that is no multiple of the spacing") {
+  const auto box = [](const std::string& spacing, const std::string& upper) {
+    return replaced(replaced(plate, "spacing = 1.0", "spacing = " + spacing), "upper = [8, 5]", "upper = " + upper);
+  };
+  const std::string words = "the box of [body.lattice] is ";
+  warned(box("0.3", "[8, 5]"), "",
+         words + "26.6667 by 16.6667 spacings, which are not whole numbers: the body is 8.1 by 5.1 m, not 8 by 5 m; what fits: spacing = 0.25 or 0.333333");
+  warned(box("1.0", "[8, 5.2]"), "", words + "8 by 5.2 spacings, which are not whole numbers: the body is 8 by 5 m, not 8 by 5.2 m; what fits: spacing = 0.8");
+  // Two lengths without a common measure nearby.
+  warned(box("1.0", "[8, 5.0123]"), "", "what fits: no spacing near it does, upper = [8, 5]");
+  // What a spacing is rounded to, and boxes that `inside` has cut before they end.
+  silent(box("0.33333", "[8, 5]"));
+  silent(box("\"1/3\"", "[8, 5]"));
+  silent(replaced(box("1.0", "[8.3, 5]"), "lower = [0, 0]", "lower = [0, 0]\ninside = \"x < 7\""));
+  // Of a plane that is missed by one cell in x alone, on several axes, the run says so, too.
+  const Desk desk(box("1.0", "[8.4, 5]"));
+  const Result run = desk.perikit("run scene.toml -o out");
+  CHECK_MESSAGE(contains(run.out, words + "8.4 by 5 spacings"), run.out);
+}
+
+TEST_CASE("questionable: laws for small strains, and penalties that do not turn, in bodies that leave small strains and rotations") {
+  const std::string spinning = R"(format = 1
+[body]
+dimension = 2
+plane = "strain"
+[body.lattice]
+spacing = 1.0
+lower = [-4, -2]
+upper = [4, 2]
+[family]
+horizon_ratio = 2.015
+[kinematics]
+type = "conventional"
+stabilization = "silling"
+[material]
+type = "linear_elastic"
+density = 1.0
+youngs_modulus = 100.0
+poisson_ratio = 0.3
+[initial]
+displacement = ["0.02*x", "0"]
+velocity = ["-0.2*y", "0.2*x"]
+[integrator]
+type = "verlet"
+end_time = 1.0
+[output]
+frames = 4
+)";
+  const auto told = [](const std::string& scene, const std::string& options) {
+    const Desk desk(scene);
+    const Result run = desk.perikit("run scene.toml -o out " + options);
+    CHECK_MESSAGE(run.status == 0, run.err);
+    return run.out;
+  };
+  const std::string first = "warning: time 0.7", last = "warning: strains or rotations were not small in 2 of 5 frames, at most 0.2";
+  const std::string linear = told(spinning, "");
+  CHECK_MESSAGE(contains(linear, first), linear);
+  CHECK_MESSAGE(contains(linear, last), linear);
+  CHECK_MESSAGE(contains(linear, "with material \"linear_elastic\" (for small strains and rotations"), linear);
+  CHECK_MESSAGE(contains(linear, "beyond them saint_venant_kirchhoff and hencky take the same constants)"), linear);
+  // Half of the time, and a law that turns with the body.
+  CHECK(contains(told(spinning, "--set integrator.end_time=0.3"), "warnings      none"));
+  CHECK(contains(told(spinning, "--set material.type=hencky"), "warnings      none"));
+  // The penalty alone does not turn.
+  const std::string wan = told(spinning, "--set material.type=hencky --set kinematics.stabilization=wan");
+  CHECK_MESSAGE(contains(wan, "with stabilization \"wan\""), wan);
+  // Statics: strains, in the equilibrium that is found.
+  std::string pulled = replaced(plate, "velocity = [0.1, \"free\"]", "displacement = [2.0, \"free\"]");
+  pulled = replaced(pulled, "type = \"verlet\"\ntime_step = 0.02\nend_time = 1.0", "type = \"newton\"\nsteps = 4");
+  pulled = replaced(pulled, "type = \"neo_hookean\"", "type = \"linear_elastic\"");
+  CHECK_MESSAGE(contains(told(pulled, ""), "strains or rotations were not small in "), pulled);
+  // Pulled so little that strains are small.
+  CHECK(contains(told(pulled, "--set boundary.1.displacement=[0.2,0]"), "warnings      none"));
+}

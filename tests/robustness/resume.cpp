@@ -43,6 +43,59 @@ TEST_CASE("resume: a signal keeps the state, and the run goes on from it") {
   check_same_results(desk, "out", "whole");
 }
 
+TEST_CASE("resume: laws remember what happened at parts of families that are too poor for a gradient, and come back when no other is left") {
+  const std::string scene = R"(format = 1
+[body]
+dimension = 2
+plane = "strain"
+[body.lattice]
+spacing = 0.25
+lower = [0.875, -3.0]
+upper = [2.625, 0.0]
+[initial]
+velocity = ["-0.09*sin(-0.498*x + 0.851*y + 3.37)", "0.073*sin(-0.151*x + 1.036*y + 4.24)"]
+[family]
+horizon_ratio = 1.515
+influence = "inverse"
+[kinematics]
+type = "sub_horizon"
+[material]
+type = "hypoelastic"
+density = 166.65
+shear_modulus = 11156.7
+bulk_modulus = 107848.2
+[[region]]
+set = "part"
+material = { type = "hypoelastic", density = 333.3, shear_modulus = 2231.3, bulk_modulus = 21569.6 }
+[sets]
+low = "x < 1.125"
+part = "x > 1.7825"
+[damage]
+type = "max_stress"
+strength = 47.36
+no_fail = ["low"]
+gradual = true
+[integrator]
+type = "verlet"
+end_time = 1.2
+estimate = "bond_based"
+[output]
+frames = 3
+history_every = 1
+fields = ["displacement", "velocity", "damage"]
+)";
+  const Desk desk(scene);
+  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
+  CHECK(stop_after(desk, "out", 60, SIGTERM) == 1);
+  const Result last = desk.perikit("run scene.toml --resume -o out");
+  CHECK_MESSAGE(last.status == 0, last.err);
+  CHECK(contains(last.out, "resumed after step"));
+  CHECK(desk.text("out/frames/00000003.h5") == desk.text("whole/frames/00000003.h5"));
+  CHECK(lines(desk.text("out/history.csv")).back() == lines(desk.text("whole/history.csv")).back());
+  const bool same = desk.text("out/history.csv") == desk.text("whole/history.csv");
+  CHECK(same);
+}
+
 TEST_CASE("resume: another scene is refused with what differs") {
   const Desk desk(replaced(long_plate(), "end_time = 6.0", "end_time = 1.0"));
   REQUIRE(desk.perikit("run scene.toml --quiet -o out").status == 0);

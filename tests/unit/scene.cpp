@@ -299,6 +299,35 @@ TEST_CASE("constants may use others, wherever they stand") {
   CHECK(scene.constants.at("a_half") == doctest::Approx(0.5));
 }
 
+TEST_CASE("an expression may stand for any number and any integer, with constants or without") {
+  const auto replaced = [](std::string text, const std::string& from, const std::string& to) {
+    REQUIRE(text.find(from) != std::string::npos);
+    return text.replace(text.find(from), from.size(), to);
+  };
+  std::string text = replaced(bar, "dimension = 1", "dimension = \"2 - 1\"\narea = \"1/8\"");
+  text = replaced(text, "spacing = 0.1, lower = [0]", "spacing = \"1/4\", jitter = \"0.1\", seed = \"3/0.1\", lower = [\"-1/2\"]");
+  text = replaced(text, "horizon = 0.3", "horizon = \"sqrt(0.25)\"");
+  text += "[sets]\nfirst = { points = [\"2 - 2\"] }\nlast = { nearest = [\"1/1\"] }\n";
+  text += "[output]\ntimes = [0, \"1/2\"]\nhistory_every = \"2*5\"\n[run]\nthreads = \"1 + 1\"\n";
+  const Scene scene = parse(text, {.overrides = {"integrator = { type = \"newton\", steps = \"20/2\", tolerance = \"1/1024\" }", "body.lattice.upper.0=3/2"}});
+  CHECK(scene.body.dimension == 1);
+  CHECK(scene.body.section == 0.125);
+  CHECK(scene.body.lattice->spacing == 0.25);
+  CHECK(scene.body.lattice->jitter == 0.1);
+  CHECK(scene.body.lattice->seed == 30);
+  CHECK(scene.body.lattice->lower[0] == -0.5);
+  CHECK(scene.body.lattice->upper[0] == 1.5);
+  CHECK(scene.horizon == 0.5);
+  CHECK(scene.sets[0].points == std::vector<std::int64_t>{0});
+  CHECK(*scene.sets[1].nearest == std::array<double, 3>{1, 0, 0});
+  CHECK(scene.output.times == std::vector<double>{0, 0.5});
+  CHECK(scene.output.history_every == 10);
+  CHECK(scene.threads == 2);
+  CHECK(scene.integrator->values.integer("steps") == 10);
+  CHECK(scene.integrator->values.number("tolerance") == 1.0 / 1024);
+  CHECK(parse(std::string(bar) + "[constants]\na = \"1/4\"\nb = \"2\"\n").constants == Constants{{"a", 0.25}, {"b", 2.0}});
+}
+
 TEST_CASE("values without t ramp in quasi-static runs unless the scene says otherwise") {
   std::string text = cook;
   const std::string load = "force = [0, 1.0]\n", timed = "traction = [\"t\", 0]\n";

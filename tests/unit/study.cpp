@@ -214,6 +214,16 @@ TEST_CASE("the table holds values, quantities, errors and what went wrong; a fai
   CHECK(fs::exists(folder.path / "out" / "runs" / "4" / "history.csv"));
 }
 
+TEST_CASE("values that are expressions are numbers in the table and the picture") {
+  StudyFolder folder;
+  const std::string text = replaced(study_text, "constants.k = [1, 2, 4]", "body.lattice.spacing = [1, \"k/4\", \"1/8\"]");
+  const StudyTable table = run_study(folder.parse(text), folder.parts, {}, folder.path / "out", pretend, silent);
+  std::vector<double> spacings;
+  for (const StudyRow& row : table.rows) spacings.push_back(table.number(row, "body.lattice.spacing").value_or(-1));
+  CHECK(spacings == std::vector<double>{1, 0.5, 0.125, 1, 0.5, 0.125});
+  CHECK(!table.number(table.rows[0], "kinematics.type"));
+}
+
 TEST_CASE("runs side by side give the table of runs one by one") {
   StudyFolder folder;
   const Study study = folder.parse(replaced(study_text, "\"baqp\"]", "\"baqp\", \"bapq\"]"));

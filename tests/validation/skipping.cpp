@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <string_view>
 
@@ -223,6 +224,60 @@ TEST_CASE("skipping: when bonds have failed, forces are renewed near them alone,
         CHECK_MESSAGE(some.counting.work.stresses < every.counting.work.stresses, some.counting.work.stresses.load(), " of ",
                       every.counting.work.stresses.load(), " evaluation points");
     }
+}
+
+namespace {
+
+/// A block that is shaken until bonds fail.
+std::string shaken(int dimension, const std::string& kinematics, const std::string& damage, const std::string& more = "") {
+  const bool plane = dimension == 2;
+  return fmt::format("format = 1\nkinematics = {}\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 0.02\nlower = [{}]\nupper = [{}]\n{}\n", kinematics,
+                     dimension, plane ? "plane = \"strain\"\n" : "", plane ? "0, 0" : "0, 0, 0", plane ? "0.16, 0.22" : "0.12, 0.1, 0.08", more) +
+         fmt::format("[family]\nhorizon_ratio = {}\n[material]\ntype = \"neo_hookean\"\ndensity = 174.0\nyoungs_modulus = 14000.0\npoisson_ratio = 0.3\n", plane ? "2.515" : "2.015") +
+         fmt::format("[initial]\nvelocity = [\"0.025*sin(19*x + 12*y + 1.6)\", \"-0.023*sin(10*x - 5*y - 2.5)\"{}]\n", plane ? "" : ", \"0.02*sin(14*z - 9*x)\"") +
+         fmt::format("[damage]\n{}\n[integrator]\ntype = \"verlet\"\nend_time = {}\n[output]\nframes = 1\n", damage, plane ? "0.1" : "0.06");
+}
+
+}  // namespace
+
+TEST_CASE("skipping: the same bonds fail, bit for bit, whatever bonds fail by") {
+  const std::string released = "type = \"critical_energy\"\nenergy_release_rate = 0.002\n", bare = "\"conventional\"";
+  struct Case {
+    int dimension;
+    std::string kinematics, damage, more;
+  };
+  std::vector<Case> cases{{2, bare, released + "softening = 4.0", ""},
+                          {2, bare, released + "second_law = false", ""},
+                          {3, bare, released, ""},
+                          {3, "\"bond_augmented\"", released, ""},
+                          {2, "\"bond_augmented\"", released + "softening = 4.0\nsecond_law = false", ""},
+                          {2, "\"baqp\"", released + "softening = 2.0", ""},
+                          {3, "\"baqp\"", released, ""},
+                          {2, "\"projection\"", released + "gradual = true", ""},
+                          {2, "{type=\"conventional\",stabilization=\"silling\"}", released, ""},
+                          {2, "{type=\"conventional\",stabilization=\"wan\"}", released + "softening = 4.0", ""},
+                          {2, "\"sub_horizon\"", released, ""},
+                          {2, "\"bond_associated\"", released, ""},
+                          {2, "{type=\"selective\",base=\"baqp\"}", released, ""},
+                          {2, "{type=\"conventional\",order=2}", released, ""},
+                          {2, "\"baqp\"", released + "energy = \"held\"", ""},
+                          {2, "{type=\"conventional\",stabilization=\"silling\"}", released + "energy = \"held\"\nsoftening = 4.0", ""},
+                          {2, "\"bond_based\"", released + "softening = 4.0", ""},
+                          {2, "\"ordinary\"", released, ""},
+                          {2, "\"baqp\"", "type = \"max_stress\"\nstrength = 25.0", ""},
+                          {2, "\"projection\"", "type = \"smooth_degradation\"\nstretch_min = 0.001\nstretch = 0.004", ""}};
+  for (const std::string kinematics : {"\"conventional\"", "\"baqp\"", "\"bond_augmented\""}) cases.push_back({2, kinematics, released, "jitter = 0.1"});
+  for (const Case& c : cases) {
+    INFO(c.dimension, "D ", c.kinematics, ", ", c.damage, ", ", c.more);
+    const std::string text = shaken(c.dimension, c.kinematics, c.damage, c.more);
+    Run some(text, {"run.skip=true"}), every(text, {"run.skip=false"});
+    const std::vector<double> end = some.end(), expected = every.end();
+    CHECK(end == expected);
+    const BondChecks checks = some.problem().terms().bond_checks();
+    CHECK(checks.failed + checks.weakened > 0);
+    const auto same = [](const BondChange& a, const BondChange& b) { return a.bond == b.bond && a.integrity == b.integrity; };
+    CHECK(std::ranges::equal(some.problem().terms().changed_bonds(), every.problem().terms().changed_bonds(), same));
+  }
 }
 
 TEST_CASE("skipping: points held at rest have no forces beyond the reach of free points, and the reactions are the same, bit for bit") {

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
 #include "perikit/core/rank_values.hpp"
+#include "output/result_file.hpp"
 #include "perikit/output/recorder.hpp"
 
 namespace perikit {
@@ -136,10 +138,42 @@ void fill(const std::vector<std::optional<Expression>>& values, const Body& body
       field.component(static_cast<int>(c))[p] = (*values[c])(body.position(static_cast<std::size_t>(p)));
 }
 
+/// Points of the same body have the same places up to this share of their distance, and the same volumes up to this share: what a
+/// generator of points that runs again, and cells that are cut on other ranks, round otherwise.
+constexpr double same_place = 1e-6;
+
+/// Refuses results of another body. All ranks must call it: they look at their own points, and the first one in input order that
+/// differs is told.
+void refuse_other_body(const Scene& scene, const Body& body, std::span<const std::int64_t> numbers) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double mine = none;
+  std::string message;
+  ResultFile(*scene.initial_from).each_point(numbers, [&](std::size_t k, std::span<const double> there, double volume) {
+    if (mine < none) return;
+    const auto p = static_cast<std::size_t>(body.owned()[k]);
+    const Point x = body.position(p);
+    double square = 0, farthest = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      square += (there[c] - x[c]) * (there[c] - x[c]);
+      farthest = std::max(farthest, std::abs(x[c]));
+    }
+    const double distance = std::sqrt(square), rounding = 8 * std::numeric_limits<double>::epsilon() * farthest;
+    if (distance <= same_place * body.spacing() + rounding && std::abs(volume - body.volume(p)) <= same_place * body.volume(p)) return;
+    mine = static_cast<double>(numbers[k]);
+    message = fmt::format("found {}, results of another body: its point {} lies at ({:.6g}, {:.6g}, {:.6g}) and has {:.6g} m^3, that of this scene lies at ({:.6g}, {:.6g}, {:.6g}) and has "
+                          "{:.6g} m^3; allowed: results of the same points, with the same volumes and in the same order",
+                          scene.initial_from->string(), numbers[k], there[0], there[1], there[2], volume, x[0], x[1], x[2], body.volume(p));
+  });
+  const double first = -communicator().largest(-mine);
+  if (first < none) throw InputError(scene.initial_from_position, "initial.from", first_message(mine == first ? message : ""));
+}
+
 /// The last frame of an earlier run of the same points.
-void start_from(const std::filesystem::path& results, const Body& body, State& state) {
+void start_from(const Scene& scene, const Body& body, State& state) {
+  const std::filesystem::path& results = *scene.initial_from;
   const LastFrame frame(results, body.points_of_all_ranks());
   const std::vector<std::int64_t> numbers = body.numbers(body.owned());
+  refuse_other_body(scene, body, numbers);
   const auto copy = [&](const std::string& name, FieldView field) {
     frame.each_row(name, numbers, [&](std::size_t k, std::span<const double> row) {
       for (int c = 0; c < field.components; ++c) field.component(c)[body.owned()[k]] = row[static_cast<std::size_t>(c)];
@@ -164,7 +198,7 @@ void set_initial_state(const Scene& scene, const Body& body, const Constraints& 
         return scene.initial_displacement.empty() ? 0.0 : (*scene.initial_displacement[static_cast<std::size_t>(c)])(x);
       },
       !quasi_static, state.displacement());
-  if (scene.initial_from) start_from(*scene.initial_from, body, state);
+  if (scene.initial_from) start_from(scene, body, state);
   if (!scene.initial_displacement.empty()) fill(scene.initial_displacement, body, state.displacement());
   if (!scene.initial_velocity.empty()) fill(scene.initial_velocity, body, state.velocity());
 }

@@ -37,9 +37,13 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
       if (!p.intact(s, l)) continue;
       const double w = p.b(s, l) * slots.omega[s];
       intact_omega += w;
-      for (int a = 0; a < d; ++a) moment[a] += w * offset[static_cast<std::size_t>(a)];
       add_shape(w, K);
     }
+    // Of a bond and the one opposite together, so that whole families have none, exactly: a chunk that is whole may be cut where a part of
+    // the body ends, and its whole families must not show it.
+    const auto weight = [&](std::size_t s) { return live_mask[s] >> l & 1 ? p.b(s, l) * slots.omega[s] : 0.0; };
+    for (std::size_t s = 0; s < slots.half; ++s)
+      for (int a = 0; a < d; ++a) moment[a] += (weight(s) - weight(slots.reverse(s))) * slots.offsets[s][static_cast<std::size_t>(a)];
     const bool invertible = invert_shape(d, K, inverse, &condition), regular = needs_.shapes ? invertible : intact_omega > 0;
     p.singular = static_cast<std::uint8_t>((p.singular & ~(1u << l)) | (live && !regular ? 1u << l : 0u));
     for (int c = 0; c < 6; ++c) p.inverse[c][l] = live ? inverse[c] : 0.0;
@@ -90,9 +94,6 @@ std::uint8_t LatticeFamilies::cut_bonds(const LatticeChunk& chunk, std::uint8_t 
 void LatticeFamilies::make_patterns() {
   whole.mask.assign(slots.size(), 0xff);
   finish_pattern(whole, whole.mask, true);
-  for (int l = 0; l < chunk_points; ++l) {
-    for (auto& moment : whole.moment) moment[l] = 0.0;   // exactly, not to rounding
-  }
   std::unordered_map<std::string, std::int32_t> known;
   std::vector<std::uint8_t> live_mask, mask;
   for (LatticeChunk& chunk : tiles.chunks) {
@@ -199,6 +200,14 @@ LatticePattern& LatticeFamilies::own_pattern(LatticeChunk& chunk) {
   return patterns[static_cast<std::size_t>(chunk.pattern)];
 }
 
+unsigned LatticeFamilies::broken_lanes(const LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask) const {
+  unsigned lanes = 0;
+  for (std::size_t s = 0; s < slots.size(); ++s)
+    for (int l = 0; l < chunk_points; ++l)
+      if (live_mask[s] >> l & 1 && pattern.b(s, l) != 1) lanes |= 1u << l;
+  return lanes;
+}
+
 std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange> changes) {
   std::vector<std::int32_t> ends;
   const auto set = [&](std::int32_t point, std::size_t slot, double b) {
@@ -212,7 +221,6 @@ std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange>
     }
     if (!p.integrity.empty()) p.integrity[slot * chunk_points + lane] = b;
     p.mask[slot] = static_cast<std::uint8_t>(b == 0 ? p.mask[slot] & ~bit : p.mask[slot] | bit);
-    p.irregular |= bit;
     ends.push_back(point);
   };
   for (const auto& [bond, integrity] : changes) {
@@ -228,7 +236,10 @@ std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange>
     unsigned lanes = 0;
     for (; k < ends.size() && ends[k] < first + chunk_points; ++k) lanes |= 1u << (ends[k] - first);
     live_masks(first, live_mask);
-    finish_pattern(own_pattern(tiles.chunks[static_cast<std::size_t>(tiles.chunk_of(first))]), live_mask, false, lanes);
+    LatticePattern& pattern = own_pattern(tiles.chunks[static_cast<std::size_t>(tiles.chunk_of(first))]);
+    // A bond that was lowered on trial is whole again: nothing may depend on such a trial, of which no checkpoint knows.
+    pattern.irregular = static_cast<std::uint8_t>((pattern.irregular & ~lanes) | (lanes & broken_lanes(pattern, live_mask)));
+    finish_pattern(pattern, live_mask, false, lanes);
   }
   return ends;
 }

@@ -90,6 +90,8 @@ class LatticeFamilies final : public Families {
   /// Live cells of a chunk, and for each slot those whose far ends are live too.
   std::uint8_t live_masks(std::int64_t first, std::vector<std::uint8_t>& live_mask) const;
   LatticePattern& own_pattern(LatticeChunk& chunk);
+  /// Lanes with a bond between live points that is not whole.
+  unsigned broken_lanes(const LatticePattern& pattern, const std::vector<std::uint8_t>& live_mask) const;
   std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend_bonds() override;
   void make_room() override {}

@@ -45,16 +45,16 @@ bool find_laminate(int dimension, const double (&gradient)[interface_values][3],
   return make_laminate(dimension, of(InterfaceValue::plus), of(InterfaceValue::minus), out);
 }
 
-LaminateFinder::LaminateFinder(int dimension, bool once_for_both, int keep)
-    : dimension_(dimension), keep_(keep), once_(once_for_both), of_thread_(static_cast<std::size_t>(thread_count())) {}
+LaminateFinder::LaminateFinder(int dimension, bool once_for_both, int keep, bool with_weightless)
+    : dimension_(dimension), keep_(keep), once_(once_for_both), with_weightless_(with_weightless), of_thread_(static_cast<std::size_t>(thread_count())) {}
 
 void LaminateFinder::add(int n, const double* H, const BatchScratch& s) {
   std::vector<Found>& found = of_thread_[static_cast<std::size_t>(thread_index())];
   for (int l = 0; l < n; ++l) {
     std::int64_t number = s.first_number >= 0 ? s.first_number + l : s.number[l];
     // Numbers of bonds that are evaluated once come from one of their ends, whatever the order of threads.
-    // Lanes without a weight are there to fill a batch.
-    if (number < 0 || s.weight[l] == 0 || (once_ && s.owner[l] >= s.far[l])) continue;
+    // Most lanes without a weight are there to fill a batch.
+    if (number < 0 || (s.weight[l] == 0 && !with_weightless_) || (once_ && s.owner[l] >= s.far[l])) continue;
     if (s.far_number > 0 && number >= s.far_number) number -= s.far_number;
     Found entry{number, s.owner[l], s.far[l], s.far_number > 0 ? number + s.far_number : -1, {}};
     bool kept = true;

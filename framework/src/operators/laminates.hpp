@@ -57,8 +57,8 @@ class LaminateFinder {
   };
 
   /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be
-  /// there.
-  LaminateFinder(int dimension, bool once_for_both, int keep);
+  /// there. with_weightless: evaluation points that have no weight at present are found, too.
+  LaminateFinder(int dimension, bool once_for_both, int keep, bool with_weightless = false);
   /// H: before the selective map.
   void add(int n, const double* H, const BatchScratch& s);
   /// In ascending order of numbers.
@@ -66,7 +66,7 @@ class LaminateFinder {
 
  private:
   int dimension_, keep_;
-  bool once_;
+  bool once_, with_weightless_;
   std::vector<std::vector<Found>> of_thread_;
 };
 

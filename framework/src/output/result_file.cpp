@@ -52,4 +52,14 @@ std::string ResultFile::frame_group(std::int64_t index) const {
   return group;
 }
 
+void ResultFile::each_point(std::span<const std::int64_t> numbers,
+                            const std::function<void(std::size_t, std::span<const double>, double)>& use) const {
+  for (const char* name : {"/reference/position", "/reference/volume"})
+    if (!source_.contains(name))
+      throw InputError({path_.string(), 0, 0}, name, "reference.h5 beside it is missing or damaged, so that nothing says of which body these results are");
+  std::vector<double> volumes(numbers.size());
+  source_.each_row("/reference/volume", numbers, [&](std::size_t k, std::span<const double> row) { volumes[k] = row[0]; });
+  source_.each_row("/reference/position", numbers, [&](std::size_t k, std::span<const double> row) { use(k, row, volumes[k]); });
+}
+
 }  // namespace perikit

@@ -30,6 +30,10 @@ class ResultFile {
   /// Path of the group of a frame. Throws InputError naming the frames that are there.
   std::string frame_group(std::int64_t index) const;
   const hdf5::Source& source() const noexcept { return source_; }
+  /// use(k, position, volume) of the point numbers[k] of the body of the run, for ascending numbers. Throws InputError where the results
+  /// have lost them.
+  void each_point(std::span<const std::int64_t> numbers,
+                  const std::function<void(std::size_t k, std::span<const double> position, double volume)>& use) const;
 
  private:
   std::filesystem::path path_;

@@ -5,10 +5,79 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "perikit/body/lattice.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
+
+namespace {
+
+/// "a by b"
+std::string sizes(std::span<const double> values) {
+  std::string text;
+  for (const double value : values) text += fmt::format("{}{:.6g}", text.empty() ? "" : " by ", value);
+  return text;
+}
+
+/// How far n is from a whole number.
+double from_whole(double n) { return std::abs(n - std::round(n)); }
+
+/// A box is a multiple of the spacing where it is so up to this share of it, so that the digits that a spacing was rounded to count for
+/// nothing.
+constexpr double whole_box = 1e-3;
+
+/// The nearest spacings below and above that fit each of these lengths. Those below are at most half as long, those above twice.
+std::vector<double> fitting_spacings(std::span<const double> lengths, double spacing) {
+  const double shortest = std::ranges::min(lengths), cells = shortest / spacing;
+  const auto fits = [&](double n) {
+    return std::ranges::all_of(lengths, [&](double length) { return from_whole(length / shortest * n) < whole_box; });
+  };
+  std::vector<double> found;
+  for (double n = std::floor(cells) + 1; n <= 2 * cells + 1 && n <= cells + 1e5; ++n)
+    if (fits(n)) {
+      found.push_back(shortest / n);
+      break;
+    }
+  for (double n = std::floor(cells); n >= 1 && n >= cells / 2; --n)
+    if (fits(n)) {
+      found.push_back(shortest / n);
+      break;
+    }
+  return found;
+}
+
+/// The body of a lattice consists of whole cells: where its box does not, it is another body.
+void find_cut_cells(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  if (!scene.body.lattice) return;
+  const LatticeDescription& lattice = *scene.body.lattice;
+  const auto d = static_cast<std::size_t>(body.dimension());
+  std::vector<double> asked, cells, got;
+  bool differs = false;
+  for (std::size_t a = 0; a < d; ++a) {
+    asked.push_back(lattice.upper[a] - lattice.lower[a]);
+    cells.push_back(asked.back() / lattice.spacing);
+    got.push_back(static_cast<double>(lattice_cells(lattice.lower[a], lattice.upper[a], lattice.spacing)) * lattice.spacing);
+    if (from_whole(cells.back()) <= whole_box) continue;
+    // `inside` may cut the body before its box ends.
+    double last = -std::numeric_limits<double>::infinity();
+    for (const std::int32_t p : body.owned()) last = std::max(last, body.position(static_cast<std::size_t>(p))[a]);
+    differs |= communicator().largest(last) > lattice.lower[a] + got.back() - 0.999 * lattice.spacing;
+  }
+  if (!differs) return;
+  std::string remedy;
+  for (const double spacing : fitting_spacings(asked, lattice.spacing)) remedy += fmt::format("{}{:.6g}", remedy.empty() ? "spacing = " : " or ", spacing);
+  if (remedy.empty()) {
+    std::string upper;
+    for (std::size_t a = 0; a < d; ++a) upper += fmt::format("{}{:.6g}", a > 0 ? ", " : "", lattice.lower[a] + got[a]);
+    remedy = fmt::format("no spacing near it does, upper = [{}]", upper);
+  }
+  lines.push_back(fmt::format("the box of [body.lattice] is {} spacings, which are not whole numbers: the body is {} m, not {} m; what fits: {}",
+                              sizes(cells), sizes(got), sizes(asked), remedy));
+}
+
+}  // namespace
 
 std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) {
   std::vector<std::string> lines;
@@ -17,6 +86,7 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
     lines.push_back(
         "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
         "the body is too soft by 1 to 12 %, however fine it is");
+  find_cut_cells(scene, body, lines);
   double farthest = 0;
   for (const std::int32_t p : body.internal())
     for (const double x : body.position(static_cast<std::size_t>(p))) farthest = std::max(farthest, std::abs(x));

@@ -7,8 +7,8 @@
 
 namespace perikit {
 
-/// What makes the results of a sound scene doubtful, one line each: points at random that nothing balances, bodies thinner than a
-/// family.
+/// What makes the results of a sound scene doubtful, one line each: points at random that nothing balances, boxes that are no multiple
+/// of the spacing, bodies thinner than a family.
 std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem);
 
 }  // namespace perikit

@@ -24,6 +24,7 @@
 #include "run/gathering.hpp"
 #include "run/reduction.hpp"
 #include "run/run_folder.hpp"
+#include "run/small_strains.hpp"
 #include "run/whole_reference.hpp"
 
 namespace perikit {
@@ -239,6 +240,7 @@ std::vector<std::string> RunRecorder::fields_due(bool row, bool frame) const {
   for (const HistoryDescription& record : simulation_.scene().output.history)
     if (row) wanted.push_back(record.quantity);
   if (frame) wanted.insert(wanted.end(), frame_fields_.begin(), frame_fields_.end());
+  if (frame && simulation_.small_strains().watched()) wanted.emplace_back("deformation_gradient");
   return wanted;
 }
 
@@ -258,6 +260,8 @@ void RunRecorder::step_done(const StepReport& report) {
   const bool row = history_due(report.step), frame = frame_due(report.step, report.time);
   if (row || frame || stopping_) watch_energies(report, row || frame);
   fields_.expect(fields_due(row || stopping_, frame || stopping_));
+  if (simulation_.small_strains().watched() && (frame || stopping_))
+    if (const std::string warning = simulation_.small_strains().look(fields_, report.time); !warning.empty()) log(warning);
   if (row || stopping_) write_history(report, row);
   if (frame || stopping_) write_frame(report);
   done_.history_rows += row;

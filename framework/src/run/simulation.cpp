@@ -11,6 +11,7 @@
 #include "perikit/core/parallel.hpp"
 #include "run/doubts.hpp"
 #include "run/earlier_results.hpp"
+#include "run/small_strains.hpp"
 
 namespace perikit {
 
@@ -28,11 +29,16 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory, WorkSteps
                     scene_.integrator->type));
   }
   if (!problem_->terms().has_gradients()) refuse_gradients();
+  small_strains_ = std::make_unique<SmallStrains>(scene_, factory, *problem_);
   carried_ = carry_from_earlier_run(scene_, *problem_);
   evaluate_conditions();
   watch_pieces();
   set_up_.end();
 }
+
+Simulation::~Simulation() = default;
+
+void Simulation::tell_limits(PartCatalogue& parts) { small_strains_->tell_limits(parts); }
 
 void Simulation::watch_pieces() {
   if (!traits_.quasi_static) {

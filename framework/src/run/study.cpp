@@ -66,6 +66,16 @@ std::string placed(std::string message, const Study& study) {
   return message;
 }
 
+/// A value that is an expression is a number, too, once the constants of the scene are known: pictures place it by it.
+void evaluate(StudyValue& value, const Scene& scene) {
+  if (value.number || !value.toml.starts_with('"')) return;
+  try {
+    const Expression expression(value.shown, scene.constants, false, {}, "");
+    if (!expression.depends_on_position()) value.number = expression({});
+  } catch (const InputError&) {  // the name of a part, say
+  }
+}
+
 Planned plan(const Study& study, const std::vector<std::size_t>& combination, PartCatalogue& parts, SceneOptions options) {
   Planned planned;
   for (std::size_t k = 0; k < study.keys.size(); ++k) {
@@ -81,6 +91,7 @@ Planned plan(const Study& study, const std::vector<std::size_t>& combination, Pa
     planned.row.reason = placed(error.what(), study);
     return planned;
   }
+  for (StudyValue& value : planned.row.values) evaluate(value, *planned.scene);
   for (const StudyQuantity& quantity : study.quantities) {
     check_source(quantity, *planned.scene);
     planned.references.push_back(reference_of(quantity, *planned.scene));

@@ -23,8 +23,9 @@ std::array<double, 3> coordinates(const std::vector<double>& values) {
 void SceneReader::read_body(const toml::table& root) {
   const toml::table* body = section(root, "body", "body", true);
   if (!body) return;
-  const auto* dimension = body->get("dimension") ? body->get("dimension")->as_integer() : nullptr;
-  if (dimension && dimension->get() >= 1 && dimension->get() <= 3) reader_.dimension = static_cast<int>(dimension->get());
+  const toml::node* given = body->get("dimension");
+  const auto dimension = given ? reader_.whole_number(*given) : std::nullopt;
+  if (dimension && *dimension >= 1 && *dimension <= 3) reader_.dimension = static_cast<int>(*dimension);
 
   // Keys of another dimension are known words: say so instead of calling them unknown.
   std::vector<std::string> others{"lattice", "points"};

@@ -24,6 +24,7 @@ void SceneReader::read_initial(const toml::table& root) {
   fill("velocity", scene_.initial_velocity);
   scene_.initial_velocity_position = values.position("velocity");
   scene_.initial_from = existing_file(values, "from");
+  scene_.initial_from_position = values.position("from");
   writer_.header("initial");
   writer_.lines(table, values);
 }

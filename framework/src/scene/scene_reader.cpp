@@ -117,12 +117,12 @@ void SceneReader::read_head(const toml::table& root) {
   writer_.lines(table, values);
 }
 
-/// A number, or an expression that names something: constants that are known already, pi, functions. What is wrong counts as 0,
-/// so that its uses are not reported as well.
+/// A number, or an expression in constants that are known already. What is wrong counts as 0, so that its uses are not reported as
+/// well.
 double SceneReader::constant(const std::string& name, const toml::node& node) {
   const std::string path = join_path("constants", name);
   const std::optional<std::string> text = node.value<std::string>();
-  if (!text || names_of_expression(*text).empty()) {
+  if (!text) {
     const auto value = reader_.value(Parameter{}, node, path);
     return value ? std::get<double>(*value) : 0.0;
   }

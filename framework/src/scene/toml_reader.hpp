@@ -38,6 +38,8 @@ class TomlReader {
   /// A part of known type from its other keys. `type_path`, `at`: where the type stands.
   std::shared_ptr<const PartValues> part(Kind kind, const std::string& type, const toml::table& table, const std::string& path,
                                          const std::string& type_path, const SourcePosition& at);
+  /// What an integer, or an expression that has the value of one, says; nothing, and no error, for all else.
+  std::optional<std::int64_t> whole_number(const toml::node& node) const;
   /// One value; nothing after an error.
   std::optional<ParameterValue> value(const Parameter& parameter, const toml::node& node, const std::string& path);
 
@@ -49,7 +51,9 @@ class TomlReader {
   std::vector<std::string> check_group(const ParameterGroup& group, const ParameterTable& parameters, const toml::table& table,
                                        const SourcePosition& at, const std::string& path);
   void refuse_value(const Parameter& parameter, const toml::node& node, const std::string& path);
-  /// A number, or the value of an expression in `constants`.
+  /// Refuses what is no number, or none that is allowed. value: of an expression that has one.
+  void refuse_number(const Parameter& parameter, const toml::node& node, const std::string& path, std::optional<double> value);
+  /// A number, or the value of an expression in `constants`, which may be empty.
   std::optional<double> number(const Parameter& parameter, const toml::node& node, const std::string& path);
   std::optional<double> of_constants(const std::string& text, const toml::node& node, const std::string& path) const;
   std::optional<std::int64_t> integer(const Parameter& parameter, const toml::node& node, const std::string& path);

@@ -55,11 +55,9 @@ std::optional<double> TomlReader::number(const Parameter& parameter, const toml:
   std::optional<double> number;  // toml++'s value<double>() would take more than these two
   if (const auto* v = node.as_floating_point()) number = v->get();
   if (const auto* v = node.as_integer()) number = static_cast<double>(v->get());
-  const auto* text = constants.empty() ? nullptr : node.as_string();
-  if (text) number = of_constants(text->get(), node, path);
+  if (const auto* v = node.as_string()) number = of_constants(v->get(), node, path);
   if (number && std::isfinite(*number) && in_range(parameter, *number)) return number;
-  const std::string value = number && text ? fmt::format(" = {}", toml_number(*number)) : "";
-  refuse(node, path, fmt::format("found {}{}; allowed: {}{}", found(node), value, allowed(parameter), text ? ", or an expression in [constants]" : ""));
+  refuse_number(parameter, node, path, number);
   return std::nullopt;
 }
 
@@ -72,10 +70,31 @@ std::optional<double> TomlReader::of_constants(const std::string& text, const to
   }
 }
 
+std::optional<std::int64_t> TomlReader::whole_number(const toml::node& node) const {
+  if (const auto* v = node.as_integer()) return v->get();
+  const auto* text = node.as_string();
+  const std::optional<double> value = text ? of_constants(text->get(), node, "") : std::nullopt;
+  if (!value) return std::nullopt;
+  constexpr double most = 9007199254740992;  // 2^53: beyond it a double skips integers
+  const double whole = std::round(*value);   // 3/0.1 is 30 but for rounding
+  if (!(std::abs(whole) <= most) || std::abs(*value - whole) > 1e-12 * std::abs(whole)) return std::nullopt;
+  return static_cast<std::int64_t>(whole);
+}
+
 std::optional<std::int64_t> TomlReader::integer(const Parameter& parameter, const toml::node& node, const std::string& path) {
-  if (const auto* v = node.as_integer(); v && in_range(parameter, static_cast<double>(v->get()))) return v->get();
-  refuse_value(parameter, node, path);
+  const std::optional<std::int64_t> number = whole_number(node);
+  if (number && in_range(parameter, static_cast<double>(*number))) return number;
+  const auto* text = node.as_string();
+  refuse_number(parameter, node, path, text ? of_constants(text->get(), node, path) : std::nullopt);
   return std::nullopt;
+}
+
+void TomlReader::refuse_number(const Parameter& parameter, const toml::node& node, const std::string& path,
+                               std::optional<double> value) {
+  const bool text = node.is_string();
+  refuse(node, path,
+         fmt::format("found {}{}; allowed: {}{}", found(node), text && value ? fmt::format(" = {}", toml_number(*value)) : "",
+                     allowed(parameter), text ? ", or an expression in [constants]" : ""));
 }
 
 std::optional<std::string> TomlReader::text(const Parameter& parameter, const toml::node& node, const std::string& path) {

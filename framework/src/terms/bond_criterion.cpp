@@ -14,10 +14,12 @@ namespace {
 
 /// Directed bonds that are sampled at a time.
 constexpr std::size_t most_at_once = std::size_t{1} << 19;
-/// Bonds set free some times what they hold, where stresses and gradients of their ends are large: they are looked at where an evaluation
-/// point has this part of what would be needed if they did not. In running cracks of the strip of framework/docs/fracture.md the least part
-/// with which a bond failed was 0.58 (`baqp`, `projection`) and 0.26 (`bond_augmented`, `bond_associated`).
-double screened_release(const Formulation& formulation) noexcept { return formulation.bond && formulation.g_from_xi_only ? 0.25 : 0.125; }
+/// The criterion of what bonds set free asks for stored energy, too: a bond fails where an evaluation point of one of its ends holds this
+/// part of what would be needed if bonds set free what they hold. What a bond sets free is not bounded by what it holds, so that this is no
+/// saving without consequences but a part of the criterion, with run.skip = false as well. In running cracks of the strip of
+/// framework/docs/fracture.md the least part with which a bond failed was 0.58 (`baqp`, `projection`) and 0.26 (`bond_augmented`,
+/// `bond_associated`).
+double least_held(const Formulation& formulation) noexcept { return formulation.bond && formulation.g_from_xi_only ? 0.25 : 0.125; }
 /// Adds point p to bits by group of eight points.
 void look_at(GroupMarks& bits, std::size_t p) noexcept {
   bits[p / padding] |= static_cast<std::uint8_t>(1u << p % padding);
@@ -49,8 +51,9 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
 }
 
 /// Each term may have the same part of what a point holds.
-/// A bond holds psi_ij/N_i + psi_ji/N_j over its share, N the normaliser of its share, so that one of them is above half of the
-/// limit where it fails.
+/// Proof that no bond beyond its limit is left out of a look by what bonds hold: a bond holds psi_ij/N_i + psi_ji/N_j over its share, N the
+/// normaliser of its share, and fails where this sum is above the limit. Then one of the two psi is above half of the limit times its N, which
+/// is the density that its owner is marked beyond.
 void BondCriterion::set_screen(std::span<const double> factors) {
   const BondWeight kind = by_point_ ? BondWeight::kernel : formulation_.weight;
   const Field& onset = damage_->onset;
@@ -86,7 +89,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   };
   const auto own = [&](std::int32_t p) {
     const auto at = static_cast<std::size_t>(p);
-    return (release_ ? screened_release(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at) * static_cast<double>(terms_.size()));
+    return (release_ ? least_held(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at) * static_cast<double>(terms_.size()));
   };
   for (const std::int32_t p : body_.owned()) {
     const auto at = static_cast<std::size_t>(p);
@@ -99,7 +102,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
 }
 
 BondScreen* BondCriterion::screen() noexcept {
-  return screen_.near.empty() ? nullptr : &screen_;
+  return screen_.near.empty() || !(skip_ || release_) ? nullptr : &screen_;
 }
 
 void BondCriterion::begin_forces() {
@@ -110,6 +113,21 @@ void BondCriterion::begin_forces() {
 void BondCriterion::end_forces(ConstFieldView u) {
   screen_.u.assign(u.data, u.data + u.size());
   screen_.known = true;
+}
+
+/// Statics look for bonds at displacements that need not be those of their last evaluation.
+void BondCriterion::mark_by_forces(ConstFieldView u) {
+  if (!marked_by_forces_ || known_at(u)) return;
+  clear_forces(u.components);
+  begin_forces();
+  for (const auto& term : terms_)
+    if (term->add_forces(u, forces_, nullptr) >= 0) return;
+  end_forces(u);
+}
+
+void BondCriterion::clear_forces(int components) {
+  if (forces_.size() == 0) forces_ = body_.make_field(components);
+  std::fill_n(forces_.data(), forces_.size(), 0.0);
 }
 
 /// By group of eight points: the points with bonds that may fail at u, as bits.
@@ -156,13 +174,12 @@ void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView 
 }
 
 void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldView u) {
-  if (!skip_ || !release_ || !release_->follows_from_flux()) return;
+  if (!release_ || !release_->follows_from_flux()) return;
   GroupMarks marks(own_.size(), 0);
   for (const std::int32_t g : groups) marks[static_cast<std::size_t>(g)] = 1;
   // The points of their families, and whatever has a bond with those.
   marks = families_.around(families_.around(marks));
-  if (forces_.size() == 0) forces_ = body_.make_field(u.components);
-  std::fill_n(forces_.data(), forces_.size(), 0.0);
+  clear_forces(u.components);
   if (terms_.front()->add_forces_of(u, marks, families_.around(marks), forces_, nullptr) < 0) flux_ = terms_.front()->point_flux();
 }
 
@@ -273,10 +290,8 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   std::vector<BondChange> all;
   found_.clear();
   found_at_ = u.data;
-  looked_at_ = skip_ ? near_failure(u) : GroupMarks(own_.size(), 0xff);
-  // What bonds set free also comes from those around them: whole groups, as the bound is one of experience.
-  if (release_)
-    for (std::uint8_t& points : looked_at_) points = points != 0 ? 0xff : 0;
+  if (release_) mark_by_forces(u);
+  looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), 0xff);
   const std::vector<std::int32_t> near = marked(looked_at_);
   if (release_ && release_->follows_from_flux() && known_at(u)) flux_ = terms_.front()->point_flux();
   if (!flux_.everywhere) flux_ = {};

@@ -21,7 +21,7 @@ class BondCriterion final : public BondFinder {
  public:
   using TermsOf = std::span<const std::unique_ptr<Term>>;
   /// All must outlive this. asked: what is looked at, that of the criterion. damage: null for energies alone. skip = false: every
-  /// bond in every step.
+  /// bond in every step, save for those that hold too little to fail by what they set free.
   BondCriterion(const ReleaseParts& parts, DamageTraits asked, const BodyDamage* damage, TermsOf terms, bool skip);
 
   std::vector<BondChange> find(ConstFieldView u) override;
@@ -32,8 +32,10 @@ class BondCriterion final : public BondFinder {
   std::size_t bytes() const noexcept override {
     return samples_.bytes() + forces_.bytes() + 5 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
   }
-  /// For evaluations of forces to mark the groups that need a look; null where they cannot.
+  /// For evaluations of forces to mark the groups that need a look; null where they cannot, or need not.
   BondScreen* screen() noexcept;
+  /// All evaluations of forces do.
+  void forces_mark() noexcept { marked_by_forces_ = true; }
   /// Before and after an evaluation of forces at u where they do.
   void begin_forces();
   void end_forces(ConstFieldView u);
@@ -55,6 +57,9 @@ class BondCriterion final : public BondFinder {
   bool looks_at(std::size_t p) const noexcept { return own_[p / padding] && (looked_at_[p / padding] >> p % padding & 1); }
   bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
   GroupMarks near_failure(ConstFieldView u);
+  /// Evaluates forces at u, where the last evaluation was at other displacements, for the marks that they leave.
+  void mark_by_forces(ConstFieldView u);
+  void clear_forces(int components);
   std::vector<std::int32_t> marked(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
   template <class Visit>
@@ -76,6 +81,7 @@ class BondCriterion final : public BondFinder {
   const BodyDamage* damage_;
   TermsOf terms_;
   bool skip_;
+  bool marked_by_forces_ = false;
   DamageTraits traits_;
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;

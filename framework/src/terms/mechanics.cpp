@@ -45,8 +45,9 @@ void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
 }
 
 /// Of the rows of these displacements, where those of the first `keep` components are not zero.
-std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near) {
-  LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep);
+std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near,
+                                                        bool with_weightless) {
+  LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep, with_weightless);
   const BatchWork work(parts_.laws, finder, parts_.formulation.selective());
   Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
   space_->run(pass);
@@ -70,7 +71,9 @@ std::vector<HistoryPlace> Mechanics::history_points() {
     std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), std::uint8_t{1});
     const GroupMarks near = parts_.families.around(marks);
     parts.clear();
-    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) {
+    // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
+    // that its point has. Their history goes on meanwhile.
+    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near, !of_bonds && parts_.formulation.weighted != nullptr)) {
       const bool own = body.owns(static_cast<std::size_t>(found.owner));
       const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1,
                                of_bonds ? std::int64_t{0} : parts[found.owner]++};

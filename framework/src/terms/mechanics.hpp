@@ -77,7 +77,8 @@ class Mechanics final : public Term {
   /// stiffness <- that of the volumes of points whose evaluation points may be laminates (VolumetricRows), where it is not 0. Field index of
   /// an inadmissible point, or -1.
   std::int64_t stiffness_near_laminates(ConstFieldView u, FieldView stiffness);
-  std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near);
+  std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near,
+                                                 bool with_weightless = false);
   /// Room for the energies of all groups, zero.
   std::vector<GroupEnergy> no_energies() const { return std::vector<GroupEnergy>(parts_.families.body().stride() / padding); }
   /// Of what this rank owns.

@@ -130,9 +130,10 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     finder = all.make_monitor(*parts_.damage, parts_.skip, known);
   else {
     auto criterion = std::make_unique<BondCriterion>(release_parts(parts_), asked_of(parts_), parts_.damage, terms_, parts_.skip);
-    BondScreen* const screen = parts_.skip ? criterion->screen() : nullptr;
+    BondScreen* const screen = criterion->screen();
     // All of them or none.
     if (screen && std::ranges::all_of(terms_, [&](const auto& term) { return term->screen(screen); })) criterion_ = criterion.get();
+    if (criterion_) criterion_->forces_mark();
     for (const auto& term : terms_)
       if (!criterion_) term->screen(nullptr);
     finder = std::move(criterion);

@@ -27,7 +27,7 @@ PartDescription description() {
                        "isotropic solids: C4 : K^-1 = lambda tr(K^-1) I + 2 mu K^-1",
           .source = "Wan, Chen, Chu and Liu, Acta Mech. Sinica 35 (2019) 1021-1032; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 4.13-4.14",
           .limits = "over `conventional` only; where K_i is not a multiple of I (surfaces, cracks, irregular clouds) the penalty is not objective "
-                    "and does not keep angular momentum: for small rotations there"};
+                    "and does not keep angular momentum: for small rotations there; silling turns with the body"};
 }
 
 }  // namespace

@@ -18,17 +18,24 @@
 
 namespace perikit {
 
+class SmallStrains;
+
 class Simulation {
  public:
   /// Builds body, model and integrator. Throws InputError for what only building can show (empty sets, missing densities).
   /// show: told of each step of the work as it begins.
   Simulation(const Scene& scene, const PartFactory& factory, WorkSteps::Show show = {});
+  ~Simulation();
 
   const Scene& scene() const noexcept { return scene_; }
   /// What the set-up took.
   const WorkSteps& set_up() const noexcept { return set_up_; }
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
+  /// Watches strains and rotations where parts of the scene are for small ones only.
+  SmallStrains& small_strains() noexcept { return *small_strains_; }
+  /// Warnings about parts tell the limits that these state of themselves, which the catalogue knows.
+  void tell_limits(PartCatalogue& parts);
   bool dynamic() const noexcept { return traits_.dynamic; }
   bool quasi_static() const noexcept { return traits_.quasi_static; }
   /// Runs to the end. Throws RunError.
@@ -53,6 +60,7 @@ class Simulation {
   std::unique_ptr<Integrator> integrator_;
   IntegratorTraits traits_;
   std::unique_ptr<BodyProblem> problem_;
+  std::unique_ptr<SmallStrains> small_strains_;
   std::string carried_, loose_;   ///< from an earlier run, by weak springs; in words
 };
 

@@ -150,6 +150,7 @@ struct Scene {
   std::vector<std::string> no_fail;          ///< [damage] no_fail
   std::vector<std::optional<Expression>> initial_displacement, initial_velocity;   ///< empty or `dimension` long
   std::optional<std::filesystem::path> initial_from;
+  SourcePosition initial_from_position;
   SourcePosition initial_velocity_position;
   std::vector<BoundaryDescription> boundaries;
   std::vector<SymmetryDescription> symmetries;
