@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Kalthoff and Winkler's plate (configs/fracture/kalthoff_winkler.toml): angle, start and speed of the upper crack by kinematics, kernel,
-horizon and orientation of the lattice. A Markdown table is printed; it is that of framework/docs/fracture.md, "Kernels that follow the lattice".
+horizon and orientation of the lattice. A Markdown table is printed; it is that of framework/docs/fracture.md, "Influence functions and the lattice".
 
     kalthoff_winkler.py PERIKIT OUT [--solid] [--spacing 1e-3] [--threads 1]
 

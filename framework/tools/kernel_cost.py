@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a crack costs with every influence function: the double cantilever beam (configs/fracture/double_cantilever.toml, an interface between its arms) at
-twice the spacing, with bonds that weaken (softening 4). Energy per new area over Gc. Two Markdown tables are printed, those of framework/docs/fracture.md,
-"Kernels": by kinematics with a horizon of three spacings; and by horizon, on lattices turned by 22.5 and 45 degrees and on jittered ones.
+twice the spacing, with bonds that weaken (softening 4). Energy per new area and G, over Gc. Two Markdown tables are printed, those of framework/docs/fracture.md,
+"What a crack costs": by kinematics with a horizon of three spacings; and by horizon, on lattices turned by 22.5 and 45 degrees and on jittered ones.
 
     kernel_cost.py PERIKIT OUT [--spacing 2e-3]
 
@@ -52,7 +52,7 @@ def cell(options, kinematics, kernel, ratio, degrees, jitter):
         done = subprocess.run(command + [word for setting in settings for word in ("--set", setting)], capture_output=True, text=True, check=False)
         result.write_text(done.stdout if done.returncode == 0 else "failed: " + done.stderr.strip().splitlines()[-1] + "\n")
     words = result.read_text().split()
-    return "%.2f" % float(words[0]) if len(words) == 6 else " ".join(words)
+    return "%.2f, %.2f" % (float(words[0]), float(words[1])) if len(words) == 6 else " ".join(words)
 
 
 def main():

@@ -200,7 +200,7 @@ TEST_CASE("critical_energy: a factor of the influence function changes no limit"
   }
 }
 
-/// The table of framework/docs/fracture.md, "G over Gc without a run", into crossing_bonds.md.
+/// The figures of framework/docs/fracture.md, "Influence functions and the lattice", into crossing_bonds.md.
 TEST_CASE("table of G over Gc by kernel, horizon and direction" * doctest::skip()) {
   const Formulation f = formulation("baqp");
   std::ofstream out("crossing_bonds.md");
