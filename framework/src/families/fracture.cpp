@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <limits>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -32,41 +34,75 @@ Fracture::Fracture(Families& families, const BodyDamage& damage, std::unique_ptr
   if (damage.gradual()) gradual_.emplace(families.body(), damage.crack_speed);
 }
 
-std::vector<double> Fracture::moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u) {
+std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u) {
+  std::vector<Found> all;
   // Bonds that let go in the course of steps, or weaken, do so all through the step.
-  if (gradual_) return std::vector<double>(changes.size(), 0.5);
-  // Energies and stresses are right at the points of this rank: each rank knows the moments of bonds that begin there.
+  for (const BondChange& change : changes) all.push_back({change, 0.5, 1});
+  const bool inside = before.data && !gradual_;
+  if (!inside && !damage_.second_law) return all;
+  // Energies and stresses are right at the points of this rank: each rank knows the values of bonds that begin there.
   const bool share = shared_.part() && !damage_.by_stretch();
   std::vector<BondId> bonds;
   for (const BondChange& change : changes)
     if (!share || families_.body().owns(static_cast<std::size_t>(change.bond.point))) bonds.push_back(change.bond);
-  std::vector<double> start(bonds.size()), end(bonds.size()), moments;
-  finder_->values(bonds, before, start);
+  std::vector<double> start(bonds.size()), end(bonds.size()), moments(bonds.size(), 0.5), excesses(bonds.size());
+  if (inside) finder_->values(bonds, before, start);
   finder_->values(bonds, u, end);
   // Energies grow with the square of what the bonds do.
   const bool square = damage_.law->traits().energy;
   const auto linear = [&](double value) { return square ? std::copysign(std::sqrt(std::abs(value)), value) : value; };
   for (std::size_t k = 0; k < bonds.size(); ++k) {
+    const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
+    excesses[k] = end[k] / limits.failure;
+    if (!inside) continue;
     const double first = linear(start[k]), last = linear(end[k]);
     const auto crossing = [&](double limit) {
       return first < last ? std::clamp((linear(limit) - first) / (last - first), 0.0, 1.0) : 0.0;
     };
-    const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
     if (damage_.second_law && start[k] > limits.failure && !past_a_rung(start[k], end[k], limits.failure))
-      moments.push_back(not_now);
+      moments[k] = not_now;
     else
-      moments.push_back(0.5 * (crossing(limits.onset) + crossing(limits.failure)));
+      moments[k] = 0.5 * (crossing(limits.onset) + crossing(limits.failure));
   }
-  if (!share) return moments;
-  std::vector<BondChange> mine;
-  for (std::size_t k = 0; k < bonds.size(); ++k) mine.push_back({bonds[k], moments[k]});
-  moments.clear();
-  for (const BondChange& moment : shared_.of_all(mine)) moments.push_back(moment.integrity);
-  return moments;
+  const auto of_all = [&](std::vector<double>& values) {
+    if (!share) return;
+    std::vector<BondChange> mine;
+    for (std::size_t k = 0; k < bonds.size(); ++k) mine.push_back({bonds[k], values[k]});
+    values.clear();
+    for (const BondChange& value : shared_.of_all(mine)) values.push_back(value.integrity);
+  };
+  of_all(moments);
+  of_all(excesses);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    all[k].moment = moments[k];
+    all[k].excess = excesses[k];
+  }
+  return all;
 }
 
-BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction,
-                            const Body& body) {
+/// Which bonds stay must follow from what they do, not from their places in the body: bonds whose excess is the same but for rounding, as those of
+/// points that mirror each other, are one.
+Fracture::Ties Fracture::ties(std::span<const Found> found) const {
+  constexpr double same = 1e-9;   // relative; rounding changes an excess by far less
+  std::vector<double> all;
+  for (const Found& f : found)
+    if (families_.body().owns(static_cast<std::size_t>(f.change.bond.point))) all.push_back(f.excess);
+  if (shared_.part()) all = told_to_all(gathered<double>(all));
+  std::ranges::sort(all, std::greater());
+  std::vector<double> least;  // of each tie
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (k > 0 && all[k - 1] - all[k] <= same * std::abs(all[k - 1])) least.back() = all[k];
+    else least.push_back(all[k]);
+  }
+  Ties ties(least.size());
+  for (const Found& f : found) {
+    const auto tie = std::ranges::lower_bound(least, f.excess, std::greater());
+    if (tie != least.end()) ties[static_cast<std::size_t>(tie - least.begin())].push_back(f.change);
+  }
+  return ties;
+}
+
+BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepInside& step, const Body& body) {
   ++updates_;
   weakening_.clear();
   settling_.clear();
@@ -76,7 +112,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
   if (gradual_) changes = gradual_->let_go(changes, time_step);
   if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;
-  if (!begin) {
+  if (!step) {
     if (time_step > 0) hastened_.forget();
     if (!damage_.law->traits().bits) {
       std::vector<double> from;
@@ -89,47 +125,44 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepBegin&
           if (change.integrity > 0) weakening_.push_back(change.bond);
       }
     }
-    fail(std::move(changes), u, 0, {}, body, update);
+    fail(found(changes, {}, u), u, {}, body, update);
     finish(update);
     return update;
   }
-  const int d = u.components;
-  if (before_.size() == 0) {
-    before_ = families_.body().make_field(d);
-    at_ = families_.body().make_field(d);
-  }
-  begin(before_);
-  for (Field* field : {&reaction->impulse, &reaction->drift}) {
-    if (field->size() == 0) *field = families_.body().make_field(d);
-    else fill(0.0, *field);
-  }
-  const std::vector<double> moments = this->moments(changes, before_, u);
-  for (std::size_t k = 0; k < changes.size(); ++k)
-    update.held += moments[k] == not_now && families_.body().owns(static_cast<std::size_t>(changes[k].bond.point));
+  if (before_.size() == 0)
+    for (Field* field : {&before_, &at_, &force_}) *field = families_.body().make_field(u.components);
+  step.begin(before_);
+  const std::vector<Found> all = found(changes, before_, u);
+  for (const Found& f : all)
+    update.held += f.moment == not_now && families_.body().owns(static_cast<std::size_t>(f.change.bond.point));
   // Those of each half of the step at the mean of their moments.
   for (const bool early : {true, false}) {
-    std::vector<BondChange> of_half;
+    std::vector<Found> of_half;
     ExactSum sum;
     std::int64_t count = 0;  // each bond once, where its first point is
-    for (std::size_t k = 0; k < changes.size(); ++k) {
-      if (moments[k] == not_now || (moments[k] < 0.5) != early || families_.integrity(changes[k].bond) <= changes[k].integrity)
-        continue;
-      of_half.push_back(changes[k]);
-      if (!families_.body().owns(static_cast<std::size_t>(changes[k].bond.point))) continue;
-      sum.add(moments[k]);
+    for (const Found& f : all) {
+      if (f.moment == not_now || (f.moment < 0.5) != early || families_.integrity(f.change.bond) <= f.change.integrity) continue;
+      of_half.push_back(f);
+      if (!families_.body().owns(static_cast<std::size_t>(f.change.bond.point))) continue;
+      sum.add(f.moment);
       ++count;
     }
     communicator().sum({&count, 1});
     if (count == 0) continue;
     const double moment = total_over_ranks(sum) / static_cast<double>(count);
-    for (std::size_t k = 0; k < u.size(); ++k) at_.data()[k] = before_.data()[k] + moment * (u.data[k] - before_.data()[k]);
-    // The bonds act until they fail, at `moment`. A step has the forces of its beginning for the first half, and those of its
-    // end, which are to be without these bonds, for the second: what the bonds owe, or gave too much, is an impulse. Of the first
-    // half it belongs to the beginning of the step and has moved the points since.
-    const double owed = (moment - 0.5) * time_step;
-    Field& impulse = reaction->impulse;
-    fail(std::move(of_half), at_, owed, impulse, body, update);
-    for (std::size_t k = 0; early && k < u.size(); ++k) reaction->drift.data()[k] = time_step * impulse.data()[k];
+    if (!early) step.begin(before_);   // points that lost bonds were elsewhere
+    combine(1 - moment, before_, moment, u, at_);
+    // The bonds act until they fail, at `moment`. A step has the forces of its beginning for the first half, and those of its end, which are to be
+    // without these bonds, for the second: what the bonds owe, or gave too much, is an impulse. It acts where its forces were evaluated, as they have
+    // no moment about other positions.
+    const double owed = (moment - 0.5) * time_step, end = early ? 0 : 1;
+    if (owed != 0) fill(0.0, force_);
+    fail(of_half, at_, owed != 0 ? FieldView(force_) : FieldView{}, body, update);
+    if (owed == 0) continue;
+    const double growth = step.act(force_, owed, moment);
+    // It works at the velocity of its moment, and in the balance of a step at that of the end of the step that it belongs to. Where the second law
+    // asks that nothing is gained, energies stay what they are.
+    if (!damage_.second_law) update.dissipated -= (moment - end) * time_step * owed * growth;
   }
   finish(update);
   return update;
@@ -192,7 +225,7 @@ BondUpdate Fracture::weaken(ConstFieldView u, ConstFieldView forecast, const Bod
   }
   BondUpdate update;
   if (changes.empty()) return update;
-  fail(std::move(changes), u, 0, {}, body, update);
+  fail(found(changes, {}, u), u, {}, body, update);
   finish(update);
   return update;
 }
@@ -230,24 +263,27 @@ GroupMarks Fracture::widened(GroupMarks marks, std::span<const std::int32_t> end
   return marks;
 }
 
-void Fracture::fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
-                    BondUpdate& update) {
-  if (damage_.second_law) {
-    std::vector<BondChange> lawful, before;
-    try_to_fail(std::move(changes), at, body, lawful, before, update);
-    // Once more, with forces, and together.
-    take_back(before, body);
-    changes = std::move(lawful);
+void Fracture::fail(std::span<const Found> found, ConstFieldView at, FieldView force, const Body& body, BondUpdate& update) {
+  std::vector<BondChange> changes;
+  if (!damage_.second_law) {
+    for (const Found& f : found) changes.push_back(f.change);
+    return lower(std::move(changes), at, force, true, body, update);
   }
-  lower(std::move(changes), at, owed, impulse, body, update);
+  std::vector<BondChange> before;
+  try_to_fail(ties(found), at, body, changes, before, update);
+  // Once more, with forces, and together.
+  take_back(before, body);
+  lower(std::move(changes), at, force, false, body, update);
 }
 
 /// Lowers bonds, and those of fragments, where the energy at `at` does not rise, and halves of them where it does. lawful: those
 /// that were; before: their integrities, and those of the fragments' bonds, in the order in which they fell. All ranks must call
 /// it.
-void Fracture::try_to_fail(std::vector<BondChange> changes, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
                            std::vector<BondChange>& before, BondUpdate& update) {
-  if (!on_any_rank(!changes.empty())) return;
+  if (ties.empty()) return;
+  std::vector<BondChange> changes;
+  for (const std::vector<BondChange>& tie : ties) changes.insert(changes.end(), tie.begin(), tie.end());
   const std::size_t known = before.size();
   std::vector<std::int32_t> all;
   const auto lower_all = [&] {
@@ -266,16 +302,18 @@ void Fracture::try_to_fail(std::vector<BondChange> changes, ConstFieldView at, c
   std::vector<BondChange> tried(before.begin() + static_cast<std::ptrdiff_t>(known), before.end());
   before.resize(known);
   take_back(tried, body);
+  const double now = body.energy(at, marks);
   // Points that are inside out already say nothing.
-  if (const double now = body.energy(at, marks); after <= now || !std::isfinite(now)) {
+  if (after <= now || !std::isfinite(now)) {
     lower_all();
     lawful.insert(lawful.end(), changes.begin(), changes.end());
+    if (std::isfinite(after) && std::isfinite(now)) update.dissipated += now - after;
     return;
   }
-  std::vector<BondChange> rest = later_half(changes);
-  if (on_any_rank(!rest.empty())) {
-    try_to_fail(std::move(changes), at, body, lawful, before, update);
-    try_to_fail(std::move(rest), at, body, lawful, before, update);
+  if (ties.size() > 1) {
+    const std::size_t half = (ties.size() + 1) / 2;
+    try_to_fail(ties.first(half), at, body, lawful, before, update);
+    try_to_fail(ties.subspan(half), at, body, lawful, before, update);
     return;
   }
   for (const BondChange& change : changes) {
@@ -290,30 +328,12 @@ void Fracture::take_back(std::vector<BondChange>& before, const Body& body) {
   body.changed(families_.raise(before));
 }
 
-/// Takes the later half of what all ranks have, by names in the whole body, out of `changes`; nothing of a single bond. All ranks
-/// must call it.
-std::vector<BondChange> Fracture::later_half(std::vector<BondChange>& changes) const {
-  double first = std::numeric_limits<double>::infinity(), last = -first;
-  for (const BondChange& change : changes) {
-    first = std::min(first, shared_.name(change.bond));
-    last = std::max(last, shared_.name(change.bond));
-  }
-  first = -communicator().largest(-first);
-  last = communicator().largest(last);
-  const double middle = std::floor(0.5 * (first + last));
-  const auto rest =
-      std::ranges::stable_partition(changes, [&](const BondChange& change) { return shared_.name(change.bond) <= middle; });
-  std::vector<BondChange> later(rest.begin(), rest.end());
-  changes.erase(rest.begin(), rest.end());
-  return later;
-}
-
 /// Between the first bonds and the last ones of fragments nothing is evaluated where that can be helped: points that are about to
 /// go may be turned inside out.
-void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
-                     BondUpdate& update) {
-  if (impulse.data && part_.size() == 0) part_ = families_.body().make_field(impulse.components);
-  const FieldView part = impulse.data ? FieldView(part_) : FieldView{};
+void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update) {
+  if (force.data && part_.size() == 0) part_ = families_.body().make_field(force.components);
+  const bool evaluates = force.data || account;
+  const FieldView part = force.data ? FieldView(part_) : FieldView{};
   GroupMarks marks;   // empty: no forces are waiting for those without the bonds
   double before = 0;
   const auto settle = [&] {
@@ -324,8 +344,8 @@ void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double 
       ++update.inside_out;
       return;
     }
-    update.dissipated += before - after;
-    if (impulse.data) combine(1, impulse, owed, part, impulse);
+    if (account) update.dissipated += before - after;
+    if (force.data) combine(1, force, 1, part, force);
   };
   while (on_any_rank(!changes.empty())) {
     std::vector<std::int32_t> ends;
@@ -335,12 +355,12 @@ void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, double 
     }
     std::sort(ends.begin(), ends.end());
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    GroupMarks of_these = dependent_on(ends, body);
+    GroupMarks of_these = evaluates ? dependent_on(ends, body) : GroupMarks();
     const auto marked = [](std::uint8_t wanted, std::uint8_t have) { return !wanted || have; };
-    if (on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
+    if (evaluates && on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
       settle();
       marks = widened(std::move(of_these), ends);
-      if (impulse.data) fill(0.0, part);
+      if (force.data) fill(0.0, part);
       before = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit
     }
     families_.lower(changes);

@@ -14,6 +14,7 @@
 #include "families/gradual_failure.hpp"
 #include "families/hastened_bonds.hpp"
 #include "families/shared_bonds.hpp"
+#include "perikit/families/step_inside.hpp"
 
 namespace perikit {
 
@@ -35,8 +36,8 @@ class Fracture {
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
-  /// Bonds of fragments fail too, but for those that must not. begin, reaction: see Terms::update_bonds. All ranks must call it.
-  BondUpdate update(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction, const Body& body);
+  /// Bonds of fragments fail too, but for those that must not. All ranks must call it.
+  BondUpdate update(ConstFieldView u, double time_step, const StepInside& step, const Body& body);
 
   // Of the bonds that weakened in the last update outside of a step, and have something left; on one rank.
   /// Whether some of them may be forecast.
@@ -57,21 +58,29 @@ class Fracture {
  private:
   /// The bonds of fragments among the points that may fail. All ranks must call it.
   std::vector<BondId> fragments(std::span<const std::int32_t> points) const;
-  /// The moments at which these bonds failed, from 0 at the beginning of the step, at `before`, to 1 at its end, at u; -1: they
-  /// stay this time.
-  std::vector<double> moments(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
+  /// A bond that a criterion has found, and when inside of the step it failed: from 0 at its beginning to 1 at its end.
+  struct Found {
+    BondChange change;
+    double moment = 1;
+    double excess = 1;  ///< its value over its limit, where it was found
+  };
+  /// Bonds of one excess, which fail together or stay together. All ranks have as many of them, the largest excess first.
+  using Ties = std::vector<std::vector<BondChange>>;
+  /// before: at the beginning of an explicit step, u at its end; without data bonds fail at u.
+  std::vector<Found> found(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
+  /// All ranks must call it.
+  Ties ties(std::span<const Found> found) const;
   GroupMarks dependent_on(std::span<const std::int32_t> ends, const Body& body) const;
   GroupMarks widened(GroupMarks marks, std::span<const std::int32_t> ends) const;
-  /// Lowers bonds, and those of fragments with them. at: where they fail; impulse += owed times their forces there. With the
-  /// second law, those without which the energy does not rise: what was found is tried together, then in halves, down to single
-  /// bonds, which stay.
-  void fail(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body, BondUpdate& update);
-  void lower(std::vector<BondChange> changes, ConstFieldView at, double owed, FieldView impulse, const Body& body,
-             BondUpdate& update);
-  void try_to_fail(std::vector<BondChange> changes, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+  /// Lowers bonds, and those of fragments with them. at: where they fail; force += their forces there, where it has data. With the second law, those
+  /// without which the energy does not rise: what was found is tried together, then in halves, those that exceed their limits most first, down to
+  /// ties, which stay.
+  void fail(std::span<const Found> found, ConstFieldView at, FieldView force, const Body& body, BondUpdate& update);
+  void try_to_fail(std::span<const std::vector<BondChange>> ties, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
                    std::vector<BondChange>& before, BondUpdate& update);
+  /// account: what the energy at `at` falls by is dissipated.
+  void lower(std::vector<BondChange> changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update);
   void take_back(std::vector<BondChange>& before, const Body& body);
-  std::vector<BondChange> later_half(std::vector<BondChange>& changes) const;
   void finish(BondUpdate& update);
   /// What the criterion leaves of these bonds at u, whatever they had before.
   std::vector<double> integrities(std::span<const BondId> bonds, ConstFieldView u);
@@ -86,7 +95,8 @@ class Fracture {
   std::vector<BondId> weakening_, settling_;  ///< by the last update outside of a step; those of them that may be forecast
   std::size_t updates_ = 0;
   Field before_, at_;  ///< displacement at the beginning of the step, and where bonds fail
-  Field part_;         ///< of an impulse, as long as nobody knows whether it is whole
+  Field force_;        ///< of bonds that failed
+  Field part_;         ///< of it, as long as nobody knows whether it is whole
 };
 
 }  // namespace perikit

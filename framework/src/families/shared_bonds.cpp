@@ -22,11 +22,6 @@ std::vector<NamedChange> SharedBonds::merged(std::span<const BondChange> mine) c
   return all;
 }
 
-double SharedBonds::name(BondId bond) const noexcept {
-  return static_cast<double>(place(bond.point)) * static_cast<double>(body_.stride_of_all_ranks()) +
-         static_cast<double>(place(bond.far));
-}
-
 void SharedBonds::mark(GroupMarks& marks) const {
   if (!part()) return;
   std::vector<std::int64_t> mine;

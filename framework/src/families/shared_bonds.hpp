@@ -28,8 +28,6 @@ class SharedBonds {
   /// Marks by point: the points of all ranks that are here, and those that share a group of eight points of the whole body with them: the same
   /// points on any number of ranks. Empty where no rank has any. All ranks must call it.
   std::vector<std::uint8_t> points_beside(std::span<const std::int32_t> points) const;
-  /// A number for each bond that all ranks have for it, in the order of the bonds.
-  double name(BondId bond) const noexcept;
   /// Whether other ranks have bonds, too.
   bool part() const noexcept { return body_.part(); }
 

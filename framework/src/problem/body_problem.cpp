@@ -262,16 +262,26 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
   }
   if (!parts_.fracture.damage()) return false;
   const ConstFieldView u = state().displacement();
-  const StepBegin begin = [&](FieldView before) {
-    for (std::size_t k = 0; k < before.size(); ++k) before.data[k] = u.data[k] - time_step * velocity.data[k];
-    if (ghosts_) ghosts_->forward(before);
-    if (images()) images()->extend(before);
-  };
-  const bool explicit_step = velocity.data != nullptr;
-  const BondUpdate update =
-      parts_.fracture.update(terms(), seen(u, seen_), state(), time_step, explicit_step ? begin : StepBegin(), &reaction_);
+  const Seen whole = seen(u, seen_);
+  std::vector<std::int32_t> moved;
+  StepInside step;
+  if (velocity.data) {
+    step.begin = [&](FieldView before) {
+      combine(1, u, -time_step, velocity, before);
+      if (ghosts_) ghosts_->forward(before);
+      if (images()) images()->extend(before);
+    };
+    step.act = [&](FieldView force, double time, double moment) {
+      const double growth = push(force, time, (1 - moment) * time_step, velocity, moved);
+      // `whole` follows.
+      if (images()) seen(u, seen_);
+      else if (ghosts_) ghosts_->forward(Seen::writable(u));
+      return growth;
+    };
+  }
+  const BondUpdate update = parts_.fracture.update(terms(), whole, state(), time_step, step);
   if (update.changed == 0) return false;
-  if (explicit_step) react(update.ends, velocity);
+  if (velocity.data) renew_forces(moved, update.ends);
   find_pieces(true);
   return true;
 }
@@ -280,36 +290,44 @@ void BodyProblem::find_pieces(bool fresh) {
   if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), fresh);
 }
 
-/// Forces and strain energy become those of the bonds that are left, where the points are by then. What holds a component takes
-/// the impulse upon it; its work is that of all other forces, with the opposite sign.
-void BodyProblem::react(std::span<const std::int32_t> ends, FieldView velocity) {
+/// What holds a component takes the impulse upon it; its work is that of all other forces, with the opposite sign.
+double BodyProblem::push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved) {
   EvaluationStatus status;
-  const FieldView impulse = reaction_.impulse, drift = reaction_.drift;
-  finish(impulse, status);
-  finish(drift, status);
-  const FieldView u = state().displacement();
+  finish(force, status);
+  const FieldView u = state().displacement(), internal = state().internal_force();
+  const ConstFieldView external = loads().any() ? state().external_force() : FieldView{};
   const std::span<const double> by_point = masses().by_point();
   const ConstFieldView free = constraints().free();
-  ExactSum held;
-  std::vector<std::int32_t> moved;
+  ExactSum growth, held;
   for (int c = 0; c < velocity.components; ++c)
     for (std::size_t p = 0; p < velocity.stride; ++p) {
-      const double push = impulse.component(c)[p], pull = drift.component(c)[p];
-      if (push == 0 && pull == 0) continue;   // far from bonds that failed
-      if (by_point[p] > 0 && free.component(c)[p] != 0) {
-        velocity.component(c)[p] += push / by_point[p];
-        u.component(c)[p] += pull / by_point[p];
-        if (pull != 0) moved.push_back(static_cast<std::int32_t>(p));
-      } else {
-        held.add(push * velocity.component(c)[p]);
+      const double f = force.component(c)[p];
+      if (f == 0) continue;   // far from bonds that failed
+      double& v = velocity.component(c)[p];
+      internal.component(c)[p] -= f;
+      if (!(by_point[p] > 0) || free.component(c)[p] == 0) {
+        held.add(f * v);
+        continue;
       }
+      const double left = internal.component(c)[p] + (external.data ? external.component(c)[p] : 0.0);
+      growth.add(f * left / by_point[p]);
+      const double change = time * f / by_point[p];
+      v += change;
+      u.component(c)[p] += since * change;
+      moved.push_back(static_cast<std::int32_t>(p));
     }
-  state().energies.external_work -= total_over_ranks(held);
+  state().energies.external_work -= time * total_over_ranks(held);
+  return total_over_ranks(growth);
+}
+
+void BodyProblem::renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
   double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
+  const FieldView u = state().displacement();
+  EvaluationStatus status;
   if (ghosts_ || images() || weak_springs_) {
     status = evaluate_forces(u, state().internal_force(), energy);
   } else {
-    status = terms().renew_forces(u, moved, ends, state().internal_force(), energy);
+    status = terms().renew_forces(u, moved, lost, state().internal_force(), energy);
     describe(status);
   }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);

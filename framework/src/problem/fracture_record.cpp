@@ -9,9 +9,8 @@
 
 namespace perikit {
 
-BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin,
-                                  BondReaction* reaction) {
-  BondUpdate update = terms.update_bonds(u, time_step, begin, reaction);
+BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepInside& step) {
+  BondUpdate update = terms.update_bonds(u, time_step, step);
   account(update, state);
   return update;
 }

@@ -39,7 +39,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks, [&](std::size_t b) { for_chunks(b, [&](const LatticeChunk& chunk) { set_sums(chunk); }); });
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t*) override {
+  /// Points of `near` in rows without sources feel those of `only` as well: sources send M_i u_i, and -M_i u_k stands in B_k u_k.
+  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t* near) override {
     if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
@@ -58,6 +59,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
       if (!quiet_.awake(b, 2)) return;
       for (std::size_t r = families_.tiles.blocks[b].row_begin; r < families_.tiles.blocks[b].row_end; ++r)
         if (takes(r, only)) operator_.divergence(families_.tiles.rows[r], flux_, source_, force);
+        else if (only) hold(families_.tiles.rows[r], u, factor, near, force);
       if (!families_.any_broken()) return;
       for_chunks(b, [&](const LatticeChunk& chunk) {
         if (!only || only[chunk.first / chunk_points]) operator_.remove_broken(chunk, flux_, chunk.first, source_, force);
@@ -137,9 +139,12 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     return static_cast<std::size_t>(c * D + families_.grid.axis[static_cast<std::size_t>(e)]);
   }
 
-  /// Whether a row is marked, and somebody feels it.
+  /// Whether somebody feels a row, and a group of it or one that its points read along the row is marked.
   bool takes(std::size_t row, const std::uint8_t* only) const noexcept {
-    return (felt_rows_.empty() || felt_rows_[row]) && families_.tiles.rows[row].marked(only);
+    if (!felt_rows_.empty() && !felt_rows_[row]) return false;
+    const LatticeRow& r = families_.tiles.rows[row];
+    const std::int32_t group = r.first / chunk_points;
+    return !only || std::any_of(only + group - r.before, only + group + r.chunks + r.after, [](std::uint8_t marked) { return marked != 0; });
   }
 
   /// use(chunk, H of its lanes, sum_s omega_s u_{k+s} of its lanes), both with stride batch_points, for every chunk of the wanted
@@ -195,6 +200,19 @@ class LatticePenalty final : public ZeroEnergyPenalty {
         }
       }
       for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p) + f[c]).store(force.component(c) + p);
+    }
+  }
+
+  /// force -= factor B u on the points of a row in the groups of `near`.
+  void hold(const LatticeRow& row, ConstFieldView u, double factor, const std::uint8_t* near, FieldView force) const noexcept {
+    for (int k = 0; k < row.chunks * chunk_points; k += pack_width) {
+      const std::int64_t p = row.first + k;
+      if (!near[p / chunk_points]) continue;
+      Pack B[Matrix::components], x[D], y[D];
+      for (int c = 0; c < Matrix::components; ++c) B[c] = Pack::load(B_.component(c) + p);
+      for (int c = 0; c < D; ++c) x[c] = Pack::load(u.component(c) + p);
+      Matrix::apply(B, x, y);
+      for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p) - Pack(factor) * y[c]).store(force.component(c) + p);
     }
   }
 

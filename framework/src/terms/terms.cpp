@@ -349,9 +349,9 @@ void Terms::bonds_changed(std::span<const std::int32_t> points) {
   for (const auto& term : terms_) term->bonds_changed(points);
 }
 
-BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepBegin& begin, BondReaction* reaction) {
+BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepInside& step) {
   if (!failing_) return {};
-  BondUpdate update = failing_->fracture.update(u, time_step, begin, reaction, failing_->body(*this));
+  BondUpdate update = failing_->fracture.update(u, time_step, step, failing_->body(*this));
   failing_->ends = update.ends;
   return update;
 }

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <compare>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -100,16 +99,6 @@ struct NamedChange {
 struct BondEnergy {
   BondId bond;
   double energy = 0;  ///< [J]
-};
-
-/// before(u): u <- the displacement at the beginning of the explicit step that ended now. Called where bonds fail; empty: they
-/// fail where they were found.
-using StepBegin = std::function<void(FieldView)>;
-
-/// What bonds that failed inside of a step mean for it. Its forces were taken with them.
-struct BondReaction {
-  Field impulse;  ///< what they still owed when they failed, or had given too much [N s]
-  Field drift;    ///< that of the first half of the step times its length: by mass, what it has moved the points [N s^2]
 };
 
 struct BondUpdate {

@@ -155,11 +155,12 @@ class BodyProblem final : public Problem {
   void describe(EvaluationStatus& status) const;
   /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
   void find_pieces(bool fresh);
-  /// What bonds that failed inside of the last step mean for forces, velocity and work.
-  void react(std::span<const std::int32_t> ends, FieldView velocity);
+  /// See StepInside::act. since: of the end of the step [s].
+  double push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved);
+  /// Forces and strain energy become those of the bonds that are left, where the points are.
+  void renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
 
   Field seen_, seen_direction_;
-  BondReaction reaction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
   Sampling along_ = Sampling::nothing;   ///< with the next one
   std::optional<PointSamples> kept_;     ///< with the last one

@@ -20,7 +20,7 @@ class FractureRecord {
   /// Null where bonds never fail.
   const BodyDamage* damage() const noexcept { return damage_.get(); }
   /// Lets bonds of `terms` fail at u, the displacement as they see it; energies of the state follow. The rest: see Terms.
-  BondUpdate update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepBegin& begin, BondReaction* reaction);
+  BondUpdate update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepInside& step);
   /// Likewise lets bonds weaken to what they are at `forecast`. True when some did.
   bool weaken(Terms& terms, ConstFieldView u, ConstFieldView forecast, State& state);
   /// How bonds failed so far, in words; empty where they never fail.

@@ -11,6 +11,7 @@
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/families/bonds.hpp"
 #include "perikit/families/quiet_counts.hpp"
+#include "perikit/families/step_inside.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/law_history.hpp"
@@ -109,9 +110,8 @@ class Terms {
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that are beyond their limit at u, and recomputes what depends on them. To be called after
-  /// every step, with its length [s] (0 in quasi-static runs). Where `begin` is given, bonds fail inside the step, and *reaction
-  /// (fields of u, zero before) is what that means for it.
-  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepBegin& begin = {}, BondReaction* reaction = nullptr);
+  /// every step, with its length [s] (0 in quasi-static runs). Where `step` is given, bonds fail inside of it, and u follows what it does.
+  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepInside& step = {});
   // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
   /// Whether some of them may be forecast.
   bool settling() const noexcept;
