@@ -78,6 +78,7 @@ void log_end(RunRecorder& recorder, const std::string& line) {
 std::string version() { return PERIKIT_VERSION " (" PERIKIT_LEVEL ")"; }
 
 void run(const Options& options) {
+  std::optional<NothingToKeep> set_up_alone(std::in_place);
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
   const auto start = std::chrono::steady_clock::now();
@@ -90,9 +91,11 @@ void run(const Options& options) {
   const auto planning = std::chrono::steady_clock::now();
   const bool first = communicator().rank() == 0;     // which alone speaks
   const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
+  simulation.refuse_memory();
   const double plan = seconds_since(planning);
   if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
+  set_up_alone.reset();
   RunRecorder recorder(simulation, folder, !options.quiet, options.resume ? RunStart::resume : RunStart::fresh,
                        library_fingerprints(*registry), options.force);
   recorder.log(fmt::format("perikit {}: {}\n{}", version(), scene.file.string(), summary));
@@ -131,6 +134,7 @@ void run(const Options& options) {
 }
 
 void check(const Options& options) {
+  const NothingToKeep nothing;
   const auto registry = open_registry(options);
   if (options.machine) {
     if (!options.machine_values.empty()) return store_machine_values(*registry, options.machine_values);
@@ -149,8 +153,10 @@ void check(const Options& options) {
       summary = simulation.summary();  // which may still refuse
       if (options.explain) summary += simulation.explanation(*registry);
       try_step(simulation);
-      if (const double bytes = peak.bytes(); bytes > 0)
-        summary += fmt::format("process       about {:.3g} MB at most\n", bytes / 1e6);
+      const double bytes = peak.bytes();
+      if (const double solver = simulation.refuse_memory(); bytes > 0)
+        summary += fmt::format("process       about {:.3g} MB at most{}\n", (bytes + solver) / 1e6,
+                               solver > 0 ? fmt::format(", {:.3g} MB of them in the solver of {}", solver / 1e6, scene.integrator->type) : "");
     }
     if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks, false);
   }

@@ -29,8 +29,13 @@
 
 namespace {
 
-/// The first signal ends the run after its step; a second one ends the program at once.
+/// The first signal ends the run after its step, or at once before the first one; a second one ends the program at once.
 void stop(int signal) {
+  if (perikit::NothingToKeep::holds()) {
+    constexpr char told[] = "\nstopped by a signal during the set-up; nothing was written\n";
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, told, sizeof told - 1);
+    ::_exit(perikit::app::run_failed);
+  }
   perikit::request_stop();
   std::signal(signal, SIG_DFL);
 }

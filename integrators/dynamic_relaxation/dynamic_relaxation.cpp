@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/power_of_two.hpp"
 #include "perikit/sdk/eigenvalue.hpp"
+#include "perikit/sdk/stability.hpp"
 #include "perikit/sdk/tangent_predictor.hpp"
 
 namespace perikit {
@@ -16,6 +19,11 @@ namespace {
 constexpr double safety = 1.1;            // of the largest eigenvalue, against stiffening within a step
 constexpr double diverging = 1e3;         // residual over the smallest so far, at which the mass is found anew
 constexpr int note_every = 1000;
+
+/// The sum of (a/of_a) (b/of_b): products of small or large numbers leave the range of numbers.
+double product(ConstFieldView a, ConstFieldView b, double of_a, double of_b) {
+  return total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return (a.data[k] / of_a) * (b.data[k] / of_b); }));
+}
 
 }  // namespace
 
@@ -70,7 +78,7 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       at_rest = false;
     } else if (options_.kinetic) {
       combine(1, v_, 1 / mass, r_, v_);
-      const double kinetic = dot(v_, v_);
+      const double kinetic = norm(v_);   // its root
       if (kinetic < last_kinetic) {
         // The peak lies behind: rest there, half of the last velocity v - r/m back.
         combine(1, u, -0.5, v_, u);
@@ -83,8 +91,9 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       last_kinetic = kinetic;
     } else {
       // Rayleigh quotient of the motion itself: it tends to the lowest frequency as the others die out.
-      const double kinetic = dot(v_, v_), curvature = dot(v_, last_r_) - dot(v_, r_);
-      if (kinetic > 0) frequency = std::sqrt(std::clamp(curvature / (mass * kinetic), 0.0, 3.6));
+      const double speed = norm(v_), unit = power_of_two(speed);
+      const double curvature = product(v_, last_r_, unit, mass * unit) - product(v_, r_, unit, mass * unit);
+      if (speed > 0) frequency = std::sqrt(std::clamp(curvature / ((speed / unit) * (speed / unit)), 0.0, 3.6));
       const double c = frequency;   // critical: c dt/2 = omega
       combine((1 - c) / (1 + c), v_, 1 / (mass * (1 + c)), r_, v_);
     }
@@ -94,6 +103,10 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
   equilibrium.note(fmt::format("  iteration {:6}  residual {:.3e}", solution.iterations, equilibrium.relative_residual()));
   solution.converged = true;
   return solution;
+}
+
+bool Relaxation::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
+  return last && has_negative_curvature(equilibrium, u);
 }
 
 void DynamicRelaxation::run(Problem& problem, Observer& observer) {

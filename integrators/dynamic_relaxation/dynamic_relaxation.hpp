@@ -13,6 +13,8 @@ class Relaxation final : public EquilibriumSolver {
  public:
   Relaxation(Problem& problem, const RelaxationOptions& options);
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
+  /// It moves on from unstable equilibria where anything pushes it aside: a body that is symmetric to rounding stays.
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override;
 
  private:
   /// Mass on every component for which steps of length 1 are stable at u [N/m]; 0 where there is none.

@@ -1,3 +1,4 @@
+#include "../shared/bond_jacobian.hpp"
 #include "jfnk.hpp"
 #include "perikit/sdk/plugin.hpp"
 
@@ -21,10 +22,10 @@ PERIKIT_PLUGIN(registrar) {
        .limits = "Follows paths that the load parameter can follow: no snap-through."},
       [](const ParameterValues& values, const PartFactory&) {
         JfnkOptions options;
-        options.differences = values.text("tangent") == "differences";
-        options.preconditioner = values.text("preconditioner");
-        options.restart = static_cast<int>(values.integer("restart"));
-        options.max_restarts = static_cast<int>(values.integer("max_restarts"));
+        options.krylov.differences = values.text("tangent") == "differences";
+        options.krylov.preconditioner = values.text("preconditioner");
+        options.krylov.restart = static_cast<int>(values.integer("restart"));
+        options.krylov.max_restarts = static_cast<int>(values.integer("max_restarts"));
         options.values = values;
         return std::make_unique<Jfnk>(options);
       });

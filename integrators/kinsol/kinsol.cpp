@@ -13,9 +13,12 @@
 #include <utility>
 
 #include "../shared/assembled_tangent.hpp"
+#include "../shared/solver_memory.hpp"
 #include "flags.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/power_of_two.hpp"
 #include "perikit/sdk/eigenvalue.hpp"
+#include "perikit/sdk/stability.hpp"
 #include "perikit/sdk/tangent_predictor.hpp"
 
 namespace perikit {
@@ -245,8 +248,9 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
     }
   }
   // KINSOL measures forces by their largest component, a fixed-point iteration by steps, here times m.
-  fill(1.0, force_scale_);
-  fill(fixed_point() ? mass_ : 1 / problem.body().spacing(), displacement_scale_);
+  const double unit = power_of_two(std::max(equilibrium.reference(), equilibrium.residual_norm()));   // KINSOL takes squares
+  fill(1 / unit, force_scale_);
+  fill(fixed_point() ? mass_ / unit : 1 / problem.body().spacing(), displacement_scale_);
   const double free_components = std::sqrt(std::max(1.0, dot(equilibrium.free(), equilibrium.free())));
   check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.body().spacing())), "the largest step");
   check(KINSetScaledStepTol(memory_, 1e-15), "the smallest step");
@@ -255,7 +259,7 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   double strictness = 1;
   for (int attempt = 0; attempt < 5 && !equilibrium.converged(); ++attempt, strictness /= 4) {
     const int flag =
-        run_once(equilibrium, strictness * equilibrium.tolerance() * equilibrium.reference() / free_components, solution);
+        run_once(equilibrium, strictness * equilibrium.tolerance() * equilibrium.reference() / (unit * free_components), solution);
     if (flag < 0) {
       solution.failure = callback_failure_.empty() ? kinsol_flag_meaning(flag) : callback_failure_;
       // The state is kept where the norm that counts is met after all.
@@ -274,6 +278,21 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
                                    equilibrium.tolerance());
   }
   return solution;
+}
+
+bool KinsolSolver::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
+  if (!last) return false;
+  if (preconditioner_) return preconditioner_->finds_unstable(equilibrium, u);
+  std::string failure;
+  if (matrix_) return matrix_->tangent().make(equilibrium, u, false, failure) && matrix_->tangent().indefinite();
+  return has_negative_curvature(equilibrium, u);
+}
+
+double Kinsol::memory(Problem& problem) {
+  const int vectors = options_.linear_solver == "spgmr" ? options_.restart : options_.linear_solver == "spfgmr" ? 2 * options_.restart : 10;
+  if (options_.strategy == "fixed_point") return krylov_solver_bytes(problem, "none", 2 * static_cast<int>(options_.anderson));
+  // KLU keeps both factors, with indices, and beside the tangent the whole matrix in columns.
+  return krylov() ? krylov_solver_bytes(problem, options_.preconditioner, vectors) : 4 * direct_solver_bytes(problem);
 }
 
 void Kinsol::run(Problem& problem, Observer& observer) {

@@ -29,6 +29,7 @@ class KinsolSolver final : public EquilibriumSolver {
   KinsolSolver(const KinsolSolver&) = delete;
   KinsolSolver& operator=(const KinsolSolver&) = delete;
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override;
   void bonds_changed() override {
     if (preconditioner_) preconditioner_->discard();
   }
@@ -76,6 +77,7 @@ class Kinsol final : public Integrator {
     const bool matrix = krylov() ? needs_one_rank(options_.preconditioner) : options_.strategy != "fixed_point";
     return {.dynamic = false, .quasi_static = true, .several_ranks = !matrix};
   }
+  double memory(Problem& problem) override;
   void run(Problem& problem, Observer& observer) override;
 
  private:

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "../shared/solver_memory.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/memory.hpp"
 
@@ -35,7 +38,7 @@ bool FactorisedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, do
     note += "  tangent made convex";
   else if (tangent_.matrix().symmetric && !tangent_.factors().positive_definite())
     note += "  tangent not positive definite";
-  if (const double condition = tangent_.factors().reciprocal_condition(); condition < 1e-14) {
+  if (const double condition = tangent_.factors().reciprocal_condition(); condition < nearly_singular) {
     note += fmt::format("  tangent nearly singular ({:.1g})", condition);
     if (!std::exchange(warned_, true))
       equilibrium.note("warning: newton: the tangent is nearly singular: some part of the body is hardly held, and where it goes is rounding");
@@ -43,16 +46,44 @@ bool FactorisedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, do
   return true;
 }
 
+bool FactorisedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool) {
+  // The last tangent is that of an iterate next to the equilibrium: where it is definite, so is that of the equilibrium.
+  std::string failure;
+  if (!tangent_.indefinite()) return false;
+  return equilibrium.problem().constant_stiffness() || (tangent_.make(equilibrium, u, false, failure) && tangent_.indefinite());
+}
+
+bool Newton::direct(Problem& problem) const {
+  const std::string& asked = values_.text("linear_solver");
+  if (asked != "auto") return asked == "direct";
+  if (problem.dimension() == 1) return true;
+  // Measured (README.md): operations a second of CHOLMOD with its assembly, and what a linear solve with the companion takes, of which the number of
+  // iterations grows with the root of the bulk modulus unless pressures are unknowns of their own.
+  constexpr double operations_a_second = 1.6e10, seconds_a_point_2d = 2e-5, seconds_a_point_3d = 9e-5;
+  const double bulk = mixed_pays(problem) ? 1 : std::sqrt(std::max(1.0, largest_bulk_ratio(problem) / 4));
+  const double krylov = bulk * static_cast<double>(problem.body().points()) * (problem.dimension() == 2 ? seconds_a_point_2d : seconds_a_point_3d);
+  return predict_factor(problem, static_cast<double>(problem.assembled_size().blocks)).operations <= operations_a_second * krylov &&
+         direct_solver_bytes(problem) <= memory_limit();
+}
+
+double Newton::memory(Problem& problem) {
+  if (!direct(problem)) return krylov_solver_bytes(problem, "companion", KrylovOptions().restart);
+  return problem.loads().follow() ? krylov_solver_bytes(problem, "factorisation", KrylovOptions().restart) : direct_solver_bytes(problem);
+}
+
 void Newton::run(Problem& problem, Observer& observer) {
-  const AssembledSize size = problem.assembled_size();
-  if (const double bytes = static_cast<double>(size.bytes), limit = memory_limit(); bytes > limit) {
-    throw RunError(
-        fmt::format("newton: the assembled tangent of {} blocks needs {:.3g} GB before it is factorised; "
-                    "this machine offers {:.3g} GB; jfnk solves the same problem without it",
-                    size.blocks, bytes / 1e9, limit / 1e9));
+  // The tangent of loads that follow the surface is not symmetric, and not in the assembled one: GMRES takes it in, with the factors of the rest.
+  const bool follow = problem.loads().follow();
+  if (!follow && direct(problem)) {
+    FactorisedEquations equations;
+    return run_newton("newton", values_, problem, observer, equations);
   }
-  FactorisedEquations equations;
-  run_newton("newton", values_, problem, observer, equations);
+  std::string chosen;
+  KrylovOptions options;
+  options.preconditioner = direct(problem) ? "factorisation" : mixed_pays(problem) ? "auto" : "companion";
+  const std::unique_ptr<LinearisedProblem> equations = make_krylov_equations(problem, options, chosen);
+  observer.log(fmt::format("newton: GMRES, preconditioner {}{}", chosen, follow ? ", with the tangent of the pressures that follow the surface" : ""));
+  run_newton("newton", values_, problem, observer, *equations);
 }
 
 }  // namespace perikit

@@ -1,6 +1,7 @@
 #pragma once
 #include "../shared/assembled_tangent.hpp"
 #include "../shared/bond_jacobian.hpp"
+#include "../shared/krylov_equations.hpp"
 
 namespace perikit {
 
@@ -12,6 +13,7 @@ class FactorisedEquations final : public LinearisedProblem {
   bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
              std::string& failure) override;
   bool exact() const noexcept override { return true; }
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override;
 
  private:
   AssembledTangent tangent_;
@@ -19,14 +21,18 @@ class FactorisedEquations final : public LinearisedProblem {
   bool warned_ = false;
 };
 
-/// Newton's method [Hashim et al., eqs. 21-29] with the exact assembled tangent.
+/// Newton's method [Hashim et al., eqs. 21-29] with the exact tangent, assembled and factorised where that is predicted to be cheaper, else by GMRES.
 class Newton final : public Integrator {
  public:
   explicit Newton(const ParameterValues& values) : values_(values) {}
   IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  double memory(Problem& problem) override;
   void run(Problem& problem, Observer& observer) override;
 
  private:
+  /// Whether linear systems are solved by factors of the tangent.
+  bool direct(Problem& problem) const;
+
   ParameterValues values_;
 };
 

@@ -6,6 +6,7 @@
 namespace perikit {
 
 bool AssembledTangent::assemble_as(Equilibrium& equilibrium, ConstFieldView u, bool convex, std::string& failure) {
+  solver_.watch([&equilibrium] { return equilibrium.goes_on(); });
   matrix_.convex = convex;
   factorised_ = false;
   const EvaluationStatus status = equilibrium.problem().assemble_tangent(u, matrix_);
@@ -29,6 +30,11 @@ bool AssembledTangent::assemble(Equilibrium& equilibrium, ConstFieldView u, bool
 bool AssembledTangent::make(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure) {
   if (!assemble(equilibrium, u, may_convex, failure)) return false;
   return factorised_ || (factorised_ = solver_.factorise(matrix_, equilibrium.free(), failure));
+}
+
+bool AssembledTangent::indefinite() const noexcept {
+  return factorised_ && matrix_.symmetric && !matrix_.convex && solver_.unknowns() > 0 && !solver_.positive_definite() &&
+         solver_.reciprocal_condition() >= nearly_singular;
 }
 
 void AssembledTangent::multiply(ConstFieldView free, ConstFieldView w, FieldView Kw) const {

@@ -14,6 +14,9 @@ inline bool far_from(const Equilibrium& equilibrium) {
   return equilibrium.relative_residual() > 0.1;
 }
 
+/// Reciprocal condition of factors below which the sign of a pivot, and the answer along some motion, is rounding.
+inline constexpr double nearly_singular = 1e-14;
+
 /// The tangent at a state as a matrix, and its factors. Far from equilibrium an indefinite tangent tells of errors more than of
 /// the body: a full step leaves errors of second order in volumes, which the bulk modulus turns into pressures. There it is
 /// assembled without the negative curvatures of single evaluation points (BlockMatrix::convex), as in projected Newton methods
@@ -33,6 +36,8 @@ class AssembledTangent {
 
   const BlockMatrix& matrix() const noexcept { return matrix_; }
   const SparseSolver& factors() const noexcept { return solver_; }
+  /// Whether the exact tangent that was factorised last has negative eigenvalues, of more than rounding: its equilibrium is unstable.
+  bool indefinite() const noexcept;
   /// What was left out of the matrix are negative curvatures.
   bool convex() const noexcept { return matrix_.convex; }
 

@@ -31,6 +31,7 @@ class BondJacobian final : public EquilibriumSolver {
   BondJacobian(Problem& problem, NewtonIteration& newton, LinearisedProblem& equations, std::unique_ptr<WeakeningBonds> bonds);
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
   bool forecast_bonds(Equilibrium& equilibrium, ConstFieldView u, ConstFieldView r) override;
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override { return newton_.unstable(equilibrium, u, last); }
   void bonds_changed() override { newton_.bonds_changed(); }
 
  private:

@@ -59,11 +59,10 @@ class MixedSystem {
   /// The same, to the volumes at u: what an extrapolated motion is to keep, because its own B du is an error of second order
   /// itself.
   std::pair<double, double> keep_volumes(ConstFieldView u, FieldView du);
-
- private:
   /// z <- M^-1 r; another field than r.
   void invert_companion(ConstFieldView r, FieldView z);
 
+ private:
   Problem& problem_;
   VolumeEquations volumes_;
   BlockMatrix springs_;

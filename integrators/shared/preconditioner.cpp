@@ -10,6 +10,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/problem/motion.hpp"
+#include "perikit/sdk/stability.hpp"
 
 namespace perikit {
 
@@ -128,16 +129,6 @@ class CompanionCycle final : public Preconditioner {
   std::unique_ptr<MultigridCycle> cycle_;
 };
 
-/// Largest ratio of bulk to shear modulus. All ranks must call it.
-double largest_bulk_ratio(const Problem& problem) {
-  double largest = 0;
-  for (const std::int32_t p : problem.body().owned()) {
-    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
-    if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
-  }
-  return communicator().largest(largest);
-}
-
 /// Largest over smallest shear modulus. All ranks must call it.
 double shear_contrast(const Problem& problem) {
   double largest = 0, largest_inverse = 0;
@@ -187,6 +178,13 @@ bool Preconditioner::convex() const noexcept {
   return tangent() && tangent()->convex();
 }
 
+bool Preconditioner::finds_unstable(Equilibrium& equilibrium, ConstFieldView u) {
+  std::string failure;
+  if (tangent()) return renew(equilibrium, u, failure) && tangent()->indefinite();
+  const bool there = prepare(equilibrium, u, failure);
+  return has_negative_curvature(equilibrium, u, there ? [this](ConstFieldView r, FieldView z) { apply(r, z); } : PreconditionerAction());
+}
+
 void Preconditioner::took(int iterations, double reduction) {
   // A solve that gains less than a digit says little of its speed.
   const double digits = std::max(1.0, -std::log10(std::max(reduction, 1e-16)));
@@ -212,13 +210,25 @@ bool mixed_pays(Problem& problem) {
   return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && shear_contrast(problem) <= most_contrast && !factorisation_pays(problem);
 }
 
+double largest_bulk_ratio(const Problem& problem) {
+  double largest = 0;
+  for (const std::int32_t p : problem.body().owned()) {
+    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
+    if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
+  }
+  return communicator().largest(largest);
+}
+
+std::string automatic_preconditioner(Problem& problem) {
+  return factorisation_pays(problem) ? "factorisation" : "companion";
+}
+
 bool needs_one_rank(const std::string& preconditioner) noexcept {
   return preconditioner == "factorisation" || preconditioner == "jacobi";
 }
 
 std::unique_ptr<Preconditioner> make_preconditioner(const std::string& name, Problem& problem, std::string& chosen) {
-  chosen = name;
-  if (name == "auto") chosen = factorisation_pays(problem) ? "factorisation" : "companion";
+  chosen = name == "auto" ? automatic_preconditioner(problem) : name;
   if (chosen == "factorisation") return std::make_unique<Factorisation>(problem);
   if (chosen == "companion") return make_companion_cycle(problem, std::numeric_limits<double>::infinity(), chosen);
   if (chosen == "jacobi") return std::make_unique<BlockJacobi>(problem);

@@ -31,6 +31,8 @@ class Preconditioner {
   /// True where the tangent at the state of the last prepare() was made convex: the linear equations are then to be those of
   /// tangent().
   bool convex() const noexcept;
+  /// Whether the equilibrium u is unstable: by the signs of the factors of the tangent where it has them, else by has_negative_curvature with its help.
+  bool finds_unstable(Equilibrium& equilibrium, ConstFieldView u);
   /// To be made anew before the next solve.
   void discard() noexcept { made() = in_hand_ = false; }
   /// Iterations that a solve took to make its residual smaller by the factor `reduction` < 1.
@@ -70,6 +72,11 @@ void add_preconditioner_key(ParameterTable& table, bool mixed = false);
 /// the volumes that they need: the bulk modulus is at least 50 shear moduli somewhere (20 on lattices in 3D, 200 in 2D), and the
 /// factorisation does not pay, as never on several ranks. All ranks must call it.
 bool mixed_pays(Problem& problem);
+
+/// What the name "auto" stands for, mixed systems apart. All ranks must call it.
+std::string automatic_preconditioner(Problem& problem);
+/// Largest ratio of bulk to shear modulus. All ranks must call it.
+double largest_bulk_ratio(const Problem& problem);
 
 /// Whether the preconditioner of this name needs the assembled tangent, and with it the whole body on one rank.
 bool needs_one_rank(const std::string& preconditioner) noexcept;

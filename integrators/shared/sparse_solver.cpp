@@ -8,8 +8,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
+#include <future>
 #include <limits>
+#include <memory>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -84,6 +88,12 @@ bool find_elimination_order(std::int64_t n, std::int64_t* first, std::int64_t* r
   return found;
 }
 
+/// What UMFPACK says of its factors.
+struct LuResult {
+  SuiteSparse_long status = UMFPACK_OK;
+  double info[UMFPACK_INFO];
+};
+
 struct SparseSolver::Implementation {
   cholmod_common common{};
   FreeMatrix free;
@@ -93,6 +103,8 @@ struct SparseSolver::Implementation {
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   void *symbolic = nullptr, *numeric = nullptr;
   bool analysed = false, definite = false, ready = false;
+  std::function<bool()> goes_on;
+  bool given_up = false;
   double entries = 0, limit, reciprocal_condition = 1;
 
   explicit Implementation(double memory) : limit(memory) {
@@ -115,6 +127,27 @@ struct SparseSolver::Implementation {
     umfpack_dl_free_numeric(&numeric);
   }
 
+  /// Does `work`, which asks nobody, on a thread of its own. False where the run is to end before it is done: it is left to itself then, with all that it
+  /// uses, until the program ends.
+  template <class Work>
+  bool done(Work work) {
+    if (!goes_on) {
+      work();
+      return true;
+    }
+    std::packaged_task<void()> task(std::move(work));
+    const std::future<void> end = task.get_future();
+    std::thread worker(std::move(task));
+    while (end.wait_for(std::chrono::milliseconds(100)) != std::future_status::ready) {
+      if (goes_on()) continue;
+      worker.detach();
+      given_up = true;
+      return false;
+    }
+    worker.join();
+    return true;
+  }
+
   /// The ordering of the points that CHOLMOD likes best (AMD, or METIS' nested dissection), component by component.
   std::vector<FreeMatrix::Index> ordering(const BlockMatrix& K) {
     std::vector<FreeMatrix::Index> begin(1, 0), rows;
@@ -125,9 +158,17 @@ struct SparseSolver::Implementation {
       }
       begin.push_back(static_cast<FreeMatrix::Index>(rows.size()));
     }
-    std::vector<FreeMatrix::Index> points(K.rows()), order;
-    if (!find_elimination_order(static_cast<FreeMatrix::Index>(K.rows()), begin.data(), rows.data(), points.data())) return order;
-    for (const FreeMatrix::Index point : points)
+    struct Graph {
+      std::vector<FreeMatrix::Index> begin, rows, points;
+      bool ordered = false;
+    };
+    const auto graph = std::make_shared<Graph>(Graph{std::move(begin), std::move(rows), std::vector<FreeMatrix::Index>(K.rows())});
+    std::vector<FreeMatrix::Index> order;
+    const bool ended = done([graph] {
+      graph->ordered = find_elimination_order(static_cast<FreeMatrix::Index>(graph->points.size()), graph->begin.data(), graph->rows.data(), graph->points.data());
+    });
+    if (!ended || !graph->ordered) return order;
+    for (const FreeMatrix::Index point : graph->points)
       for (int a = 0; a < K.dimension; ++a) {
         const FreeMatrix::Index unknown = free.unknown(static_cast<std::size_t>(point), a);
         if (unknown >= 0) order.push_back(unknown);
@@ -138,6 +179,7 @@ struct SparseSolver::Implementation {
   bool analyse(const BlockMatrix& K, std::string& failure) {
     free.pattern(K, true, upper_first, upper_row);
     std::vector<FreeMatrix::Index> order = ordering(K);
+    if (given_up) return stopped(failure);
     cholmod_sparse A = view(free.unknowns(), upper_first.data(), upper_row.data(), nullptr);
     // Only the given ordering is tried from here on.
     common.nmethods = 1;
@@ -160,14 +202,20 @@ struct SparseSolver::Implementation {
     return false;
   }
 
+  static bool stopped(std::string& failure) {
+    failure = "the run was stopped";
+    return false;
+  }
+
   bool factorise_symmetric(const BlockMatrix& K, std::string& failure) {
     if (!cholesky && !analyse(K, failure)) return false;
     free.values(K, true, upper_first, value);
     cholmod_sparse A = view(free.unknowns(), upper_first.data(), upper_row.data(), value.data());
-    {
+    const bool ended = done([this, A]() mutable {
       const OneThread one;
       cholmod_l_factorize(&A, cholesky, &common);
-    }
+    });
+    if (!ended) return stopped(failure);
     definite = common.status == CHOLMOD_OK && cholesky->minor == free.unknowns();
     if (common.status == CHOLMOD_OUT_OF_MEMORY)
       failure =
@@ -185,8 +233,13 @@ struct SparseSolver::Implementation {
     double info[UMFPACK_INFO];
     SuiteSparse_long status = UMFPACK_OK;
     if (!symbolic) status = umfpack_dl_symbolic(n, n, as_long(first), as_long(row), value.data(), &symbolic, nullptr, info);
-    if (status == UMFPACK_OK)
-      status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, info);
+    if (status == UMFPACK_OK) {
+      const auto result = std::make_shared<LuResult>();
+      if (!done([this, result] { result->status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, result->info); }))
+        return stopped(failure);
+      status = result->status;
+      std::copy_n(result->info, UMFPACK_INFO, info);
+    }
     if (status == UMFPACK_OK) {
       entries = info[UMFPACK_LNZ] + info[UMFPACK_UNZ];
       reciprocal_condition = info[UMFPACK_RCOND];
@@ -200,7 +253,13 @@ struct SparseSolver::Implementation {
 };
 
 SparseSolver::SparseSolver(double memory) : implementation_(std::make_unique<Implementation>(memory)) {}
-SparseSolver::~SparseSolver() = default;
+SparseSolver::~SparseSolver() {
+  if (implementation_->given_up) implementation_.release();   // a thread is still at work on it
+}
+
+void SparseSolver::watch(std::function<bool()> goes_on) {
+  implementation_->goes_on = std::move(goes_on);
+}
 
 bool SparseSolver::factorise_definite(const BlockMatrix& K, ConstFieldView free, std::string& failure) {
   Implementation& own = *implementation_;

@@ -2,6 +2,7 @@
 /// Direct solution of linear systems with assembled tangents: the one place that knows SuiteSparse.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -22,6 +23,8 @@ class SparseSolver {
   SparseSolver(const SparseSolver&) = delete;
   SparseSolver& operator=(const SparseSolver&) = delete;
 
+  /// Asked ten times a second from now on while an ordering or a factorisation takes time: false gives it up, and nothing can be solved any more.
+  void watch(std::function<bool()> goes_on);
   /// False where K is singular to working accuracy or memory is short; `failure` says so. `free`: 1 on free components,
   /// K.dimension components. The pattern of K and the mask must be those of the first call.
   bool factorise(const BlockMatrix& K, ConstFieldView free, std::string& failure);

@@ -366,12 +366,16 @@ set = "all"
 force = [0, 1]
 [integrator]
 type = "newton"
+linear_solver = "direct"
 )");
-  const Result failed = desk.perikit("run scene.toml -o out --threads 1", "ulimit -v 1000000;");
-  INFO(failed.err);
-  CHECK(failed.status == 1);
-  CHECK(contains(failed.err, "newton: the assembled tangent of "));
-  CHECK(contains(failed.err, "this machine offers 1.02 GB"));
+  for (const std::string command : {"check scene.toml", "run scene.toml -o out --threads 1"}) {
+    const Result failed = desk.perikit(command, "ulimit -v 1000000;");
+    INFO(failed.err);
+    CHECK(failed.status == 1);
+    CHECK(contains(failed.err, "newton: matrices, factors and vectors of its solver need about "));
+    CHECK(contains(failed.err, "this machine offers 1.02 GB"));
+    CHECK_MESSAGE(!fs::exists(desk.path("out")), "a refused run leaves a folder");
+  }
 }
 
 TEST_CASE("cli: an inadmissible run ends with status 1 and says where, when and what is left") {
@@ -417,4 +421,30 @@ TEST_CASE("cli: bench gives a table and the same figures for other programs") {
   const Result full = desk.perikit("bench --cells 5 --kinematics conventional --json no/such/folder.json");
   CHECK(full.status == 1);
   CHECK(contains(full.err, "no/such/folder.json: cannot be written"));
+}
+
+TEST_CASE("cli: check says what solvers of load steps take, within half of what the run then takes") {
+  const auto scene = [](const std::string& body, const std::string& kinematics, const std::string& integrator) {
+    return fmt::format("format = 1\n[body]\n{}\n[sets]\nlow = \"x < 0.1\"\nhigh = \"x > 1.3\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"{}\"\n[material]\ntype = \"neo_hookean\"\n"
+                       "youngs_modulus = 1e6\npoisson_ratio = 0.3\n[[boundary]]\nset = \"low\"\ndisplacement = VECTOR\n[[boundary]]\nset = \"high\"\nvelocity = VECTOR\n[integrator]\n{}\nsteps = 1\n",
+                       body, kinematics, integrator);
+  };
+  const std::string solid = "dimension = 3\nlattice = { spacing = 0.1, lower = [0, 0, 0], upper = [1.4, 0.8, 0.8] }",
+                    plane = "dimension = 2\nplane = \"strain\"\nlattice = { spacing = 0.025, lower = [0, 0], upper = [1.4, 1] }";
+  for (const std::string& body : {solid, plane})
+    for (const std::string integrator : {"type = \"newton\"\nlinear_solver = \"direct\"", "type = \"newton\"", "type = \"jfnk\"\npreconditioner = \"companion\""}) {
+      INFO(body, " ", integrator);
+      std::string text = replaced(scene(body, "baqp", integrator), "VECTOR", body == solid ? "[0, 0, 0]" : "[0, 0]");
+      text = replaced(text, "velocity = VECTOR", body == solid ? "displacement = [0.02, 0, 0]" : "displacement = [0.02, 0]");
+      const Desk desk(text);
+      const Result check = desk.perikit("check scene.toml --threads 1"), run = desk.perikit("run scene.toml -o out --threads 1");
+      REQUIRE_MESSAGE(check.status == 0, check.err);
+      REQUIRE_MESSAGE(run.status == 0, run.err);
+      const std::string before = "process       about ", taken = " MB of arrays, ";
+      REQUIRE(contains(check.out, before));
+      REQUIRE(contains(run.out, taken));
+      const double predicted = std::stod(check.out.substr(check.out.find(before) + before.size())), measured = std::stod(run.out.substr(run.out.find(taken) + taken.size()));
+      CHECK_MESSAGE(predicted <= 1.5 * measured, predicted, " MB, and ", measured);
+      CHECK_MESSAGE(measured <= 1.5 * predicted, predicted, " MB, and ", measured);
+    }
 }

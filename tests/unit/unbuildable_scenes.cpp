@@ -283,6 +283,17 @@ TEST_CASE("files that hold no body are refused with file, line, column and what 
   }
   CHECK(has(refusal("x,y,volume\n"), "cloud.csv: found no points behind the header line; allowed: one or more"));
   CHECK(has(refusal(""), "cloud.csv: found no header line; allowed: x,y,volume"));
+  // Areas of a plate that is thin: a hundred times the volumes that there is room for.
+  {
+    SceneDraft thin(text);
+    thin.set("body", "thickness", "0.01");
+    std::ofstream(bench.folder.path / "cloud.csv") << good;
+    const std::string message = bench.refusal(thin.text());
+    CHECK_MESSAGE(has(message, "body.points.file: found volumes that add up to 24 m^3, 100 times the 0.24 m^3 that the points have room for: their box is 6 m long in x, 4 m in y, "
+                               "with a thickness of 0.01 m"),
+                  message);
+    CHECK_MESSAGE(has(message, "allowed: volumes in m^3, areas times the thickness"), message);
+  }
   // A horizon that no bond fits into.
   SceneDraft draft(text);
   draft.set("family", "horizon_ratio", "0.4", "horizon");

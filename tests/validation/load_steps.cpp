@@ -175,3 +175,55 @@ TEST_CASE("a body that nothing moves stays where it is, with a residual of zero"
       for (int c = 0; c < 2; ++c) CHECK(simulation->problem().state().displacement().component(c)[p] == 0);
   }
 }
+
+TEST_CASE("an equilibrium that is not stable is told, by every integrator and once; one that is stable is not") {
+  registry();
+  // A column that is shortened, clamped and guided; a small force chooses its side. With few steps the path stays straight beyond Euler's load.
+  const auto column = [](const std::string& integrator, double shortened, double aside) {
+    return contract::build(fmt::format(
+        "format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [10, 0.5]\n[sets]\ntip = {{ nearest = [10, 0] }}\n"
+        "[family]\nhorizon_ratio = 2.515\ninfluence = \"gaussian\"\n[kinematics]\ntype = \"baqp\"\n[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1200.0\n"
+        "poisson_ratio = 0.0\n[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[boundary]]\nface = \"+x\"\ndisplacement = [\"-{}*t\", \"free\"]\n[[load]]\nset = \"tip\"\n"
+        "force = [\"0\", \"{}\"]\nramp = false\n[integrator]\nsteps = 4\n{}",
+        shortened, aside, integrator));
+  };
+  const std::string told = "is not stable";
+  for (const std::string integrator :
+       {"type = \"newton\"\n", "type = \"newton\"\nlinear_solver = \"krylov\"\n", "type = \"jfnk\"\n", "type = \"jfnk\"\npreconditioner = \"companion\"\n",
+        "type = \"jfnk\"\npreconditioner = \"none\"\n", "type = \"kinsol\"\n", "type = \"kinsol\"\nlinear_solver = \"klu\"\n", "type = \"dynamic_relaxation\"\n"}) {
+    INFO(integrator);
+    const auto straight = column(integrator, 0.3, 0.0), held = column(integrator, 0.03, 0.0);
+    const Protocol beyond = run(*straight), before = run(*held);
+    const std::size_t at = beyond.text.find(told);
+    REQUIRE_MESSAGE(at != std::string::npos, beyond.text);
+    CHECK(beyond.text.find(told, at + 1) == std::string::npos);
+    CHECK_MESSAGE(before.text.find(told) == std::string::npos, before.text);
+  }
+  const auto bent = column("type = \"newton\"\n", 0.3, 0.3);
+  const Protocol stable = run(*bent);
+  CHECK(std::abs(mean(*bent, "tip", 1)) > 1);
+  CHECK_MESSAGE(stable.text.find(told) == std::string::npos, stable.text);
+}
+
+TEST_CASE("forces of any size: what a load does is in proportion to it, from numbers without digits to those whose squares are none") {
+  registry();
+  const auto pulled = [](const std::string& integrator, double force) {
+    return contract::build(fmt::format(
+        "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 0.4]\n[sets]\nlow = \"x < 0.1\"\nhigh = \"x > 0.9\"\n"
+        "[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"baqp\"\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1e6\npoisson_ratio = 0.25\n[[boundary]]\n"
+        "set = \"low\"\ndisplacement = [0, 0]\n[[load]]\nset = \"high\"\nforce = [{:.17g}, 0]\n[integrator]\nsteps = 1\n{}",
+        force, integrator));
+  };
+  for (const std::string integrator : {"type = \"newton\"\n", "type = \"newton\"\nlinear_solver = \"krylov\"\n", "type = \"jfnk\"\n", "type = \"kinsol\"\n", "type = \"dynamic_relaxation\"\n"}) {
+    const auto one = pulled(integrator, 1.0);
+    run(*one);
+    const double u = mean(*one, "high", 0);
+    CHECK(u > 0);
+    for (const double force : {1e-290, 1e-200, 1e-160, 1e100, 1e150}) {
+      INFO(integrator, force);
+      const auto other = pulled(integrator, force);
+      run(*other);
+      CHECK(mean(*other, "high", 0) / force == doctest::Approx(u).epsilon(1e-6));
+    }
+  }
+}

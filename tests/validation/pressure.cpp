@@ -184,3 +184,27 @@ TEST_CASE("newton and jfnk find the same inflated ring") {
   CHECK(norm(a->problem().state().displacement()) > 0);
   CHECK(norm(difference) < 1e-6 * norm(a->problem().state().displacement()));
 }
+
+TEST_CASE("newton with a pressure that follows: the tangent of the load is in its equations, and load steps need no cut-back") {
+  // A cantilever that an end couple rolls up.
+  registry();
+  const auto rolled = [](const std::string& integrator) {
+    return contract::build("format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [6, 0.5]\n[sets]\nend = \"x > 5.75\"\n"
+                    "pin = { nearest = [0, 0] }\n[family]\nhorizon_ratio = 2.515\ninfluence = \"gaussian\"\n[kinematics]\ntype = \"projection\"\n[material]\n"
+                    "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1000.0\npoisson_ratio = 0.0\n[[symmetry]]\naxis = \"x\"\n[[boundary]]\nset = \"pin\"\ndisplacement = "
+                    "[\"free\", 0]\n[[load]]\nset = \"end\"\nface = \"+x\"\npressure = \"-120*y\"\nfollower = true\n[integrator]\nsteps = 6\n" + integrator);
+  };
+  const auto reference = rolled("type = \"jfnk\"\n");
+  contract::run(*reference);
+  const ConstFieldView u = reference->problem().state().displacement();
+  CHECK(largest_magnitude(u) > 1);
+  for (const std::string solver : {"auto", "direct", "krylov"}) {
+    INFO(solver);
+    const auto found = rolled("type = \"newton\"\nlinear_solver = \"" + solver + "\"\n");
+    contract::run(*found);
+    CHECK(found->problem().state().step == 6);
+    Field difference = found->problem().make_field();
+    combine(1, found->problem().state().displacement(), -1, u, difference);
+    CHECK(norm(difference) < 1e-5 * norm(u));
+  }
+}

@@ -165,6 +165,40 @@ void refuse_empty_cell(const Scene& scene, const PointCloud& cloud) {
           x[1], x[2]));
 }
 
+/// That of so many points in the box that is larger than they by half of it.
+double spacing_in_box(const Point& first, const Point& last, double points, int dimension) {
+  double spacing = 0;
+  for (int step = 0; step < 50; ++step) {
+    double size = 1;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) size *= last[c] - first[c] + spacing;
+    spacing = std::pow(size / points, 1.0 / dimension);
+  }
+  return spacing;
+}
+
+/// Volumes that are far larger than the room that there is for them, areas for instance, give a spacing and with it a horizon far beyond those of the
+/// points: every point would be a neighbour of every other.
+void check_volumes(const Scene& scene, const PointCloud& cloud, WhichPoints which, double total, double points, double ratio) {
+  constexpr double most = 4;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Point lower{infinity, infinity, infinity}, upper{-infinity, -infinity, -infinity};
+  extend(cloud.position, which, lower, upper);
+  const int d = scene.body.dimension;
+  const auto axes = static_cast<std::size_t>(d);
+  for (std::size_t c = 0; c < axes; ++c)
+    if (!(upper[c] > lower[c])) return;   // a layer may be as thick as it likes
+  const double spacing = spacing_in_box(lower, upper, points, d), room = points * std::pow(spacing, d) * scene.body.section;
+  if (points < 2 || total <= most * room) return;
+  const double m = ratio * std::pow(total / room, 1.0 / d);
+  throw InputError(scene.body.position, "body.points.file",
+                   fmt::format("found volumes that add up to {:.4g} m^3, {:.3g} times the {:.4g} m^3 that the points have room for: their box is {:.4g} m long in x{}{}{}. With a horizon from "
+                               "these volumes a family would have about {:.3g} points where {:.3g} are usual; allowed: volumes in m^3{}",
+                               total, total / room, room, upper[0] - lower[0] + spacing, d > 1 ? fmt::format(", {:.4g} m in y", upper[1] - lower[1] + spacing) : "",
+                               d > 2 ? fmt::format(", {:.4g} m in z", upper[2] - lower[2] + spacing) : "",
+                               d < 3 ? fmt::format(", with a {} of {:.4g} m{}", d == 2 ? "thickness" : "section", scene.body.section, d == 1 ? "^2" : "") : "",
+                               std::min(points, std::pow(2 * m + 1, d)), std::pow(2 * ratio + 1, d), d == 2 ? ", areas times the thickness" : ""));
+}
+
 /// Points of a file with the volumes of their Voronoi cells.
 PointCloud cells_of_points(const Scene& scene, WhichPoints which) {
   const BodyDescription& body = scene.body;
@@ -175,13 +209,7 @@ PointCloud cells_of_points(const Scene& scene, WhichPoints which) {
   Point lower{infinity, infinity, infinity}, upper{-infinity, -infinity, -infinity};
   extend(cloud.position, which, lower, upper);
   const Point first = lower, last = upper;
-  // The spacing that the points have in the box that is larger than they by half of it.
-  double spacing = 0;
-  for (int step = 0; step < 50; ++step) {
-    double size = 1;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) size *= last[c] - first[c] + spacing;
-    spacing = std::pow(size / points, 1.0 / body.dimension);
-  }
+  const double spacing = spacing_in_box(first, last, points, body.dimension);
   for (std::size_t c = 0; c < static_cast<std::size_t>(body.dimension); ++c) {
     lower[c] = body.points_lower ? (*body.points_lower)[c] : lower[c] - 0.5 * spacing;
     upper[c] = body.points_upper ? (*body.points_upper)[c] : upper[c] + 0.5 * spacing;
@@ -213,6 +241,7 @@ CloudPoints points_of_file(const Scene& scene, WhichPoints which) {
   const double total = which == WhichPoints::all ? volumes.value() : total_over_ranks(volumes),
                points = static_cast<double>(counted_of(cloud.volume.size(), which).all),
                spacing = mean_spacing(scene, total, points), reach = scene_horizon(scene, spacing);
+  if (!scene.body.voronoi) check_volumes(scene, cloud, which, total, points, reach / spacing);
   check_cloud(scene, points, reach / spacing, which);
   if (reach < spacing) {
     throw InputError(scene.body.position, "family.horizon",

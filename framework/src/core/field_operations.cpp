@@ -4,12 +4,15 @@
 #include <vector>
 
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/power_of_two.hpp"
 
 namespace perikit {
 
 namespace {
 
 constexpr std::size_t sum_block = 16384;
+/// Sums of squares beyond have lost digits, or terms.
+constexpr double smallest_square = 1e-270, largest_square = 1e300;
 
 }  // namespace
 
@@ -17,7 +20,12 @@ double dot(ConstFieldView a, ConstFieldView b) {
   return total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return a.data[k] * b.data[k]; }));
 }
 
-double norm(ConstFieldView a) { return std::sqrt(dot(a, a)); }
+double norm(ConstFieldView a) {
+  const double squares = dot(a, a);
+  if (squares > smallest_square && squares < largest_square) return std::sqrt(squares);
+  const double unit = power_of_two(largest_magnitude(a));
+  return unit * std::sqrt(total_over_ranks(exact_sum(a.size(), [&](std::size_t k) { return (a.data[k] / unit) * (a.data[k] / unit); })));
+}
 
 double largest_magnitude(ConstFieldView a) {
   std::vector<double> most((a.size() + sum_block - 1) / sum_block, 0.0);

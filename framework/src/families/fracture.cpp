@@ -183,7 +183,7 @@ std::vector<double> Fracture::integrities(std::span<const BondId> bonds, ConstFi
 
 bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force, const Body& body) {
   const double length = largest_magnitude(w);
-  if (weakening_.empty() || length == 0) return true;
+  if (weakening_.empty() || length < std::numeric_limits<double>::min()) return true;   // the step would be infinite
   // Central differences: points move by the cube root of the rounding unit times the spacing.
   const double step = std::cbrt(std::numeric_limits<double>::epsilon()) * families_.body().spacing() / length;
   Field at = families_.body().make_field(u.components);
@@ -196,7 +196,7 @@ bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force
     slope[k] = (slope[k] - behind[k]) / (2 * step);
     largest = std::max(largest, std::abs(slope[k]));
   }
-  if (largest == 0) return true;
+  if (largest < std::numeric_limits<double>::min()) return true;
   const double change = 1e-6 / largest;
   std::vector<BondChange> before, after;
   for (std::size_t k = 0; k < slope.size(); ++k) {

@@ -97,6 +97,9 @@ void RunRecorder::watch_energies(const StepReport& report, bool recorded) {
   const double off = balance.add(e, simulation_.dynamic() ? energy_of_load_kick(problem, report.time_step) : 0.0);
   if (!simulation_.dynamic() || !problem.terms().conservative() || off <= lost_share * balance.largest) return;
   if (balance.largest <= smallest_energy || off <= rounding_energy(problem, report.time_step)) return;
+  if (!std::isfinite(off))
+    throw RunError(fmt::format("step {}, time {:.6g} s: the energies are beyond what a number can hold: strain {:.3g} J, kinetic {:.3g} J, work {:.3g} J", report.step,
+                               report.time, e.strain, e.kinetic, e.external_work));
   throw RunError(
       fmt::format("step {}, time {:.6g} s: the energies do not add up any more: strain {:.3g} J, kinetic {:.3g} J and dissipated "
                   "{:.3g} J, from {:.3g} J "

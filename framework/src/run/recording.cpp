@@ -32,6 +32,7 @@ namespace perikit {
 namespace {
 
 std::atomic<bool> stop{false};
+std::atomic<int> without_results{0};
 constexpr std::int64_t default_frames = 20;
 constexpr std::int64_t default_history_rows = 1000;
 
@@ -66,6 +67,10 @@ void share(Checkpoint& checkpoint) {
 
 void request_stop() noexcept { stop = true; }
 bool stop_requested() noexcept { return stop; }
+
+NothingToKeep::NothingToKeep() noexcept { ++without_results; }
+NothingToKeep::~NothingToKeep() { --without_results; }
+bool NothingToKeep::holds() noexcept { return without_results > 0; }
 
 std::vector<std::string> history_columns(const Scene& scene, bool laws_dissipate) {
   std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};

@@ -8,6 +8,7 @@
 
 #include "perikit/build/problem.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/memory.hpp"
 #include "perikit/core/parallel.hpp"
 #include "run/doubts.hpp"
 #include "run/earlier_results.hpp"
@@ -85,6 +86,14 @@ void Simulation::refuse_gradients() const {
   for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
     check(scene_.output.history[k].quantity, scene_.output.history[k].position, fmt::format("output.history.{}.quantity", k));
   }
+}
+
+double Simulation::refuse_memory() {
+  const double bytes = communicator().largest(integrator_->memory(*problem_)), limit = memory_limit();   // refused by all ranks or by none
+  if (bytes <= limit) return bytes;
+  throw RunError(fmt::format("{}: matrices, factors and vectors of its solver need about {:.3g} GB; this machine offers {:.3g} GB; jfnk with preconditioner = \"companion\", or newton "
+                             "with linear_solver = \"krylov\", take least",
+                             scene_.integrator->type, bytes / 1e9, limit / 1e9));
 }
 
 void Simulation::run(Observer& observer) {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <optional>
 #include <ctime>
 #include <new>
 #include <span>
@@ -38,6 +39,7 @@ std::string packed(const RunOutcome& outcome) {
 RunOutcome unpacked(std::string text) {
   text.pop_back();
   const std::size_t reason = text.find("\n\n");
+  std::optional<NothingToKeep> set_up_alone(std::in_place);
   RunOutcome outcome;
   std::istringstream lines(text.substr(0, reason));
   std::getline(lines, outcome.status);
@@ -78,6 +80,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
   using clock = std::chrono::steady_clock;
   const auto seconds = [](clock::duration duration) { return std::chrono::duration<double>(duration).count(); };
   RunOutcome outcome{"done", "", {}};
+  std::optional<NothingToKeep> set_up_alone(std::in_place);
   try {
     const auto start = clock::now();
     Simulation simulation(scene, parts);
@@ -86,8 +89,11 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     outcome.measures["points"] = static_cast<double>(problem.body().points_of_all_ranks());
     outcome.measures["bonds"] = static_cast<double>(problem.terms().report().bonds);
     outcome.measures["memory"] = static_cast<double>(problem.bytes());
+    const std::string summary = simulation.summary();
+    simulation.refuse_memory();
+    set_up_alone.reset();
     RunRecorder recorder(simulation, folder, false, RunStart::fresh, {}, force);
-    recorder.log(simulation.summary());
+    recorder.log(summary);
     const auto running = clock::now();
     const std::clock_t processor = std::clock();
     try {

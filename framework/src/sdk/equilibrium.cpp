@@ -9,6 +9,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/power_of_two.hpp"
 
 namespace perikit {
 
@@ -55,16 +56,20 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
     return false;
   }
   if (external_.data) combine(1, r, 1, external_, r);
-  double squares = external_.data ? dot(external_, external_) : 0.0;
+  // In a unit that squares can be taken in, whatever the size of forces.
+  double largest = external_.data ? largest_magnitude(external_) : 0.0;
+  for (const std::int64_t dof : problem_.constraints().dofs()) largest = std::max(largest, std::abs(r.data[dof]));
+  const double unit = power_of_two(communicator().largest(largest));
+  double squares = external_.data ? total_over_ranks(exact_sum(external_.size(), [&](std::size_t k) { return (external_.data[k] / unit) * (external_.data[k] / unit); })) : 0.0;
   ExactSum reactions;
   for (const std::int64_t dof : problem_.constraints().dofs()) {
-    const double outer = external_.data ? external_.data[dof] : 0.0, reaction = -r.data[dof];
+    const double outer = (external_.data ? external_.data[dof] : 0.0) / unit, reaction = -r.data[dof] / unit;
     reactions.add(reaction * reaction - outer * outer);  // loads on prescribed components go into the reactions
   }
   squares += total_over_ranks(reactions);
   mask(free_, r);
   norm_ = norm(r);
-  reference_ = std::sqrt(std::max(squares, 0.0));
+  reference_ = unit * std::sqrt(std::max(squares, 0.0));
   reference_ = std::max(reference_, 4 * std::numeric_limits<double>::epsilon() * stiffness_ * norm(u) / tolerance_);
   if (std::isfinite(norm_) && std::isfinite(reference_)) return true;
   failure_ = "the forces are not finite";

@@ -55,7 +55,7 @@ class LoadSteps {
         driving_(problem.make_field()),
         old_driving_(problem.make_field()),
         start_(problem.make_field()),
-        numbers_(state_.declare_numbers("load_steps", 5)) {}
+        numbers_(state_.declare_numbers("load_steps", 6)) {}
 
   void run() {
     double& planned_end = state_.declare_numbers("planned_end", 1)[0];
@@ -84,6 +84,7 @@ class LoadSteps {
   double& increment() noexcept { return numbers_[2]; }        ///< of the position, for the next step
   double& last_span() noexcept { return numbers_[3]; }        ///< length of the last step; 0: none to continue
   double& largest_reference() noexcept { return numbers_[4]; }  ///< of the equilibria so far [N]
+  double& told_unstable() noexcept { return numbers_[5]; }      ///< 1: the warning is in the log
   double planned() const noexcept { return static_cast<double>(options_.steps); }
 
   void begin() {
@@ -241,9 +242,21 @@ class LoadSteps {
     state_.time = position() / planned();
     ++state_.step;
     solver_.accepted(problem_, u_);
+    watch_stability();
     observer_.log(equilibrium_.take_notes());
     observer_.wants_sample(state_.step, state_.time);
     report(span / planned(), solution.iterations);
+  }
+
+  /// Tells the first equilibrium that is not stable. What cannot be told, because the run is to end, is not.
+  void watch_stability() {
+    if (told_unstable() != 0 || !solver_.unstable(equilibrium_, u_, position() >= planned())) return;
+    told_unstable() = 1;
+    equilibrium_.note(fmt::format(
+        "warning: {}: the equilibrium at load parameter {:.6g} is not stable: there is a motion by which the body would leave it on its own, as past buckling or a "
+        "limit point. Results from here on may be those of an unstable branch; more steps, a small force or imperfection that chooses a side, or "
+        "dynamic_relaxation, which moves on to stable equilibria, find another one",
+        integrator_, state_.time));
   }
 
   /// With [damage] a step consists of several equilibria: what is needed to return to where it began.

@@ -90,7 +90,8 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   using V = detail::Vector<T>;
   T largest = T(0.0);
   for (int k = 0; k < 9; ++k) largest = max(largest, abs(a[k]));
-  const T scale = select(largest > T(0.0), largest, T(1.0)), inverse_scale = T(1.0) / scale;
+  // The reciprocal of a number without digits would be infinite.
+  const T scale = select(largest > T(1e-290), largest, T(1.0)), inverse_scale = T(1.0) / scale;
   const Tensor<T, Solid> b = inverse_scale * a;
   const T mean = trace(b) * T(1.0 / 3.0);
   const Tensor<T, Solid> d = add_diagonal(b, -mean);

@@ -56,6 +56,9 @@ class Integrator {
   virtual IntegratorTraits traits() const noexcept = 0;
   /// What `perikit check` prints: "12 000 steps of 1.2e-7 s". May evaluate the tangent.
   virtual std::string plan(Problem&) { return {}; }
+  /// What the run takes beyond the problem itself: matrices, factors, vectors [bytes]. `perikit check` prints it; a run that the machine has no memory
+  /// for is refused before it writes or allocates anything.
+  virtual double memory(Problem&) { return 0; }
   /// Runs from the problem's present state, which may be one that `restore` brought back, to the end. Throws RunError.
   virtual void run(Problem&, Observer&) = 0;
 };

@@ -28,6 +28,8 @@ class Simulation {
   ~Simulation();
 
   const Scene& scene() const noexcept { return scene_; }
+  /// What the integrator takes beyond the problem [bytes]; RunError where the machine has less.
+  double refuse_memory();
   /// What the set-up took.
   const WorkSteps& set_up() const noexcept { return set_up_; }
   BodyProblem& problem() noexcept { return *problem_; }
@@ -209,5 +211,14 @@ class RunRecorder final : public Observer {
 /// Asks a running RunRecorder to stop after the present step; safe in a signal handler.
 void request_stop() noexcept;
 bool stop_requested() noexcept;
+/// While one lives a signal ends the program at once: nothing is on the disk yet, or will be.
+class NothingToKeep {
+ public:
+  NothingToKeep() noexcept;
+  ~NothingToKeep();
+  NothingToKeep(const NothingToKeep&) = delete;
+  NothingToKeep& operator=(const NothingToKeep&) = delete;
+  static bool holds() noexcept;
+};
 
 }  // namespace perikit

@@ -55,14 +55,14 @@ class Equilibrium {
   void watch(Observer& observer) { observer_ = &observer; }
   /// Whether an evaluation failed because the run is to end.
   bool stopped() const noexcept { return stopped_; }
+  /// False where the run is to end: evaluations fail from now on, and what works without them, as factorisations do, is to be given up.
+  bool goes_on();
 
   /// A line for run.log; lines of one step are written together, or every few seconds where it takes longer.
   void note(std::string_view line);
   std::string take_notes();
 
  private:
-  bool goes_on();
-
   Problem& problem_;
   Observer* observer_ = nullptr;
   bool stopped_ = false;

@@ -39,6 +39,9 @@ class EquilibriumSolver {
   virtual Solution solve(Equilibrium& equilibrium, bool extrapolated) = 0;
   /// After a step that converged, `u` its displacement: where state that later steps reuse may be renewed.
   virtual void accepted(Problem&, ConstFieldView /*u*/) {}
+  /// True where the equilibrium u, which has converged, is found to be unstable: there is a motion that the body would make on its own. last: the run
+  /// ends here, and some tens of tangent actions are worth it; before, only where it costs next to nothing.
+  virtual bool unstable(Equilibrium&, ConstFieldView /*u*/, bool /*last*/) { return false; }
   /// Bonds have weakened at the equilibrium u, which left it out of balance by r. Solvers that know how far they go on weakening let them do
   /// so; true when they did.
   virtual bool forecast_bonds(Equilibrium&, ConstFieldView /*u*/, ConstFieldView /*r*/) { return false; }
@@ -52,7 +55,7 @@ class EquilibriumSolver {
 /// displacements by the trapezoidal rule.
 /// With [damage] bonds fail at equilibria only, and then equilibrium is found again at the same load, until no more fail, or
 /// those that did put the body out of balance by less than 1e-6 of the largest reference so far: then the step counts, in
-/// equilibrium with the bonds it leaves. What the body sets free on its way from one equilibrium to the next, bonds apart, would
+/// equilibrium with the bonds it leaves. The first equilibrium that the solver finds to be unstable is told in a warning. What the body sets free on its way from one equilibrium to the next, bonds apart, would
 /// become motion; a run without inertia counts it as dissipated. A step that is given up between two equilibria gives its bonds
 /// back. Steps, the last increment and the load parameter are kept with the problem, so that a restored run continues to the bit.
 /// Throws RunError when the smallest step fails, or bonds have failed bond_rounds times at one load, with load parameter, step

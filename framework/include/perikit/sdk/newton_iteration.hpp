@@ -26,7 +26,8 @@ class LinearisedProblem {
   virtual void refine(Equilibrium&, ConstFieldView /*u*/, FieldView /*du*/, std::string& /*note*/) {}
   /// Likewise of a du that continues the path from the equilibrium u of the last step. False where it stays as it is.
   virtual bool refine_extrapolation(Equilibrium&, ConstFieldView /*u*/, FieldView /*du*/, std::string& /*note*/) { return false; }
-  /// See EquilibriumSolver.
+  /// See EquilibriumSolver, both.
+  virtual bool unstable(Equilibrium&, ConstFieldView /*u*/, bool /*last*/) { return false; }
   virtual void bonds_changed() {}
 };
 
@@ -42,6 +43,7 @@ class NewtonIteration final : public EquilibriumSolver {
   NewtonIteration(LinearisedProblem& equations, std::int64_t max_iterations, bool line_search)
       : equations_(equations), max_iterations_(max_iterations), line_search_(line_search) {}
   Solution solve(Equilibrium& equilibrium, bool extrapolated) override;
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override { return equations_.unstable(equilibrium, u, last); }
   void bonds_changed() override { equations_.bonds_changed(); }
 
  private:

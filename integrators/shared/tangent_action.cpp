@@ -29,7 +29,7 @@ bool TangentAction::difference(Equilibrium& equilibrium, ConstFieldView w, Field
   // P 3.73-3.74: K w = -(f(u + eps w) - f(u - eps w))/(2 eps); eps w moves points by the cube root of the rounding unit times the
   // spacing.
   const double largest = largest_magnitude(w);
-  if (largest == 0) {
+  if (largest < std::numeric_limits<double>::min()) {   // the step would be infinite
     fill(0.0, Kw);
     return true;
   }

@@ -6,6 +6,8 @@
 #include <algorithm>
 
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/power_of_two.hpp"
+#include "perikit/sdk/stability.hpp"
 
 namespace perikit {
 
@@ -21,7 +23,7 @@ bool say(const std::pair<double, double>& errors, std::string& note) {
 
 }  // namespace
 
-MixedEquations::MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen)
+MixedEquations::MixedEquations(Problem& problem, const KrylovOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen)
     : max_restarts_(options.max_restarts),
       restart_(options.restart),
       action_(problem, options.differences),
@@ -63,11 +65,14 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
   failure_.clear();
   fill(0.0, right_);
   fill(0.0, solution_);
-  copy(rhs, system_.displacement(right_));
-  const double size = norm(rhs);
+  // In a unit that GMRES can take squares in.
+  const double unit = power_of_two(norm(rhs));
+  combine(1 / unit, rhs, 0, rhs, system_.displacement(right_));
+  const double size = norm(system_.displacement(right_));
   SUNLinSol_SPFGMRSetMaxRestarts(gmres_.get(), max_restarts_);
   SUNLinSolSetup(gmres_.get(), nullptr);
   const int flag = SUNLinSolSolve(gmres_.get(), nullptr, solution_vector_.get(), right_vector_.get(), accuracy * size);
+  combine(unit, solution_, 0, solution_, solution_);
   copy(system_.displacement(solution_), du);
   const int iterations = SUNLinSolNumIters(gmres_.get());
   const double reached = size > 0 ? SUNLinSolResNorm(gmres_.get()) / size : 0.0;
@@ -78,6 +83,12 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
                               : fmt::format("GMRES reduces the linear residual only to {:.2g} in {} iterations (restart {})",
                                             reached, iterations, restart_);
   return false;
+}
+
+bool MixedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
+  std::string failure;
+  return last && system_.linearise(equilibrium, u, failure) &&
+         has_negative_curvature(equilibrium, u, [this](ConstFieldView r, FieldView z) { system_.invert_companion(r, z); });
 }
 
 double MixedEquations::accuracy_for_motions(double accuracy) const {

@@ -1,6 +1,6 @@
 #pragma once
-#include "../shared/mixed_system.hpp"
-#include "jfnk.hpp"
+#include "krylov_equations.hpp"
+#include "mixed_system.hpp"
 
 namespace perikit {
 
@@ -9,7 +9,7 @@ namespace perikit {
 class MixedEquations final : public LinearisedProblem {
  public:
   /// chosen: of MixedSystem.
-  MixedEquations(Problem& problem, const JfnkOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen);
+  MixedEquations(Problem& problem, const KrylovOptions& options, std::unique_ptr<VolumetricPart> volumes, std::string& chosen);
   bool linearise(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) override;
   bool apply(Equilibrium& equilibrium, ConstFieldView w, FieldView Kw, std::string& failure) override;
   bool solve(Equilibrium& equilibrium, ConstFieldView rhs, double accuracy, FieldView du, std::string& note,
@@ -18,6 +18,7 @@ class MixedEquations final : public LinearisedProblem {
   bool refine_extrapolation(Equilibrium& equilibrium, ConstFieldView u, FieldView du, std::string& note) override;
   double accuracy_for_motions(double accuracy) const override;
   bool exact() const noexcept override { return false; }
+  bool unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) override;
   void bonds_changed() override { system_.discard(); }
 
  private:
