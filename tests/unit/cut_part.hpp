@@ -240,6 +240,10 @@ inline Images images_of_part(const Images& images, const Body& part) {
     term.image = kept[static_cast<std::size_t>(term.image)];
     if (term.image >= 0) found.terms.push_back(term);
   }
+  for (HeldPoint held : images.held) {
+    held.point = here[static_cast<std::size_t>(held.point)];
+    if (std::ranges::find(found.source, held.point) != found.source.end()) found.held.push_back(held);
+  }
   return found;
 }
 

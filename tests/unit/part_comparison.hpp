@@ -122,6 +122,9 @@ inline void compare_images(const Images& found, const Images& expected) {
   CHECK(found.sign == expected.sign);
   CHECK(found.volume == expected.volume);
   CHECK(same_terms(found, expected));
+  CHECK(std::ranges::equal(found.held, expected.held, [](const HeldPoint& one, const HeldPoint& other) {
+    return one.point == other.point && one.component == other.component && one.motion == other.motion;
+  }));
   CHECK(found.cracks.size() == expected.cracks.size());
 }
 

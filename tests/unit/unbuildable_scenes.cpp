@@ -241,12 +241,16 @@ TEST_CASE("scenes that cannot be built are refused with file, line, key, what wa
   }
 }
 
-TEST_CASE("sides of points from a file must be placed") {
+TEST_CASE("sides of points from a file are found by volumes, and must be placed where these do not say") {
   Bench bench;
   std::string text = plate_from_file();
   text.replace(text.find("set = \"left\""), 12, "face = \"-x\"");
   std::ofstream(bench.folder.path / "cloud.csv") << cloud();
-  CHECK(has(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5; allowed: the coordinate of the side"));
+  CHECK(bench.refusal(text).empty());
+  std::string uneven = cloud();
+  uneven.replace(uneven.find("0.5,1.5,1"), 9, "0.7,1.5,1");
+  std::ofstream(bench.folder.path / "cloud.csv") << uneven;
+  CHECK(has(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5 and is no part of a layer; allowed: the coordinate of the side"));
   text.replace(text.find("face = "), 0, "at = 0.0\n");
   CHECK(bench.refusal(text).empty());
 }

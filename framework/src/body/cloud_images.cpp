@@ -39,6 +39,7 @@ Images CloudImages::of_part(const Body& part) const {
       made = {};
       of = source(number);
       maker_.add(part.position(static_cast<std::size_t>(at)), of, 0, made);
+      append_held(made, part.input_of(static_cast<std::size_t>(at)), found);
     }
     append_image(made, static_cast<std::size_t>((number - points_) % most_), part.input_of(static_cast<std::size_t>(at)), found);
   }

@@ -94,24 +94,24 @@ class PointsAround {
       for (std::size_t i = 0; i < points_.size(); ++i) place_[c][i] = rows[4 * static_cast<std::size_t>(points_[i]) + c];
     }
   }
-  /// How many are within `limit` of x.
-  std::int64_t count(const double* x, double limit) const noexcept {
+  /// How many are within `limit` of x and farther than `coincident`.
+  std::int64_t count(const double* x, double limit, double coincident) const noexcept {
+    const Pack least(coincident * coincident);
     std::int64_t n = 0;
-    over_near(x, limit, [&](std::size_t, std::uint32_t bits, Pack) { n += std::popcount(bits); });
+    over_near(x, limit, [&](std::size_t, std::uint32_t bits, Pack r2) { n += std::popcount(bits & ~lane_bits(r2 <= least)); });
     return n;
   }
-  /// Writes those that are, but for `own`. Returns whether there is another one within `coincident`.
-  bool list(std::int32_t own, const double* x, double limit, double coincident, std::int32_t* out) const noexcept {
+  /// Writes those that are. same_place(q): called for each that lies within `coincident`, x itself among them.
+  template <class SamePlace>
+  void list(const double* x, double limit, double coincident, std::int32_t* out, SamePlace&& same_place) const {
     const Pack least(coincident * coincident);
-    int same_place = 0;
     over_near(x, limit, [&](std::size_t first, std::uint32_t bits, Pack r2) {
-      same_place += std::popcount(lane_bits(r2 <= least));
-      for (; bits != 0; bits &= bits - 1) {
-        const std::int32_t q = points_[first + static_cast<std::size_t>(std::countr_zero(bits))];
-        if (q != own) *out++ = q;
-      }
+      const auto point = [&](std::uint32_t of) { return points_[first + static_cast<std::size_t>(std::countr_zero(of))]; };
+      std::uint32_t same = lane_bits(r2 <= least);
+      bits &= ~same;
+      for (; same != 0; same &= same - 1) same_place(point(same));
+      for (; bits != 0; bits &= bits - 1) *out++ = point(bits);
     });
-    return same_place > 1;
   }
 
  private:
@@ -167,15 +167,19 @@ FamilyLists find_families(std::span<const double> rows, std::size_t points, int 
   };
   FamilyLists lists;
   lists.first.assign(points + 1, 0);
-  over_points([&](std::size_t p, const PointsAround& around) { lists.first[p + 1] = around.count(&rows[4 * p], limit) - 1; });
+  over_points([&](std::size_t p, const PointsAround& around) { lists.first[p + 1] = around.count(&rows[4 * p], limit, coincident); });
   std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
   lists.neighbour.resize(static_cast<std::size_t>(lists.first.back()));
   std::mutex one;
   std::optional<CoincidentPoints> twice;
   over_points([&](std::size_t p, const PointsAround& around) {
-    if (!around.list(static_cast<std::int32_t>(p), &rows[4 * p], limit, coincident, lists.neighbour.data() + lists.first[p])) return;
+    int same_place = 0;
+    const auto number_of = [&](std::size_t q) { return number ? number(q) : static_cast<std::int64_t>(q); };
+    around.list(&rows[4 * p], limit, coincident, lists.neighbour.data() + lists.first[p],
+                [&](std::int32_t q) { same_place += q == static_cast<std::int32_t>(p) || number_of(static_cast<std::size_t>(q)) >= 0; });
+    const std::int64_t found = number_of(p);
+    if (same_place < 2 || found < 0) return;
     const std::lock_guard lock(one);
-    const std::int64_t found = number ? number(p) : static_cast<std::int64_t>(p);
     if (!twice || found < twice->number()) twice.emplace(found, Point{rows[4 * p], rows[4 * p + 1], rows[4 * p + 2]});
   });
   if (twice) throw *twice;

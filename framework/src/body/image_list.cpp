@@ -87,6 +87,10 @@ void append_image(const Images& made, std::size_t k, std::int32_t source, Images
   }
 }
 
+void append_held(const Images& made, std::int32_t source, Images& images) {
+  for (const HeldPoint& held : made.held) images.held.push_back({source, held.component, held.motion});
+}
+
 void mirror_cracks(const ImagePlane& plane, std::vector<Crack>& cracks) {
   const std::size_t n = cracks.size();
   for (std::size_t k = 0; k < n; ++k) {

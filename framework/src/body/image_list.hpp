@@ -25,6 +25,8 @@ class ImageList {
   const Point& point() const { return position_.front(); }
   std::int64_t number() const noexcept { return number_; }
 
+  /// The point lies on a mirror, whose motion is this component of it.
+  void hold(int component, int motion) { images_.held.push_back({source_, component, motion}); }
   /// The image of place n. odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
   void add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
 
@@ -38,11 +40,17 @@ class ImageList {
   Images& images_;
 };
 
+/// How near to a mirror a point lies on it, and is its own image [m].
+inline double touching(double spacing) noexcept { return 1e-4 * spacing; }
+
 /// ImagePlane::surface where every point has an image, and lies below itself.
 inline std::int64_t itself(const Point&, std::int64_t number) noexcept { return number; }
 
 /// Appends one of the images of a point, the k-th of `made`, as that of the point with the input number `source`.
 void append_image(const Images& made, std::size_t k, std::int32_t source, Images& images);
+
+/// Appends what planes hold of a point itself, which has the input number `source`.
+void append_held(const Images& made, std::int32_t source, Images& images);
 
 /// Distance of a place in front of the plane whose points it takes: itself, or the opposite side.
 double depth(const ImagePlane& plane, const Point& x);

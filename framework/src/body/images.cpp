@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "body/image_list.hpp"
 
@@ -11,16 +12,23 @@ namespace perikit {
 namespace {
 
 /// The planes across one axis. Between two of them images have images in turn, until the reach of both is filled.
-void add_across(std::span<const ImagePlane> all, std::span<const std::size_t> across, double reach, ImageList& list) {
-  const auto plane_of = [&](std::size_t k) -> const ImagePlane& { return all[across[k]]; };
-  const auto add_image = [&](const ImagePlane& plane, std::size_t n) {
+void add_across(std::span<const ImagePlane> all, std::span<const std::size_t> across, double reach, double touching, ImageList& list) {
+  std::vector<std::size_t> from(list.size(), across.size());  // by place: the plane that it is an image behind
+  const auto add_image = [&](std::size_t k, std::size_t n) {
+    const ImagePlane& plane = all[across[k]];
     const double d = depth(plane, list.position(n));
-    if (!(d >= 0) || d > reach) return false;
+    const bool mirror = plane.period == 0, on_plane = std::abs(d) <= touching;
+    // Of two periodic sides the lower one has the points on it.
+    if (on_plane ? (mirror ? from[n] == k : plane.outward < 0) : !(d > 0) || d > reach) return false;
     const std::int64_t surface = plane.surface(list.point(), list.number());
     if (surface < 0) return false;
     Point foot = list.position(n);
     foot[static_cast<std::size_t>(plane.axis)] = plane.at;
-    list.add(n, {image_of(plane, list.position(n)), foot, 1.0, surface}, plane.odd, plane.motion);
+    if (mirror && on_plane && n == 0)
+      for (int c = 0; c < 3; ++c)
+        if (plane.odd[static_cast<std::size_t>(c)]) list.hold(c, plane.motion[static_cast<std::size_t>(c)]);
+    list.add(n, {mirror && on_plane ? list.position(n) : image_of(plane, list.position(n)), foot, 1.0, surface}, plane.odd, plane.motion);
+    from.push_back(k);
     return true;
   };
   std::vector<std::size_t> done(across.size(), 0);
@@ -28,7 +36,7 @@ void add_across(std::span<const ImagePlane> all, std::span<const std::size_t> ac
     more = false;
     for (std::size_t k = 0; k < across.size(); ++k) {
       const std::size_t end = list.size();
-      for (std::size_t n = done[k]; n < end; ++n) more = add_image(plane_of(k), n) || more;
+      for (std::size_t n = done[k]; n < end; ++n) more = add_image(k, n) || more;
       done[k] = end;
     }
   }
@@ -55,6 +63,7 @@ ImageMaker::ImageMaker(int dimension, double reach, std::vector<ImagePlane> plan
 
 ImageMaker::ImageMaker(const BodyFrame& frame, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces)
     : ImageMaker(perikit::dimension(frame.space), halo(frame.horizon), std::move(planes)) {
+  touching_ = touching(frame.spacing);
   if (surfaces.empty()) return;
   turning_ = std::make_unique<TurningMirrors>(frame, planes_, surfaces);
   for (std::vector<std::size_t>& across : across_)
@@ -67,12 +76,12 @@ ImageMaker::ImageMaker(ImageMaker&&) noexcept = default;
 void ImageMaker::add(const Point& x, std::int64_t number, std::int32_t source, Images& images) const {
   const bool near = std::ranges::any_of(planes_, [&](const ImagePlane& plane) {
     const double d = depth(plane, x);
-    return d >= 0 && d <= reach_;
+    return d >= -touching_ && d <= reach_;
   });
   if (!near && !turning_) return;
   ImageList list(dimension_, x, number, source, images);
   if (turning_) turning_->add_images(list);
-  for (const std::vector<std::size_t>& across : across_) add_across(planes_, across, reach_, list);
+  for (const std::vector<std::size_t>& across : across_) add_across(planes_, across, reach_, touching_, list);
 }
 
 std::vector<Crack> ImageMaker::cracks(std::vector<Crack> cracks) const {

@@ -21,7 +21,8 @@ class Mirror {
   };
   Mirror(const std::array<bool, 3>& odd, const std::array<int, 3>& motion) : odd_(odd), motion_(motion) {}
   virtual ~Mirror() = default;
-  /// nullopt: place n lies behind, or too far in front, or its image would lie nearer to another part of the mirror.
+  /// nullopt: place n lies behind, or too far in front, or its image would lie nearer to another part of the mirror. A place on the mirror
+  /// is its own image, at a depth of 0.
   virtual std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const = 0;
   /// How far a place lies behind the mirror; 0 in front of it.
   virtual double behind(const Point& x) const = 0;
@@ -37,23 +38,25 @@ namespace {
 
 class PlaneMirror final : public Mirror {
  public:
-  PlaneMirror(const ImagePlane& plane, double reach) : Mirror(plane.odd, plane.motion), plane_(plane), reach_(reach) {}
+  PlaneMirror(const ImagePlane& plane, double reach, double touching)
+      : Mirror(plane.odd, plane.motion), plane_(plane), reach_(reach), touching_(touching) {}
 
   std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
     const Point& x = list.position(n);
     const double d = depth(plane_, x);
-    if (!(d >= 0) || d > reach_) return std::nullopt;
+    const bool on_plane = std::abs(d) <= touching_;
+    if (!(d >= 0 || on_plane) || d > reach_) return std::nullopt;
     const std::int64_t surface = plane_.surface(list.point(), list.number());
     if (surface < 0) return std::nullopt;
     Point foot = x;
     foot[static_cast<std::size_t>(plane_.axis)] = plane_.at;
-    return Reflected{{image_of(plane_, x), foot, 1.0, surface}, d};
+    return Reflected{{on_plane ? x : image_of(plane_, x), foot, 1.0, surface}, on_plane ? 0 : d};
   }
   double behind(const Point& x) const override { return std::max(0.0, -depth(plane_, x)); }
 
  private:
   ImagePlane plane_;
-  double reach_;
+  double reach_, touching_;
 };
 
 class SurfaceMirror final : public Mirror {
@@ -67,6 +70,7 @@ class SurfaceMirror final : public Mirror {
 
   std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const override {
     const Point& x = list.position(n);
+    if (std::abs(surface_.estimate(x)) <= touching(spacing_)) return Reflected{{x, x, 1.0, nearest_(x, list.number())}, 0};
     if (!(surface_.level(x) < 0) || surface_.estimate(x) > far * reach_) return std::nullopt;
     const std::optional<Foot> foot = surface_.foot(x);
     if (!foot || !(foot->depth > 0) || foot->depth > reach_ || !(foot->stretch > 0)) return std::nullopt;
@@ -106,7 +110,7 @@ TurningMirrors::TurningMirrors(const BodyFrame& frame, std::span<const ImagePlan
   const double reach = halo(frame.horizon);
   for (const ImageSurface& surface : surfaces) mirrors_.push_back(std::make_unique<SurfaceMirror>(frame, surface, reach));
   for (const ImagePlane& plane : planes)
-    if (plane.period == 0) mirrors_.push_back(std::make_unique<PlaneMirror>(plane, reach));
+    if (plane.period == 0) mirrors_.push_back(std::make_unique<PlaneMirror>(plane, reach, touching(frame.spacing)));
 }
 
 TurningMirrors::~TurningMirrors() = default;
@@ -120,15 +124,22 @@ void TurningMirrors::add_images(ImageList& list) const {
     }
     return true;
   };
-  std::vector<std::size_t> done(mirrors_.size(), 0);
+  // By place: the last mirror that it is an image of. A point on mirrors has an image there behind each, those of images in the order of the
+  // mirrors; an image elsewhere that lies on a mirror has none, since that one's images have images there.
+  std::vector<std::size_t> from(list.size(), 0), done(mirrors_.size(), 0);
   for (bool more = true; more;) {
     more = false;
     for (std::size_t k = 0; k < mirrors_.size(); ++k) {
       const std::size_t end = list.size();
       for (std::size_t n = done[k]; n < end; ++n) {
         const auto reflected = mirrors_[k]->reflect(list, n);
-        if (!reflected || !deepest(k, reflected->place.at, reflected->depth)) continue;
+        const bool on_mirror = reflected && reflected->depth == 0;
+        if (!reflected || (on_mirror && n > 0 && (list.position(n) != list.point() || from[n] >= k)) || !deepest(k, reflected->place.at, reflected->depth)) continue;
+        if (on_mirror && n == 0)
+          for (int c = 0; c < 3; ++c)
+            if (mirrors_[k]->odd()[static_cast<std::size_t>(c)]) list.hold(c, mirrors_[k]->motion()[static_cast<std::size_t>(c)]);
         list.add(n, reflected->place, mirrors_[k]->odd(), mirrors_[k]->motion());
+        from.push_back(k);
         more = true;
       }
       done[k] = end;

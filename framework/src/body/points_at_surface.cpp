@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/image_list.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -12,7 +13,7 @@ PointsAtSurface::PointsAtSurface(const BodyFrame& frame, const LevelSurface& sur
   points([&](const CloudShares::OnePoint& point) {
     const double spacing = std::max(spacing_, std::pow(point.volume / frame.section, 1.0 / dimension_)),
                  depth = surface.estimate(point.x);
-    if (depth >= 0 && depth <= 1.2 * spacing) mine_.push_back(point);
+    if (depth >= -touching(spacing_) && depth <= 1.2 * spacing) mine_.push_back(point);
   });
   const auto add = [&](const Points& found) {
     for (const CloudShares::OnePoint& point : found) cells_[cell(point.x)].push_back(point);

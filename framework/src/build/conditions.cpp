@@ -28,7 +28,7 @@ namespace {
 
 /// A point at a held face that a layer holds too would be held at two places. Of a part of a body all ranks must call it.
 void refuse_twice(const Scene& scene, const Body& body, const Images& images, const std::vector<Prescription>& prescriptions,
-                  const std::vector<std::size_t>& boundary_of) {
+                  const std::vector<std::size_t>& boundary_of, const std::vector<FaceMotion>& motions) {
   if (prescriptions.empty() || std::ranges::none_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
     return;
   struct Held {
@@ -41,7 +41,7 @@ void refuse_twice(const Scene& scene, const Body& body, const Images& images, co
     held.erase(std::unique(held.begin(), held.end()), held.end());
   };
   for (const ImageTerm& term : images.terms)
-    if (term.motion >= 0) held.push_back({term.surface, term.component});
+    if (term.motion >= 0 && !motions[static_cast<std::size_t>(term.motion)].of_set) held.push_back({term.surface, term.component});
   keep_each_once();
   if (body.part()) held = told_to_all(gathered<Held>(held));
   keep_each_once();
@@ -119,7 +119,7 @@ Constraints build_constraints(const Scene& scene, const Body& body, const Images
       boundary_of.push_back(k);
     }
   }
-  refuse_twice(scene, body, images, prescriptions, boundary_of);
+  refuse_twice(scene, body, images, prescriptions, boundary_of, motions);
   refuse_contradictions(scene, body, prescriptions, boundary_of, quasi_static);
   try {
     return Constraints(body, std::move(prescriptions), images, std::move(motions));

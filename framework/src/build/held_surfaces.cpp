@@ -98,10 +98,11 @@ class SurfaceBuilder {
   void check_in_front(const Point& x) const {
     constexpr double least = 0.05;  // spacings: a point and its image are two ends of a bond
     const double depth = surface_.estimate(x);
-    if (depth < least * frame_.spacing)
+    const bool on_surface = std::abs(depth) <= touching(frame_.spacing);
+    if (depth < least * frame_.spacing && !on_surface)
       refuse(depth < 0 ? fmt::format("found a surface in front of the point at {}", place(x))
                        : fmt::format("found a surface {:.2g} spacings from the point at {}", depth / frame_.spacing, place(x)),
-             fmt::format("an expression that is negative at all points, and zero {:.3g} or more in front of them",
+             fmt::format("an expression that is zero at the points that lie on the surface, and else {:.3g} or more in front of them",
                          least * frame_.spacing));
     if (depth < halo(frame_.horizon) && !surface_.foot(x))
       refuse(fmt::format("found no place on the surface that is nearest to the point at {}", place(x)),
@@ -112,7 +113,7 @@ class SurfaceBuilder {
   void check_thickness(const Point& x) const {
     const double reach = halo(frame_.horizon);
     const std::optional<Foot> foot = surface_.foot(x);
-    if (!foot || foot->depth <= 0) return;
+    if (!foot || foot->depth <= touching(frame_.spacing)) return;
     Point below{};
     for (std::size_t c = 0; c < 3; ++c) below[c] = foot->at[c] + (x[c] - foot->at[c]) * reach / foot->depth;
     const std::optional<Foot> back = surface_.foot(below);

@@ -11,6 +11,7 @@
 #include "build/conditions.hpp"
 #include "build/held_surfaces.hpp"
 #include "build/sets.hpp"
+#include "build/several_ranks.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -29,7 +30,7 @@ double layer_at(const PlacedPoints& points) {
   return (points.lattice() ? 0.75 : 1.2) * points.frame().spacing;
 }
 
-/// The points of a cloud at a side: which of them lies nearest beside the axis.
+/// The points of a cloud at a side: which of them lies nearest to the foot of a point.
 class PointsAtSide {
  public:
   struct Outermost {
@@ -40,7 +41,7 @@ class PointsAtSide {
   PointsAtSide(const PlacedPoints& points, const Side& side, const std::string& set) : side_(side), spacing_(points.frame().spacing) {
     const auto over = [&](const std::string& name, auto&& visit) {
       points.over(name, [&](const PlacedPoints::OnePoint& point) {
-        if (const double d = side_.depth(point.x); d >= 0 && d < layer_at(points)) visit(point.x, point.number);
+        if (const double d = side_.depth(point.x); d >= -touching(spacing_) && d < layer_at(points)) visit(point.x, point.number);
       });
     };
     std::vector<Outermost> found;
@@ -61,7 +62,8 @@ class PointsAtSide {
         const auto found = cells_.find({centre[0] + i, centre[1] + j});
         if (found == cells_.end()) continue;
         for (const Outermost& point : found->second) {
-          double square = 0;
+          const double depth = side_.depth(point.x);  // of two points below each other the outer one is meant
+          double square = depth * depth;
           for (std::size_t a = 0; a < 3; ++a)
             if (a != static_cast<std::size_t>(side_.axis)) square += (x[a] - point.x[a]) * (x[a] - point.x[a]);
           if (square < least) least = square, nearest = &point;
@@ -95,6 +97,8 @@ class PlaneBuilder {
       if (!scene_.boundaries[k].face.empty()) add_face(k);
     for (std::size_t k = 0; k < scene_.symmetries.size(); ++k) add_symmetry(k);
     for (std::size_t k = 0; k < scene_.periodics.size(); ++k) add_periodic(k);
+    for (std::size_t k = 0; k < scene_.boundaries.size() && sets_may_hold_sides(scene_); ++k)
+      if (!scene_.boundaries[k].holds_side()) add_side_of_set(k);
     return std::move(found_);
   }
 
@@ -109,15 +113,58 @@ class PlaneBuilder {
   }
 
   /// Where the side of these points lies: half a spacing beyond a lattice point; cells of points that were moved at random keep theirs.
-  double end_of(const std::string& set, int axis, double outward, const SourcePosition& position, const std::string& key) const {
+  double end_of(const std::string& set, int axis, double outward, const SourcePosition& position, const std::string& key) {
     const double extreme = outermost(set, axis, outward);
     if (lattice_) return extreme + 0.5 * outward * spacing_;
-    if (!scene_.body.lattice) {
-      throw InputError(position, key,
-                       fmt::format("found nothing for points from a file, whose outermost lies at {:.6g}; allowed: the coordinate of the side", extreme));
-    }
+    if (!scene_.body.lattice) return end_of_file(set, axis, outward, position, key);
     const double lower = scene_.body.lattice->lower[static_cast<std::size_t>(axis)], cells = std::floor((extreme - lower) / spacing_);
     return lower + (cells + (outward > 0 ? 1 : 0)) * spacing_;
+  }
+
+  /// Between the volumes of half a cell and of a whole one, over those of the points behind.
+  static constexpr double half_cell = 0.75;
+  /// The mean volume of the points of a layer on a plane [m^d], 0 where there are none, and of those less than two spacings behind it.
+  struct Layers {
+    double outer = 0, inner = 0;
+    bool between = false;  ///< whether points lie near the layer, but not in it
+  };
+  Layers layers_at(const Side& side, const std::string& set) const {
+    constexpr double thick = 0.05, apart = 0.4, behind = 1.75;  // spacings
+    std::array<ExactSum, 4> sums;  // volumes and numbers of the points of both
+    double between = 0;
+    points_->over(set, [&](const PlacedPoints::OnePoint& point) {
+      const double depth = side.depth(point.x) / spacing_;
+      if (depth > behind) return;
+      if (depth > thick && depth < apart) between = 1;
+      const std::size_t layer = depth <= thick ? 0 : 2;
+      sums[layer].add(point.volume);
+      sums[layer + 1].add(1);
+    });
+    std::array<double, 4> total{};
+    for (std::size_t k = 0; k < total.size(); ++k) total[k] = points_->shared() ? total_over_ranks(sums[k]) : sums[k].value();
+    const auto mean = [&](std::size_t k) { return total[k + 1] > 0 ? total[k] / total[k + 1] : 0.0; };
+    return {mean(0), mean(2), communicator().largest(between) > 0};
+  }
+
+  /// Where the side of points from a file lies: that of the box of their cells, or where the volumes of the outermost layer say. Points on the
+  /// side have half of the cells that the next layer has; others lie in the middle of theirs.
+  double end_of_file(const std::string& set, int axis, double outward, const SourcePosition& position, const std::string& key) {
+    const double extreme = outermost(set, axis, outward);
+    const auto a = static_cast<std::size_t>(axis);
+    const std::optional<std::array<double, 3>>& box = outward > 0 ? scene_.body.points_upper : scene_.body.points_lower;
+    if (box && std::abs((*box)[a] - extreme) < 1.2 * spacing_) return found_at((*box)[a], extreme, axis, outward, "that of the box of the points' cells");
+    const Layers layers = layers_at({axis, outward, extreme}, set);
+    if (layers.between || !(layers.inner > 0))
+      throw InputError(position, key,
+                       fmt::format("found nothing for points from a file, whose outermost lies at {:.6g} and is no part of a layer; allowed: the coordinate of the side", extreme));
+    if (layers.outer < half_cell * layers.inner) return found_at(extreme, extreme, axis, outward, "by the volumes of its points, which are those of half cells");
+    const double cell = std::pow(layers.outer / points_->frame().section, 1.0 / scene_.body.dimension);
+    return found_at(extreme + 0.5 * outward * cell, extreme, axis, outward, "by the volumes of its points, half a cell beyond them");
+  }
+  double found_at(double at, double extreme, int axis, double outward, const std::string& why) {
+    const bool on_side = std::abs(at - extreme) <= touching(spacing_);
+    found_.notes.push_back(fmt::format("{}{} at {:.6g}, {}{}", outward > 0 ? '+' : '-', "xyz"[axis], at, why, on_side ? "; its points lie on it" : ""));
+    return at;
   }
 
   /// A given coordinate, which on lattices lies between two points.
@@ -135,7 +182,7 @@ class PlaneBuilder {
   bool touched(const Side& side, const std::string& set) const {
     double found = 0;
     points_->over(set, [&](const PlacedPoints::OnePoint& point) {
-      if (const double d = side.depth(point.x); d >= 0 && d < layer_at(*points_)) found = 1;
+      if (const double d = side.depth(point.x); d >= -touching(spacing_) && d < layer_at(*points_)) found = 1;
     });
     return communicator().largest(found) > 0;
   }
@@ -144,9 +191,9 @@ class PlaneBuilder {
   /// the whole body no point is left out.
   std::function<std::int64_t(const Point&, std::int64_t)> surface(const Side& side, const std::string& set) const {
     const bool whole = set == "all";
-    const auto far = [side, reach = halo(points_->frame().horizon)](const Point& x) {
+    const auto far = [side, least = -touching(spacing_), reach = halo(points_->frame().horizon)](const Point& x) {
       const double d = side.depth(x);
-      return d < 0 || d > reach;
+      return d < least || d > reach;
     };
     if (!lattice_)
       return [at_side = std::make_shared<const PointsAtSide>(*points_, side, set), whole, far](const Point& x, std::int64_t number) {
@@ -176,13 +223,48 @@ class PlaneBuilder {
     std::vector<Beyond> mine;   // the one farthest behind, the first of several
     points_->over("all", [&](const PlacedPoints::OnePoint& point) {
       const double d = side.depth(point.x);
-      if (d < 0 && (mine.empty() || d < mine.front().depth)) mine.assign(1, {d, point.x, point.number});
+      if (d < -touching(spacing_) && (mine.empty() || d < mine.front().depth)) mine.assign(1, {d, point.x, point.number});
     });
     const std::vector<Beyond> all = told_to_all(gathered<Beyond>(mine));
     if (all.empty()) return;
     const Beyond& first = *std::ranges::min_element(all, {}, [](const Beyond& beyond) { return std::pair(beyond.depth, beyond.number); });
     throw InputError(where, key, fmt::format("found a plane through the body, at {:.6g}: a point at ({:.6g}, {:.6g}, {:.6g}) lies behind it; "
                                              "allowed: a plane with all points on one side", side.at, first.x[0], first.x[1], first.x[2]));
+  }
+
+  /// A point and its image are two ends of a bond, and a point on a plane is its own image: nothing may lie between.
+  void refuse_points_close(const Side& side, const std::string& set, const SourcePosition& where, const std::string& key) const {
+    if (lattice_) return;
+    constexpr double least = 0.05;  // spacings
+    double nearest = std::numeric_limits<double>::infinity();
+    points_->over(set, [&](const PlacedPoints::OnePoint& point) {
+      if (const double d = side.depth(point.x); d > touching(spacing_)) nearest = std::min(nearest, d);
+    });
+    nearest = -communicator().largest(-nearest);
+    if (nearest >= least * spacing_) {
+      refuse_whole_cells(side, set, where, key);
+      return;
+    }
+    throw InputError(where, key, fmt::format("found a side at {:.6g}, with a point {:.2g} spacings from it; allowed: points on the side, or {:.3g} and more in front of it",
+                                             side.at, nearest / spacing_, least * spacing_));
+  }
+
+  /// A point on a side stands for the part of its cell that lies inside.
+  void refuse_whole_cells(const Side& side, const std::string& set, const SourcePosition& where, const std::string& key) const {
+    const Layers layers = layers_at(side, set);
+    if (layers.outer == 0 || layers.inner == 0 || layers.outer < half_cell * layers.inner) return;
+    throw InputError(where, key, fmt::format("found points on the side, at {:.6g}, that have {:.3g} times the volume of those behind them; allowed: the volumes of those parts of "
+                                             "their cells that lie inside, about a half, or a side half a cell beyond the points",
+                                             side.at, layers.outer / layers.inner));
+  }
+
+  /// Whether one of all points lies on a side.
+  bool touches(const Side& side) const {
+    double found = 0;
+    points_->over("all", [&](const PlacedPoints::OnePoint& point) {
+      if (std::abs(side.depth(point.x)) <= touching(spacing_)) found = 1;
+    });
+    return communicator().largest(found) > 0;
   }
 
   /// may_exist: several [[boundary]] may prescribe components of one face, and sets may share a plane.
@@ -213,6 +295,7 @@ class PlaneBuilder {
     ImagePlane& plane = plane_at(side, boundary.set, key, boundary.face_position, true);
     const bool whole = boundary.set == "all";
     if (whole) refuse_points_beyond(side, boundary.face_position, key);
+    refuse_points_close(side, boundary.set, boundary.face_position, key);
     if (!plane.surface) {
       if (!touched(side, boundary.set))
         throw InputError(boundary.face_position, key, fmt::format("found \"{}\" at {:.6g}, which no point of the set \"{}\" touches; allowed: a face of the set", boundary.face, side.at, boundary.set));
@@ -228,6 +311,50 @@ class PlaneBuilder {
     }
   }
 
+  /// The side of the body that a set consists of: all points that lie on it, and no others.
+  std::optional<Side> side_of(const std::string& set) const {
+    for (int axis = 0; axis < scene_.body.dimension; ++axis)
+      for (const double outward : {-1.0, 1.0}) {
+        Side side{axis, outward, outermost("all", axis, outward)};
+        if (std::abs(outermost(set, axis, -outward) - side.at) > touching(spacing_)) continue;
+        std::array<ExactSum, 2> sums;  // points on the side, and those of the set
+        const auto add = [&](const std::string& name, std::size_t to) {
+          points_->over(name, [&](const PlacedPoints::OnePoint& point) {
+            if (side.depth(point.x) <= touching(spacing_)) sums[to].add(1);
+          });
+        };
+        add("all", 0);
+        add(set, 1);
+        const auto count = [&](std::size_t k) { return points_->shared() ? total_over_ranks(sums[k]) : sums[k].value(); };
+        const Layers layers = layers_at(side, "all");
+        if (count(0) == count(1) && layers.inner > 0 && layers.outer < half_cell * layers.inner) return side;
+      }
+    return std::nullopt;
+  }
+
+  /// Points on a side that a set holds hold the side: it has images behind it as a face has, unless a face or a plane has them already.
+  void add_side_of_set(std::size_t k) {
+    const BoundaryDescription& boundary = scene_.boundaries[k];
+    const std::optional<Side> side = std::isinf(outermost(boundary.set, 0, 1)) ? std::nullopt : side_of(boundary.set);
+    if (!side) return;
+    const std::string key = fmt::format("boundary.{}.set", k);
+    const auto same = [&](const ImagePlane& plane) { return plane.axis == side->axis && std::abs(plane.at - side->at) <= touching(spacing_); };
+    if (const auto there = std::ranges::find_if(found_.planes, same);
+        there != found_.planes.end() && !found_.origins[static_cast<std::size_t>(there - found_.planes.begin())].key.ends_with(".set"))
+      return;
+    ImagePlane& plane = plane_at(*side, "all", key, boundary.position, true);
+    if (!plane.surface) {
+      plane.surface = surface(*side, "all");
+      found_.notes.push_back(fmt::format("{}{} at {:.6g}: the set \"{}\" consists of the points on it, and holds it", side->outward > 0 ? '+' : '-', "xyz"[side->axis], side->at, boundary.set));
+    }
+    for (std::size_t c = 0; c < boundary.components.size(); ++c) {
+      if (!boundary.components[c] || plane.odd[c]) continue;
+      plane.odd[c] = true;
+      plane.motion[c] = static_cast<int>(found_.motions.size());
+      found_.motions.push_back({boundary.velocity, function_of(*boundary.components[c], boundary.ramp, quasi_static_), true});
+    }
+  }
+
   void add_symmetry(std::size_t k) {
     const SymmetryDescription& symmetry = scene_.symmetries[k];
     const std::string key = fmt::format("symmetry.{}.at", k);
@@ -240,6 +367,7 @@ class PlaneBuilder {
       side.at = end_of("all", symmetry.axis, side.outward, symmetry.position, key);
     }
     refuse_points_beyond(side, symmetry.position, key);
+    refuse_points_close(side, "all", symmetry.position, key);
     ImagePlane& plane = plane_at(side, "all", fmt::format("symmetry.{}.axis", k), symmetry.position, false);
     plane.odd[a] = true;
     plane.surface = surface(side, "all");
@@ -258,6 +386,10 @@ class PlaneBuilder {
                        : end_of("all", periodic.axis, sides[s].outward, periodic.position, key);
       refuse_points_beyond(sides[s], periodic.position, key);
     }
+    if (!lattice_ && touches(sides[0]) && touches(sides[1]))
+      throw InputError(periodic.position, path + ".axis",
+                       fmt::format("found points on both sides, at {:.6g} and {:.6g}, which are the same places; allowed: the points of one of them, with the volumes of their whole cells",
+                                   sides[0].at, sides[1].at));
     for (const Side& side : sides) {
       ImagePlane& plane = plane_at(side, "all", path + ".axis", periodic.position, false);
       plane.period = sides[1].at - sides[0].at;

@@ -19,6 +19,7 @@ struct ScenePlanes {
   std::vector<ImagePlane> planes;
   std::vector<Origin> origins;           ///< of the planes
   std::vector<ImageSurface> surfaces;
+  std::vector<std::string> notes;        ///< where sides of clouds were found to lie
   std::vector<FaceMotion> motions;       ///< what ImagePlane::motion and ImageSurface::motion number
 };
 

@@ -47,6 +47,7 @@ struct LocalPlaces {
   Body body;
   std::optional<Images> images = std::nullopt;  ///< of bodies that have any, on whatever rank
   std::vector<FaceMotion> motions{};
+  std::vector<std::string> notes{};
 };
 
 LocalPlaces placed(std::unique_ptr<Partition> partition, std::uint16_t far_material) {
@@ -73,6 +74,7 @@ LocalPlaces placed(const BodyFrame& frame, const CloudShares& shares, const Part
   LocalPlaces places = placed(std::make_unique<Partition>(frame, shares, reach, &images), far_material);
   places.images = images.of_part(places.body);
   places.motions = std::move(planes.scene.motions);
+  places.notes = std::move(planes.scene.notes);
   return places;
 }
 
@@ -225,7 +227,7 @@ LocalBody build_local_body(const Scene& scene, const Partition::Reach& reach, st
   const SetMembers members = add_sets(scene.sets, places.body);
   std::vector<std::uint16_t> material = materials_of_part(scene, members, places.body);
   set_materials(material, far_material, image_material, places.body);
-  return LocalBody{std::move(places.partition), std::move(places.body), std::move(material), std::move(places.images), std::move(places.motions)};
+  return LocalBody{std::move(places.partition), std::move(places.body), std::move(material), std::move(places.images), std::move(places.motions), std::move(places.notes)};
 }
 
 }  // namespace perikit

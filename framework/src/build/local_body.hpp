@@ -18,6 +18,7 @@ struct LocalBody {
   std::vector<std::uint16_t> material;  ///< by input number of the part: as in the whole body, also of far points
   std::optional<Images> images;         ///< those that the part has, of bodies that have any on whatever rank
   std::vector<FaceMotion> motions;      ///< of these
+  std::vector<std::string> notes;       ///< where sides were found to lie
 };
 
 /// The part of this rank of the scene's body, with its sets and materials. Of a lattice it asks its own cells and those within

@@ -34,6 +34,7 @@ std::uint16_t far_material(const Scene& scene, bool images) { return static_cast
 struct Beyond {
   Images images;  ///< of several ranks: what this one has of them
   std::vector<FaceMotion> motions;
+  std::vector<std::string> notes;  ///< where sides were found to lie
   std::shared_ptr<const Interfaces> interfaces;   ///< null: no laminates
 };
 
@@ -46,7 +47,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   } catch (const OverlappingImage& error) {
     refuse_overlap(planes, error);
   }
-  return {std::move(images), std::move(planes.motions), nullptr};
+  return {std::move(images), std::move(planes.motions), std::move(planes.notes), nullptr};
 }
 
 /// How far the forces of a formulation reach (partition.hpp).
@@ -66,6 +67,7 @@ Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulat
     if (local.images) {
       beyond.images = std::move(*local.images);
       beyond.motions = std::move(local.motions);
+      beyond.notes = std::move(local.notes);
       parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     }
     beyond.interfaces = std::make_shared<const Interfaces>(
@@ -246,6 +248,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
+  parts.notes = std::move(beyond.notes);
   parts.warnings = questionable(scene, *parts.families, constraints, quasi_static, state);
   parts.warnings.insert(parts.warnings.end(), warnings.begin(), warnings.end());
   Loads loads = build_loads(scene, of_terms, parts.images.get(), quasi_static);

@@ -16,8 +16,15 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
                                scene.integrator->type, communicator().size()));
 }
 
+bool sets_may_hold_sides(const Scene& scene) {
+  // Results of other runs do not say where sides were, and a pressure that follows needs gradients that images have not.
+  return scene.body.points_file && !scene.initial_from &&
+         std::ranges::none_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::pressure && load.follower; }) &&
+         std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return !boundary.holds_side(); });
+}
+
 bool has_images(const Scene& scene) {
-  return !scene.symmetries.empty() || !scene.periodics.empty() ||
+  return sets_may_hold_sides(scene) || !scene.symmetries.empty() || !scene.periodics.empty() ||
          std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); });
 }
 

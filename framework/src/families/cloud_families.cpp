@@ -34,7 +34,7 @@ const Row* positions(const Body& body) noexcept { return reinterpret_cast<const 
 CloudFamilies::CloudFamilies(const Body& body, std::shared_ptr<const InfluenceFunction> influence, FamilyNeeds needs)
     : Families(body, std::move(influence), needs),
       lists_(find_families(body.rows(), body.points(), body.dimension(), body.horizon(),
-                           [&](std::size_t p) { return body.number(p); })) {
+                           [&](std::size_t p) { return body.image(p) ? -1 : body.number(p); })) {
   const std::size_t n = body.points();
   for (AlignedVector<double>* values : {&volumes_, &influences_, &damage_}) values->assign(n, 0.0);
   if (needs.influence) omega_.resize(lists_.neighbour.size());

@@ -90,11 +90,12 @@ void Companion::find_pattern() {
   double reach = (dimension_ == 1 ? 1.01 : 1.43) * body_.spacing();
   // Farther than a horizon from its own points a rank knows no moduli.
   if (!body_.places().place.empty()) reach = std::min(reach, body_.horizon());
-  lists_ = find_families(rows_, n, dimension_, reach);
+  const auto number = [&](std::size_t i) { return body_.image(static_cast<std::size_t>(point_[i])) ? -1 : static_cast<std::int64_t>(i); };
+  lists_ = find_families(rows_, n, dimension_, reach, number);
   std::vector<bool> poor(n);
   for (std::size_t i = 0; i < n; ++i) poor[i] = lists_.first[i + 1] - lists_.first[i] < dimension_;
   if (std::ranges::find(poor, true) != poor.end())
-    lists_ = merged(lists_, find_families(rows_, n, dimension_, std::max(body_.horizon(), reach)), poor);
+    lists_ = merged(lists_, find_families(rows_, n, dimension_, std::max(body_.horizon(), reach), number), poor);
   if (body_.cracks().empty()) return;
   FamilyLists whole{{0}, {}};
   for (std::size_t i = 0; i < n; ++i) {

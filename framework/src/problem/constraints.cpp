@@ -29,7 +29,9 @@ Constraints::Constraints(const Body& body, std::vector<Prescription> prescriptio
   }
   for (std::size_t dof = 0; dof < governor.size(); ++dof)
     if (governor[dof] >= 0) dofs_.push_back(static_cast<std::int64_t>(dof));
+  add_held(images);
   add_images(images);
+  std::ranges::sort(dofs_);
 }
 
 void Constraints::add_images(const Images& images) {
@@ -53,7 +55,28 @@ void Constraints::add_images(const Images& images) {
     shares_.push_back({term.motion, term.factor, term.at, motion.value.depends_on_time ? 0.0 : motion.value.value(term.at, 0.0)});
     image.last = shares_.size();
   }
-  std::ranges::sort(dofs_);
+}
+
+void Constraints::add_held(const Images& images) {
+  const std::size_t of_layers = dofs_.size();
+  for (std::size_t k = 0; k < images.held.size(); ++k) {
+    const HeldPoint& held = images.held[k];
+    const std::int32_t point = body_->internal()[static_cast<std::size_t>(held.point)];
+    if (!body_->owns(static_cast<std::size_t>(point))) continue;
+    bool last = true;  // of its component
+    for (std::size_t j = k + 1; j < images.held.size() && images.held[j].point == held.point; ++j) last &= images.held[j].component != held.component;
+    const std::int64_t dof = held.component * static_cast<std::int64_t>(body_->stride()) + point;
+    if (!last || std::binary_search(dofs_.begin(), dofs_.begin() + static_cast<std::ptrdiff_t>(of_layers), dof)) continue;
+    image_dofs_.push_back({dof, false, false, shares_.size(), shares_.size()});
+    dofs_.push_back(dof);
+    if (held.motion < 0) continue;
+    const FaceMotion& motion = motions_[static_cast<std::size_t>(held.motion)];
+    const Point x = body_->position(static_cast<std::size_t>(point));
+    image_dofs_.back().velocity = motion.velocity;
+    image_dofs_.back().depends_on_time = motion.value.depends_on_time;
+    shares_.push_back({held.motion, 1.0, x, motion.value.depends_on_time ? 0.0 : motion.value.value(x, 0.0)});
+    image_dofs_.back().last = shares_.size();
+  }
 }
 
 double Constraints::value(const ImageDof& image, double t) const {

@@ -163,6 +163,7 @@ std::string Simulation::summary() {
     lines.push_back(
         fmt::format("warning       {} points have {}", singular,
                     problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds"));
+  for (const std::string& note : problem_->notes()) lines.push_back(fmt::format("side          {}", note));
   for (const std::string& warning : problem_->warnings()) lines.push_back(fmt::format("warning       {}", warning));
   for (const auto& [label, note] : report.notes) lines.push_back(fmt::format("{:<13} {}", label, note));
   for (const std::string& warning : doubts(scene_, *problem_)) lines.push_back(fmt::format("warning       {}", warning));

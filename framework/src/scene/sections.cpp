@@ -159,7 +159,7 @@ ParameterTable boundary_parameters() {
   ParameterTable table;
   table.string("set", "The points whose motion is prescribed; with `face` those whose side it is, default: all. Needed without `face`.");
   table.choice("face", faces(), "Prescribe the motion of this side of the set instead of that of its points.");
-  table.number("at", "m", "With `face`: where it lies; without it half a spacing beyond the outermost points. Needed where points come from a file.");
+  table.number("at", "m", "With `face`: where it lies. Without it half a spacing beyond the outermost points; points from a file say by their volumes, or the box of their cells, whether they lie on it.");
   table.expression("surface", "-", "Prescribe the motion of the surface where this expression of x, y, z is zero; it is negative in the body, a cloud.");
   table.add(ParameterType::components, "displacement", "m", "Prescribed displacement.").with_time();
   table.add(ParameterType::components, "velocity", "m/s", "Prescribed velocity.").with_time();
@@ -171,7 +171,7 @@ ParameterTable boundary_parameters() {
 ParameterTable symmetry_parameters() {
   ParameterTable table;
   table.choice("axis", {"x", "y", "z"}, "Normal of the plane, of which the body is one half.").require();
-  table.number("at", "m", "Where the plane lies; without it half a spacing below the lowest points. Needed where points come from a file.");
+  table.number("at", "m", "Where the plane lies. Without it half a spacing below the lowest points; points from a file say by their volumes, or the box of their cells, whether they lie on it.");
   return table;
 }
 

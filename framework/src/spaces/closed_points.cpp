@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "body/voronoi.hpp"
 #include "core/symmetric_matrix.hpp"
@@ -41,6 +43,39 @@ Box whole_box_of(const Body& body, std::span<const std::int32_t> points) {
   return box;
 }
 
+/// Where points are, each place once: images of points on a mirror lie on their sources.
+struct Places {
+  std::vector<Point> position;
+  std::vector<double> volume;   ///< of all points there
+  std::vector<std::size_t> of;  ///< by point
+};
+
+Places places_of(const Body& body) {
+  Places places;
+  places.of.resize(body.points());
+  std::vector<std::size_t> order(body.points());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (std::ranges::none_of(order, [&](std::size_t p) { return body.image(p); })) {
+    for (const std::size_t p : order) {
+      places.position.push_back(body.position(p));
+      places.volume.push_back(body.volume(p));
+    }
+    places.of = std::move(order);
+    return places;
+  }
+  std::ranges::sort(order, {}, [&](std::size_t p) { return std::pair(body.position(p), p); });
+  for (const std::size_t p : order) {
+    const Point x = body.position(p);
+    if (places.position.empty() || places.position.back() != x) {
+      places.position.push_back(x);
+      places.volume.push_back(0);
+    }
+    places.volume.back() += body.volume(p);
+    places.of[p] = places.position.size() - 1;
+  }
+  return places;
+}
+
 /// By point: 1 where its cell is open, 2 where its bonds are cut as well or its family is too poor; of images what their sources
 /// are, of points of other ranks what these say.
 Field open_cells(const Families& families, const std::function<void(FieldView)>& copy_from_sources) {
@@ -50,14 +85,13 @@ Field open_cells(const Families& families, const std::function<void(FieldView)>&
     box.lower[c] -= 2 * body.horizon();
     box.upper[c] += 2 * body.horizon();
   }
-  std::vector<Point> positions;
-  for (std::size_t p = 0; p < body.points(); ++p) positions.push_back(body.position(p));
-  const VoronoiCells cells = voronoi_cells(positions, body.dimension(), box.lower, box.upper);
+  const Places places = places_of(body);
+  const VoronoiCells cells = voronoi_cells(places.position, body.dimension(), box.lower, box.upper);
   Field open = body.make_field(1);
   for (const std::int32_t p : body.owned()) {
-    const auto at = static_cast<std::size_t>(p);
+    const auto at = static_cast<std::size_t>(p), cell = places.of[at];
     const bool torn = families.damage(at) > 0 || !std::isfinite(families.condition(at));
-    open.data()[p] = torn ? 2 : cells.reach[at] > 1.5 * spacing_of(body, at) ? 1 : 0;
+    open.data()[p] = torn ? 2 : cells.reach[cell] > 1.5 * spacing_of(body, places.volume[cell]) ? 1 : 0;
   }
   if (copy_from_sources) copy_from_sources(open);
   return open;
@@ -122,7 +156,10 @@ class Normals {
 }  // namespace
 
 double spacing_of(const Body& body, std::size_t p) {
-  return std::pow(body.volume(p) / body.section(), 1.0 / body.dimension());
+  return spacing_of(body, body.volume(p));
+}
+double spacing_of(const Body& body, double volume) {
+  return std::pow(volume / body.section(), 1.0 / body.dimension());
 }
 
 ClosedComponents::ClosedComponents(ClosedPoints closed, const Body& body)

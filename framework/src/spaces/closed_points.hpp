@@ -52,6 +52,7 @@ class ClosedComponents {
 
 /// Of the volume that belongs to a point [m].
 double spacing_of(const Body& body, std::size_t p);
+double spacing_of(const Body& body, double volume);
 
 /// Of the points that the body owns. copy_from_sources: values of points -> their images; may be empty.
 ClosedPoints find_closed_points(const Families& families, const std::function<void(FieldView)>& copy_from_sources);

@@ -232,8 +232,8 @@ class CoincidentPoints : public std::domain_error {
   std::int64_t number_;
 };
 
-/// |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. Throws CoincidentPoints. number(p): of a
-/// point there; empty: p.
+/// 0 < |xi| <= horizon (1 + 1e-10), by a cell list in O(n). `rows`: positions, rows of 4. number(p): of a point; empty: p. Throws
+/// CoincidentPoints where two points with numbers lie at one place. Images have a number below 0 and may lie on their sources.
 FamilyLists find_families(std::span<const double> rows, std::size_t points, int dimension, double horizon,
                           const std::function<std::int64_t(std::size_t p)>& number = {});
 

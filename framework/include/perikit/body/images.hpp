@@ -47,6 +47,12 @@ struct ImageTerm {
   std::int64_t surface;                        ///< input number, in the whole body
 };
 
+/// A component of a point that lies on a plane itself: the motion of the plane there (-1: 0) is the point's.
+struct HeldPoint {
+  std::int32_t point;                          ///< input number
+  int component, motion;
+};
+
 /// An image on a point of a lattice, or on another image.
 class OverlappingImage : public std::domain_error {
  public:
@@ -60,6 +66,7 @@ struct Images {
   std::vector<double> volume;                  ///< over that of the source
   std::vector<std::array<std::int8_t, 3>> sign;
   std::vector<ImageTerm> terms;                ///< ascending by image
+  std::vector<HeldPoint> held;                 ///< ascending by point; the last one of a component governs it
   std::vector<Crack> cracks;                   ///< of the body, and their images
   std::optional<Lattice> lattice;              ///< that has places for the points of a lattice and for its images
 
@@ -72,13 +79,15 @@ double halo(double horizon);
 class TurningMirrors;
 
 /// Images of points that lie no farther than the halo from planes, axis after axis, so that edges and corners have images of images.
+/// A point of a cloud that lies on a mirror stands for the part of its cell in front of it, and its image for the other one: both are at
+/// one place, and no bond joins them.
 /// Where there are surfaces, mirrors take their turns until none adds an image, and where several could have one, that behind which it
 /// lies deepest has it; periodic sides come last. Each point has its images by itself.
 class ImageMaker {
  public:
   /// surfaces: of a cloud.
   ImageMaker(const BodyFrame& frame, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces = {});
-  /// Without surfaces; reach: the halo.
+  /// Of a lattice: without surfaces; reach: the halo.
   ImageMaker(int dimension, double reach, std::vector<ImagePlane> planes);
   ~ImageMaker();
   ImageMaker(ImageMaker&&) noexcept;
@@ -93,7 +102,7 @@ class ImageMaker {
 
  private:
   int dimension_;
-  double reach_;
+  double reach_, touching_ = 0;
   std::vector<ImagePlane> planes_;
   std::unique_ptr<TurningMirrors> turning_;                   ///< null: without surfaces
   std::vector<std::vector<std::size_t>> across_;              ///< planes across one axis after the other

@@ -36,6 +36,7 @@ struct ProblemParts {
   std::string kinematics;                       ///< names, for messages
   std::vector<std::string> materials;           ///< by material of the body
   std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
+  std::vector<std::string> notes;               ///< where sides were found to lie
 };
 
 class BodyProblem final : public Problem {
@@ -108,6 +109,7 @@ class BodyProblem final : public Problem {
   const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
   /// Faces of cracks that have passed through each other, in words; empty: none. All ranks must call it.
   std::string crossed_faces();
+  const std::vector<std::string>& notes() const noexcept { return parts_.notes; }
   /// Bytes held by body, terms and state.
   std::size_t bytes() const noexcept;
 

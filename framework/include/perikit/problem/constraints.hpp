@@ -27,12 +27,13 @@ struct Prescription {
 struct FaceMotion {
   bool velocity = false;                 ///< [m/s]; else displacement [m]
   SpaceTimeFunction value;
+  bool of_set = false;                   ///< a set that consists of the points on the face holds them likewise
 };
 
 class Constraints {
  public:
   /// Where several prescriptions name a component of a point, the last one governs it. `body` must outlive the constraints. The images
-  /// of the body, if it has any, are constrained where mirrors turn the sign: by what faces prescribe there. Throws std::domain_error where
+  /// of the body, if it has any, are constrained where mirrors turn the sign: by what faces prescribe there; points on mirrors likewise. Throws std::domain_error where
   /// velocities and displacements meet in one image.
   Constraints(const Body& body, std::vector<Prescription> prescriptions, const Images& images = {}, std::vector<FaceMotion> motions = {});
 
@@ -80,6 +81,8 @@ class Constraints {
   };
   double value(const ImageDof& image, double t) const;
   void add_images(const Images& images);
+  /// What planes hold of points on them.
+  void add_held(const Images& images);
   /// visit(dof, velocity, depends_on_time, value(t)) for every constrained component.
   template <class Visit>
   void each(Visit&& visit) const;
