@@ -9,25 +9,35 @@ namespace {
 
 constexpr double shortest = 4, longest = 32;   // steps from look to look
 /// Eigenvalues rise at most about as the fourth power of a stretch (tension of a Saint Venant-Kirchhoff solid: the third; compression of laws
-/// with a logarithm of J: the third). Half of what is left then serves what happens between two looks.
-constexpr double power = 8;
-/// Of the margin: below it, an estimate tells nothing.
+/// with a logarithm of J: the third). Half of what may be left then serves what happens between two looks.
+constexpr double least_power = 2, largest_power = 8;
+/// An estimate after less tells nothing.
 constexpr double least_margin = 0.01;
 
 }  // namespace
 
-void StretchWatch::estimated(StretchRange range, std::int64_t step, double headroom) {
+double StretchWatch::change(StretchRange range) const {
+  return std::max({0.0, std::log(range.largest / largest_), std::log(least_ / range.least)});
+}
+
+void StretchWatch::estimated(StretchRange range, std::int64_t step, double eigenvalue, double tolerated) {
+  // What the last change did to the eigenvalue, the next one does about once more.
+  const bool known = power_ > 0 && eigenvalue_ > 0 && eigenvalue > 0;
+  const double changed = known ? change(range) : 0;
+  if (changed >= least_margin) power_ = std::clamp(2 * std::log(eigenvalue / eigenvalue_) / changed + 1, least_power, largest_power);
+  if (!known) power_ = largest_power;
   least_ = range.least;
   largest_ = range.largest;
-  margin_ = std::max(least_margin, std::log(std::max(1.0, headroom)) / power);
+  eigenvalue_ = eigenvalue;
+  margin_ = eigenvalue > 0 ? std::max(least_margin, std::log(std::max(1.0, tolerated / eigenvalue)) / power_) : least_margin;
   before_ = 0;
   last_ = static_cast<double>(step);
-  next_ = static_cast<double>(step) + shortest;
+  next_ = last_ + shortest;
 }
 
 bool StretchWatch::look(StretchRange range, std::int64_t step) {
-  const double changed = std::max(std::log(range.largest / largest_), std::log(least_ / range.least));
-  if (!(changed < margin_)) return true;
+  const double changed = change(range);
+  if (changed >= margin_) return true;
   // Half of the steps after which it is reached if it goes on like that.
   const double now = static_cast<double>(step), rate = (changed - before_) / (now - last_);
   const double steps = rate > 0 ? 0.5 * (margin_ - changed) / rate : longest;

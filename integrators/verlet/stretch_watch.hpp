@@ -10,20 +10,26 @@ namespace perikit {
 /// rare where stretches change slowly.
 class StretchWatch {
  public:
-  static constexpr std::size_t numbers = 6;
+  static constexpr std::size_t numbers = 8;
   /// The numbers are kept with the state of the run.
-  explicit StretchWatch(std::span<double> kept) : least_(kept[0]), largest_(kept[1]), margin_(kept[2]), before_(kept[3]), last_(kept[4]), next_(kept[5]) {}
+  explicit StretchWatch(std::span<double> kept)
+      : least_(kept[0]), largest_(kept[1]), eigenvalue_(kept[2]), power_(kept[3]), margin_(kept[4]), before_(kept[5]), last_(kept[6]), next_(kept[7]) {}
 
-  /// The largest eigenvalue may rise by the factor `headroom` from here.
-  void estimated(StretchRange range, std::int64_t step, double headroom);
+  /// The largest eigenvalue, and the one that is tolerated.
+  void estimated(StretchRange range, std::int64_t step, double eigenvalue, double tolerated);
   bool due(std::int64_t step) const noexcept { return static_cast<double>(step) >= next_; }
   /// Whether an estimate is needed.
   bool look(StretchRange range, std::int64_t step);
 
  private:
+  /// By how much the logarithm of the largest stretch, or of the least, has gone beyond that of the last estimate.
+  double change(StretchRange range) const;
+
   double &least_, &largest_;   ///< stretches at the last estimate
-  double& margin_;             ///< by which the logarithm of one of them may change
-  double& before_;             ///< by how much it had changed at the last look
+  double& eigenvalue_;         ///< what it found
+  double& power_;              ///< of the stretch, with which eigenvalues are expected to rise; 0: nothing is known
+  double& margin_;             ///< of the change
+  double& before_;             ///< change at the last look
   double& last_;               ///< step of that look, or of the estimate
   double& next_;               ///< step of the next look
 };

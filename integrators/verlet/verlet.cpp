@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -189,12 +188,11 @@ double Verlet::step_of(const Problem& problem, double eigenvalue) const {
   return options_.bond_based ? std::min(step, safety(problem) * bond_based_time_step(problem.body(), problem.laws())) : step;
 }
 
-double Verlet::eigenvalue_around_failed_bonds(Problem& problem, double step) const {
+double Verlet::eigenvalue_around_failed_bonds(Problem& problem, double most) const {
   const std::unique_ptr<DamagedPart> part = problem.damaged_part();
   if (!part) return 0;
-  const double most = 2 * tolerated(problem) / step, limit = most * most;
-  const double found = largest_eigenvalue(problem, *part, problem.state().displacement(), limit);
-  return found < limit ? 0 : found;
+  const double found = largest_eigenvalue(problem, *part, problem.state().displacement(), most);
+  return found < most ? 0 : found;
 }
 
 double Verlet::steps_to_end(double time, double step) const {
@@ -248,17 +246,17 @@ void Verlet::run(Problem& problem, Observer& observer) {
     counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
-  // By how much the largest eigenvalue may rise before the step is longer than is tolerated.
-  const auto headroom = [&](double eigenvalue) {
-    const double most = 2 * tolerated(problem) / dt;
-    return eigenvalue > 0 ? most * most / eigenvalue : std::numeric_limits<double>::infinity();
+  // The largest eigenvalue of which the step is tolerated.
+  const auto most = [&] {
+    const double root = 2 * tolerated(problem) / dt;
+    return root * root;
   };
   const bool watched = estimated && !problem.constant_stiffness();
   const bool fresh = dt == 0;
   if (fresh) {
     check_time_step(problem, options_.values, &observer);
     make_plan(first_step(problem));   // before the fields of the steps are there: it has its own
-    if (watched) watch.estimated(problem.stretches(state.displacement()), 0, headroom(planned_.eigenvalue));
+    if (watched) watch.estimated(problem.stretches(state.displacement()), 0, planned_.eigenvalue, most());
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
     if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
     planned_ = {};
@@ -321,7 +319,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
     // The largest eigenvalue rises at once where bonds fail, soon where the body is stretched or compressed fast, and slowly else.
     if (watched && !last) {
-      const double failed = fewer ? eigenvalue_around_failed_bonds(problem, dt) : 0;
+      const double failed = fewer ? eigenvalue_around_failed_bonds(problem, most()) : 0;
       const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
       if (failed > 0 || stretched || state.step % options_.check_every == 0) {
         const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
@@ -329,7 +327,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
           make_plan(stable);
           observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
         }
-        watch.estimated(problem.stretches(state.displacement()), state.step, headroom(eigenvalue));
+        watch.estimated(problem.stretches(state.displacement()), state.step, eigenvalue, most());
       }
     }
     observer.step_done(report());

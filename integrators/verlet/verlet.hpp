@@ -28,8 +28,8 @@ class Verlet final : public Integrator {
   double tolerated(const Problem& problem) const;
   /// The step to take where this is the largest eigenvalue.
   double step_of(const Problem& problem, double eigenvalue) const;
-  /// The largest eigenvalue around the bonds that failed in the last step; 0 where it tolerates steps of this length.
-  double eigenvalue_around_failed_bonds(Problem& problem, double step) const;
+  /// The largest eigenvalue around the bonds that failed in the last step; 0 where it lies below `most`.
+  double eigenvalue_around_failed_bonds(Problem& problem, double most) const;
   /// A warning where the bond-based estimate, asked for, is longer than the stable step of the beginning; else empty.
   std::string bond_based_doubt(const Problem& problem) const;
   /// That of the beginning, estimated once for plan() and run(), which take it of the same displacement.

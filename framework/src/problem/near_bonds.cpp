@@ -18,10 +18,18 @@ namespace {
 /// Of the longest bonds that count as bonds between neighbours, over the spacing: the diagonals of squares are among them.
 constexpr double neighbours_within = 1.5;
 
+/// The bits of the points p ... of a pack, p a multiple of nothing.
+unsigned pack_bits(std::span<const std::uint8_t> bits, std::size_t p) noexcept {
+  const std::size_t byte = p / 8, next = std::min(byte + 1, bits.size() - 1);
+  return (bits[byte] | static_cast<unsigned>(bits[next]) << 8) >> p % 8 & ((1u << pack_width) - 1);
+}
+
 }  // namespace
 
 NearBonds::NearBonds(const Families& families) : families_(families) {
   const Body& body = families.body();
+  // Bonds between points of other ranks are theirs, too, and images have no displacement of their own.
+  all_intact_ = !families.fails() && families.cut() == 0 && body.owned().size() == body.internal().size();
   const double reach = std::min(neighbours_within * body.spacing(), body.horizon() * (1 + 1e-9));
   if (families.lattice()) {
     const int d = body.dimension();
@@ -69,9 +77,11 @@ NearBonds::Squares NearBonds::on_lattice(ConstFieldView u) const {
       double xi[3] = {}, length = 0;
       for (std::size_t k = 0; k < D; ++k) xi[lattice.axis[k]] = offset[k] * lattice.spacing;
       for (int c = 0; c < D; ++c) length += xi[c] * xi[c];
+      Pack least(range.least), largest(range.largest);
       for (std::size_t p = begin; p < end; p += pack_width) {
         // Neighbours of points lie within the field, those of padding may not.
-        unsigned lanes = alive[p / padding] >> p % padding & ((1u << pack_width) - 1);
+        unsigned lanes = pack_bits(alive, p);
+        if (lanes != 0) lanes &= pack_bits(alive, p + static_cast<std::size_t>(shift));
         if (lanes == 0) continue;
         Pack square(0.0);
         for (int c = 0; c < D; ++c) {
@@ -79,17 +89,29 @@ NearBonds::Squares NearBonds::on_lattice(ConstFieldView u) const {
           const Pack y = Pack(xi[c]) + Pack::load(from + shift) - Pack::load(from);
           square += y * y;
         }
-        square = square * Pack(1 / length);
-        lanes &= lane_bits((square < Pack(range.least)) | (square > Pack(range.largest)));
+        // Stretch 1 in the lanes without a bond.
+        const Pack excess = keep(static_cast<std::uint8_t>(lanes), square * Pack(1 / length) - Pack(1.0));
+        if (all_intact_) {
+          least = min(least, Pack(1.0) + excess);
+          largest = max(largest, Pack(1.0) + excess);
+          continue;
+        }
+        lanes &= lane_bits((Pack(1.0) + excess < Pack(range.least)) | (Pack(1.0) + excess > Pack(range.largest)));
+        if (lanes == 0) continue;
+        double values[pack_width];
+        excess.store(values);
         for (; lanes != 0; lanes &= lanes - 1) {
           const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
-          double values[pack_width];
-          square.store(values);
           const std::size_t q = p + lane;
-          if (!body.owns(q) || body.image(q) || !body.alive(q + static_cast<std::size_t>(shift))) continue;
-          widen(range, values[lane], q, q + static_cast<std::size_t>(shift));
+          if (body.owns(q) && !body.image(q)) widen(range, 1 + values[lane], q, q + static_cast<std::size_t>(shift));
         }
       }
+      if (!all_intact_) continue;
+      double values[pack_width];
+      least.store(values);
+      range.least = *std::ranges::min_element(values);
+      largest.store(values);
+      range.largest = *std::ranges::max_element(values);
     }
     of_block[begin / 1024] = range;
   });

@@ -1,6 +1,7 @@
 #pragma once
 /// Bonds between neighbouring points, whose lengths tell how far a body has deformed.
 
+#include <array>
 #include <vector>
 
 #include "families/families.hpp"
@@ -30,6 +31,7 @@ class NearBonds {
   void widen(Squares& range, double square, std::size_t p, std::size_t far) const;
 
   const Families& families_;
+  bool all_intact_;   ///< bonds cannot fail, none is cut, and all points are this rank's
   std::vector<std::array<int, 3>> offsets_;     ///< lattices, internal axes
   std::vector<std::int32_t> first_, far_;       ///< clouds: by point, and the far ends
 };
