@@ -266,6 +266,7 @@ TEST_CASE("skipping: the same bonds fail, bit for bit, whatever bonds fail by") 
                           {2, "\"ordinary\"", released, ""},
                           {2, "\"baqp\"", "type = \"max_stress\"\nstrength = 25.0", ""},
                           {2, "\"projection\"", "type = \"smooth_degradation\"\nstretch_min = 0.001\nstretch = 0.004", ""}};
+  cases.push_back({2, "\"ordinary\"", released + "softening = 2.0", "jitter = 0.1"});   // dilatations with bonds that have weakened
   for (const std::string kinematics : {"\"conventional\"", "\"baqp\"", "\"bond_augmented\""}) cases.push_back({2, kinematics, released, "jitter = 0.1"});
   for (const Case& c : cases) {
     INFO(c.dimension, "D ", c.kinematics, ", ", c.damage, ", ", c.more);

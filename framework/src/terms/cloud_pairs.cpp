@@ -41,7 +41,7 @@ class CloudPairs final : public PairLoop {
     alignas(64) double dq[batch_points];
     alignas(64) double own_strain[batch_points], far_strain[batch_points];   ///< see PairFields::own_strain; near interfaces
     alignas(64) double far_volume[batch_points];   ///< b V_j
-    alignas(64) double integrity[batch_points];    ///< b, where damage is on
+    alignas(64) double integrity[batch_points];    ///< b, where bonds may have weakened
     alignas(64) double t[batch_points];        ///< omega |xi| e or its rate
     std::int32_t far[batch_points];
   };
@@ -135,8 +135,6 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
       // What lies at the far end of a broken bond is nobody's business: it may be anywhere.
       for (int c = 0; c < D && !(b > 0); ++c) g.du[c][l] = 0;
     }
-  } else if (fails_) {
-    std::fill_n(g.integrity, n, 1.0);
   }
   if (const double* omega = families_.whole_omegas())
     std::copy_n(omega + begin, n, g.omega);
@@ -178,7 +176,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   const bool energies = work == PairWork::energy || screened || (work == PairWork::force && pass.energies);
   double highest = 0;  // energy of a bond, over its share where that is asked for
   // Locals: packs that are stored may be any member, as far as the compiler knows.
-  const bool dilatation = dilatation_, fails = fails_, crosses = dilatation_ && fields_.crosses(p);
+  const bool dilatation = dilatation_, fails = fails_, weakens = families_.integrities() != nullptr, crosses = dilatation_ && fields_.crosses(p);
   Row* const force = force_.data();
   const std::int64_t end = lists_.first[p + 1];
   alignas(64) PairScratch s;
@@ -221,7 +219,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         const Pack t = crosses ? Pack::load(g.own_strain + l) * Pack::load(g.t + l) : Pack::load(g.t + l);
         own_sum += t * Pack::load(g.far_volume + l);
       }
-      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[l] * (fails ? g.integrity[l] * volume : volume);
+      for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[l] * (weakens ? g.integrity[l] * volume : volume);
       continue;
     }
     law_.bond_law({n, g.length, g.omega, s.e, s.modulus, energies ? s.energy : nullptr,
