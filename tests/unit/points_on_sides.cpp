@@ -132,6 +132,36 @@ TEST_CASE("a bar of nodes that is stretched at its ends, held as faces or as set
         }
 }
 
+TEST_CASE("a traction on nodes of a side keeps the bar in equilibrium, beside a plane of symmetry, too") {
+  for (const char* kinematics : with_gradients)
+    for (const std::vector<int>& cells : {std::vector<int>{12}, {12, 5}})
+      for (const bool moved : {false, true}) {
+        if (cells.size() == 1 && moved && std::string(kinematics) == "type = \"sub_horizon\"") continue;   // does not balance this line of points
+        INFO(std::string(kinematics), ", ", cells.size(), "D, moved ", moved);
+        const Bar bar(cells, moved);
+        const bool flat = cells.size() == 2;
+        const auto simulation = bar.build(bar.scene(
+            kinematics,
+            std::string("[[boundary]]\nface = \"-x\"\ndisplacement = [0") + (flat ? ", \"free\"]\n[[symmetry]]\naxis = \"y\"\n" : "]\n") +
+                "[[load]]\nset = \"right\"\nface = \"+x\"\ntraction = [1.0e3" + (flat ? ", 0]\n" : "]\n") +
+                "[initial]\ndisplacement = [\"1e-3*x\"" + (flat ? ", \"-0.25e-3*y\"]\n" : "]\n"),
+            "type = \"evaluate\""));
+        BodyProblem& problem = simulation->problem();
+        Field force = problem.make_field(), load = problem.make_field();
+        double energy = 0, largest = 0, work = 0;
+        REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy, 0).ok());
+        problem.loads().evaluate(0, load);
+        const ConstFieldView free = problem.constraints().free();
+        for (const std::int32_t p : problem.body().owned()) {
+          work += load.component(0)[p] * problem.body().position(static_cast<std::size_t>(p))[0];
+          for (int c = 0; c < problem.dimension(); ++c)
+            largest = std::max(largest, std::abs((force.component(c)[p] + load.component(c)[p]) * free.component(c)[p]));
+        }
+        CHECK(largest < 2.0);   // of 1000 a spacing
+        CHECK(work == doctest::Approx(1e3 * 12 * (flat ? 5 : 1)).epsilon(1e-6));
+      }
+}
+
 TEST_CASE("where a side lies is found by volumes, and said") {
   const Bar bar({10, 5}, false);
   const std::string faces = "[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[symmetry]]\naxis = \"y\"\n";

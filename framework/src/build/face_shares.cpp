@@ -9,6 +9,8 @@
 #include <map>
 
 #include "body/near_ranks.hpp"
+#include "build/free_surface.hpp"
+#include "build/outer_layer.hpp"
 #include "families/families.hpp"
 #include "perikit/core/exact_sum.hpp"
 
@@ -182,46 +184,138 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
   return in_order(shares, std::move(samples));
 }
 
-/// A cloud: points less than 1.2 spacings below the face are its outer layer, and their volumes over the spacing its area. Where
-/// the set holds a second layer, linear weights over both put the resultant on the face. Of a part of a body that is found with
-/// all ranks, which must all call it.
-FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const Body& body) {
-  const double dx = body.spacing();
-  const auto along = [&](std::int32_t p) {
-    return face.outward * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face.axis)];
-  };
-  const auto largest = [&](double value) { return body.part() ? communicator().largest(value) : value; };
-  double extreme = -std::numeric_limits<double>::infinity();
-  for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
-  extreme = largest(extreme);
+/// The points of a cloud at a face. Of a part of a body all ranks must call it.
+class Layer {
+ public:
+  Layer(const std::vector<std::int32_t>& points, const Face& face, const Body& body) : body_(body), face_(face) {
+    double extreme = -std::numeric_limits<double>::infinity(), highest = extreme, lowest = -extreme;
+    for (const std::int32_t p : points) extreme = std::max(extreme, along(p));
+    for (const std::int32_t p : body.internal()) {
+      highest = std::max(highest, along(p));
+      lowest = std::min(lowest, along(p));
+    }
+    at_ = largest(extreme);
+    thickness_ = largest(highest) + largest(-lowest);
+    const OuterLayer layer = outer_layer(body.spacing(), body.part(), [&](const auto& visit) {
+      for (const std::int32_t p : body.owned())
+        if (along(p) <= at_ + 1e-9 * body.spacing()) visit(at_ - along(p), body.volume(static_cast<std::size_t>(p)));
+    });
+    if (layer.clear() && layer.half_cells()) {
+      double next = std::numeric_limits<double>::infinity();  // layer
+      for (const std::int32_t p : body.owned())
+        if (const double d = at_ - along(p); d > 0.4 * body.spacing()) next = std::min(next, d);
+      cell_ = -0.5 * largest(-next);
+      outer_ = 0.05 * body.spacing();
+      behind_ = 0;
+    } else {
+      cell_ = body.spacing();
+      at_ += 0.5 * cell_;
+      outer_ = 1.2 * cell_;
+      behind_ = 2.2 * cell_;
+    }
+  }
+  double depth(std::int32_t p) const { return at_ - along(p); }
+  bool outer(std::int32_t p) const { return depth(p) <= outer_; }
+  bool second(std::int32_t p) const { return !outer(p) && depth(p) <= behind_; }
+  /// Of the face, where the point is one of the outer layer.
+  double area(std::int32_t p) const { return body_.volume(static_cast<std::size_t>(p)) / cell_; }
+  double thickness() const noexcept { return thickness_; }
+  /// Whether volumes say what the area of the face is; where points lie on it, evaluation points know better.
+  bool whole_cells() const noexcept { return behind_ > 0; }
+  Point foot(std::int32_t p) const {
+    Point x = body_.position(static_cast<std::size_t>(p));
+    x[static_cast<std::size_t>(face_.axis)] += face_.outward * depth(p);
+    return x;
+  }
+
+ private:
+  double along(std::int32_t p) const { return face_.outward * body_.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(face_.axis)]; }
+  double largest(double value) const { return body_.part() ? communicator().largest(value) : value; }
+
+  const Body& body_;
+  const Face& face_;
+  double at_ = 0;         ///< of the face, along the outward normal
+  double thickness_ = 0;  ///< of the body with its images: no face is where these are
+  double cell_ = 0;       ///< thickness of the cells of the outer layer
+  double outer_ = 0, behind_ = 0;  ///< depths at which the outer and the second layer end
+};
+
+/// What the kinematics has of the face, where a homogeneous stress is in equilibrium inside of the cloud: below each point of the outer layer that
+/// is of the set, and images of these points with what the evaluation points have of the face beyond its edges.
+Shares by_kinematics(const std::vector<std::int32_t>& points, const Face& face, const Layer& layer, const TermParts& parts, const ImageMap* images) {
+  const Body& body = parts.families->body();
+  const Field areas = face_areas(parts, face.axis);
+  std::vector<std::uint8_t> in_set(body.stride(), 0);
+  for (const std::int32_t p : points) in_set[static_cast<std::size_t>(p)] = 1;
+  std::vector<SurfacePoint> outer;
+  for (const std::int32_t p : body.owned())
+    if (const auto i = static_cast<std::size_t>(p); layer.outer(p) && layer.depth(p) >= -1e-9 * body.spacing())
+      outer.push_back({body.position(i), body.part() ? body.places().place[i] : p, in_set[i]});
+  const double felt = 3 * body.horizon();  // a face is felt no deeper
+  const NearestPoint nearest(of_ranks_near(body, outer, felt * (1 + 1e-9)), 2 * body.spacing());
+  std::vector<std::int32_t> below;
+  for (const std::int32_t p : images ? body.internal() : std::span(body.owned())) {
+    if (body.image(static_cast<std::size_t>(p)) || layer.depth(p) > std::min(felt, 0.5 * layer.thickness())) continue;
+    const SurfacePoint* const at = nearest.to(body.position(static_cast<std::size_t>(p)), felt);
+    if (at && at->chosen) below.push_back(p);
+  }
+  if (images) images->append_images(below);
+  std::vector<std::uint8_t> complete(body.stride(), 0);
+  for (const std::int32_t p : body.complete()) complete[static_cast<std::size_t>(p)] = 1;
+  Shares shares;
+  for (const std::int32_t p : below)
+    if (complete[static_cast<std::size_t>(p)]) shares[p].area = face.outward * areas.data()[p];
+  return shares;
+}
+
+/// By volumes: the outer layer has the area of the face, its volumes over the thickness of its cells. Where the set holds a second layer of whole
+/// cells, linear weights over both put the resultant on the face.
+Shares by_volumes(const std::vector<std::int32_t>& points, const Layer& layer, const Body& body) {
   ExactSum areas, volumes, moments, squares;
   bool second = false;
   for (const std::int32_t p : points) {
-    const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
-    if (depth > 2.2 * dx) continue;
-    if (depth <= 1.2 * dx)
-      areas.add(v / dx);
+    const double depth = layer.depth(p), v = body.volume(static_cast<std::size_t>(p));
+    if (!layer.outer(p) && !layer.second(p)) continue;
+    if (layer.outer(p))
+      areas.add(layer.area(p));
     else
       second = true;
     volumes.add(v);
     moments.add(v * depth);
     squares.add(v * depth * depth);
   }
-  second = largest(second ? 1 : 0) > 0;
+  if (body.part()) second = communicator().largest(second ? 1 : 0) > 0;
   const double total = total_of(body, areas), m0 = total_of(body, volumes), m1 = total_of(body, moments), m2 = total_of(body, squares);
   Shares shares;
-  SurfaceSamples samples;
   for (const std::int32_t p : points) {
-    const double depth = extreme + 0.5 * dx - along(p), v = body.volume(static_cast<std::size_t>(p));
-    if (depth > 2.2 * dx) continue;
-    Point foot = body.position(static_cast<std::size_t>(p));
-    foot[static_cast<std::size_t>(face.axis)] += face.outward * depth;
-    // A point of the outer layer has a square cell of the face.
-    const double area = depth <= 1.2 * dx ? v / dx : 0.0,
-                 side = body.dimension() == 2 ? area / body.frame().section : std::sqrt(area);
-    const std::int32_t group = add_cell(body.dimension(), face.axis, foot, side, area, samples);
-    shares[p] = {second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0, group};
+    const double depth = layer.depth(p), v = body.volume(static_cast<std::size_t>(p));
+    if (!layer.outer(p) && !layer.second(p)) continue;
+    shares[p].area = second ? total * v * (m2 - m1 * depth) / (m0 * m2 - m1 * m1) : total * v / m0;
   }
+  return shares;
+}
+
+/// Points on a face take what a consistent cloud has of it; other clouds go by their volumes. Of a part of a body all ranks must call it.
+FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const TermParts& parts, const ImageMap* images) {
+  const Body& body = parts.families->body();
+  const Layer layer(points, face, body);
+  const bool exact = parts.consistency && !layer.whole_cells();
+  Shares shares = exact ? by_kinematics(points, face, layer, parts, images) : by_volumes(points, layer, body);
+  ExactSum carried, seen;
+  for (const auto& [p, share] : shares)
+    if (body.owns(static_cast<std::size_t>(p))) carried.add(share.area);
+  for (const std::int32_t p : points)
+    if (layer.outer(p)) seen.add(layer.area(p));
+  const double scale = total_of(body, carried) / total_of(body, seen);
+  SurfaceSamples samples;
+  const auto add_group = [&](std::int32_t p, double area) {  // a point of the outer layer has a square cell of the face
+    const double side = body.dimension() == 2 ? area / body.frame().section : std::sqrt(area);
+    return add_cell(body.dimension(), face.axis, layer.foot(p), side, area, samples);
+  };
+  std::map<std::int32_t, std::int32_t> group;
+  for (const std::int32_t p : points)
+    if (layer.outer(p)) group[p] = add_group(p, scale * layer.area(p));
+  for (auto& [p, share] : shares) share.group = group.contains(p) ? group.at(p) : add_group(p, 0.0);
   return in_order(shares, std::move(samples));
 }
 
@@ -230,7 +324,7 @@ FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, c
 FaceShares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const Face face(load);
   const std::vector<std::int32_t>& points = parts.families->body().set(load.set);
-  FaceShares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts.families->body());
+  FaceShares shares = parts.families->body().lattice() ? on_lattice(points, face, parts, images) : on_cloud(points, face, parts, images);
   if (counted(std::ssize(shares.points)).all == 0 && communicator().complete()) {
     throw InputError(
         load.position, "load.face",

@@ -10,6 +10,7 @@
 #include "body/image_list.hpp"
 #include "build/conditions.hpp"
 #include "build/held_surfaces.hpp"
+#include "build/outer_layer.hpp"
 #include "build/sets.hpp"
 #include "build/several_ranks.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -121,29 +122,10 @@ class PlaneBuilder {
     return lower + (cells + (outward > 0 ? 1 : 0)) * spacing_;
   }
 
-  /// Between the volumes of half a cell and of a whole one, over those of the points behind.
-  static constexpr double half_cell = 0.75;
-  /// The mean volume of the points of a layer on a plane [m^d], 0 where there are none, and of those less than two spacings behind it.
-  struct Layers {
-    double outer = 0, inner = 0;
-    bool between = false;  ///< whether points lie near the layer, but not in it
-  };
-  Layers layers_at(const Side& side, const std::string& set) const {
-    constexpr double thick = 0.05, apart = 0.4, behind = 1.75;  // spacings
-    std::array<ExactSum, 4> sums;  // volumes and numbers of the points of both
-    double between = 0;
-    points_->over(set, [&](const PlacedPoints::OnePoint& point) {
-      const double depth = side.depth(point.x) / spacing_;
-      if (depth > behind) return;
-      if (depth > thick && depth < apart) between = 1;
-      const std::size_t layer = depth <= thick ? 0 : 2;
-      sums[layer].add(point.volume);
-      sums[layer + 1].add(1);
+  OuterLayer layer_on(const Side& side, const std::string& set) const {
+    return outer_layer(spacing_, points_->shared(), [&](const auto& visit) {
+      points_->over(set, [&](const PlacedPoints::OnePoint& point) { visit(side.depth(point.x), point.volume); });
     });
-    std::array<double, 4> total{};
-    for (std::size_t k = 0; k < total.size(); ++k) total[k] = points_->shared() ? total_over_ranks(sums[k]) : sums[k].value();
-    const auto mean = [&](std::size_t k) { return total[k + 1] > 0 ? total[k] / total[k + 1] : 0.0; };
-    return {mean(0), mean(2), communicator().largest(between) > 0};
   }
 
   /// Where the side of points from a file lies: that of the box of their cells, or where the volumes of the outermost layer say. Points on the
@@ -153,12 +135,12 @@ class PlaneBuilder {
     const auto a = static_cast<std::size_t>(axis);
     const std::optional<std::array<double, 3>>& box = outward > 0 ? scene_.body.points_upper : scene_.body.points_lower;
     if (box && std::abs((*box)[a] - extreme) < 1.2 * spacing_) return found_at((*box)[a], extreme, axis, outward, "that of the box of the points' cells");
-    const Layers layers = layers_at({axis, outward, extreme}, set);
-    if (layers.between || !(layers.inner > 0))
+    const OuterLayer layer = layer_on({axis, outward, extreme}, set);
+    if (!layer.clear())
       throw InputError(position, key,
                        fmt::format("found nothing for points from a file, whose outermost lies at {:.6g} and is no part of a layer; allowed: the coordinate of the side", extreme));
-    if (layers.outer < half_cell * layers.inner) return found_at(extreme, extreme, axis, outward, "by the volumes of its points, which are those of half cells");
-    const double cell = std::pow(layers.outer / points_->frame().section, 1.0 / scene_.body.dimension);
+    if (layer.half_cells()) return found_at(extreme, extreme, axis, outward, "by the volumes of its points, which are those of half cells");
+    const double cell = std::pow(layer.outer / points_->frame().section, 1.0 / scene_.body.dimension);
     return found_at(extreme + 0.5 * outward * cell, extreme, axis, outward, "by the volumes of its points, half a cell beyond them");
   }
   double found_at(double at, double extreme, int axis, double outward, const std::string& why) {
@@ -251,11 +233,11 @@ class PlaneBuilder {
 
   /// A point on a side stands for the part of its cell that lies inside.
   void refuse_whole_cells(const Side& side, const std::string& set, const SourcePosition& where, const std::string& key) const {
-    const Layers layers = layers_at(side, set);
-    if (layers.outer == 0 || layers.inner == 0 || layers.outer < half_cell * layers.inner) return;
+    const OuterLayer layer = layer_on(side, set);
+    if (layer.outer == 0 || layer.inner == 0 || layer.half_cells()) return;
     throw InputError(where, key, fmt::format("found points on the side, at {:.6g}, that have {:.3g} times the volume of those behind them; allowed: the volumes of those parts of "
                                              "their cells that lie inside, about a half, or a side half a cell beyond the points",
-                                             side.at, layers.outer / layers.inner));
+                                             side.at, layer.outer / layer.inner));
   }
 
   /// Whether one of all points lies on a side.
@@ -326,8 +308,7 @@ class PlaneBuilder {
         add("all", 0);
         add(set, 1);
         const auto count = [&](std::size_t k) { return points_->shared() ? total_over_ranks(sums[k]) : sums[k].value(); };
-        const Layers layers = layers_at(side, "all");
-        if (count(0) == count(1) && layers.inner > 0 && layers.outer < half_cell * layers.inner) return side;
+        if (count(0) == count(1) && layer_on(side, "all").half_cells()) return side;
       }
     return std::nullopt;
   }
