@@ -256,8 +256,8 @@ ParameterTable common_part_parameters(Kind kind) {
     table.boolean("second_law",
                   "Bonds whose failure would raise the stored energy stay until it does not. Without it true where the "
                   "kinematics creates energy as bonds "
-                  "fail: one gradient per point without a stabilization, bond_augmented, sub_horizon, selective over weighted "
-                  "bond gradients.");
+                  "fail: one gradient per point without a stabilization, order = 2 and more, bond_augmented, sub_horizon, selective over "
+                  "weighted bond gradients.");
   }
   return table;
 }
