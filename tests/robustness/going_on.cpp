@@ -158,5 +158,5 @@ TEST_CASE("going on: results of another body are refused where it differs first"
   CHECK(desk.perikit("check next.toml --set body.lattice.spacing=1.00000000001").status == 0);
   // Results that have lost the body.
   fs::remove(desk.path("out/reference.h5"));
-  other("", "reference");
+  refused(desk.perikit("check next.toml"), "reference.h5 beside it is missing or damaged");
 }

@@ -138,15 +138,15 @@ TEST_CASE("questionable: a box that is no multiple of the spacing") {
   };
   const std::string words = "the box of [body.lattice] is ";
   warned(box("0.3", "[8, 5]"), "",
-         words + "26.6667 by 16.6667 spacings, which are not whole numbers: the body is 8.1 by 5.1 m, not 8 by 5 m; what fits: spacing = 0.25 or 0.333333");
-  warned(box("1.0", "[8, 5.2]"), "", words + "8 by 5.2 spacings, which are not whole numbers: the body is 8 by 5 m, not 8 by 5.2 m; what fits: spacing = 0.8");
+         words + "26.6667 by 16.6667 spacings, which are not whole numbers: the body is 8.1 by 5.1 m, not 8 by 5 m; spacing = 0.25 or 0.333333 would fit");
+  warned(box("1.0", "[8, 5.2]"), "", words + "8 by 5.2 spacings, which are not whole numbers: the body is 8 by 5 m, not 8 by 5.2 m; spacing = 0.4 would fit");
   // Two lengths without a common measure nearby.
-  warned(box("1.0", "[8, 5.0123]"), "", "what fits: no spacing near it does, upper = [8, 5]");
+  warned(box("1.0", "[8, 5.0123]"), "", words + "8 by 5.0123 spacings, which are not whole numbers: the body is 8 by 5 m, not 8 by 5.0123 m; no spacing nearby fits, upper = [8, 5] does");
   // What a spacing is rounded to, and boxes that `inside` has cut before they end.
   silent(box("0.33333", "[8, 5]"));
   silent(box("\"1/3\"", "[8, 5]"));
   silent(replaced(box("1.0", "[8.3, 5]"), "lower = [0, 0]", "lower = [0, 0]\ninside = \"x < 7\""));
-  // Of a plane that is missed by one cell in x alone, on several axes, the run says so, too.
+  // A run says so, too.
   const Desk desk(box("1.0", "[8.4, 5]"));
   const Result run = desk.perikit("run scene.toml -o out");
   CHECK_MESSAGE(contains(run.out, words + "8.4 by 5 spacings"), run.out);
@@ -186,7 +186,7 @@ frames = 4
     CHECK_MESSAGE(run.status == 0, run.err);
     return run.out;
   };
-  const std::string first = "warning: time 0.7", last = "warning: strains or rotations were not small in 2 of 5 frames, at most 0.2";
+  const std::string first = "warning: time 0.5: a strain of 0.01", last = "warning: strains or rotations were not small in 3 of 5 frames, at most 0.20";
   const std::string linear = told(spinning, "");
   CHECK_MESSAGE(contains(linear, first), linear);
   CHECK_MESSAGE(contains(linear, last), linear);

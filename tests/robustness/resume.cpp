@@ -44,7 +44,7 @@ TEST_CASE("resume: a signal keeps the state, and the run goes on from it") {
 }
 
 TEST_CASE("resume: laws remember what happened at parts of families that are too poor for a gradient, and come back when no other is left") {
-  const std::string scene = R"(format = 1
+  const std::string scene = R"toml(format = 1
 [body]
 dimension = 2
 plane = "strain"
@@ -83,7 +83,7 @@ estimate = "bond_based"
 frames = 3
 history_every = 1
 fields = ["displacement", "velocity", "damage"]
-)";
+)toml";
   const Desk desk(scene);
   REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
   CHECK(stop_after(desk, "out", 60, SIGTERM) == 1);

@@ -28,19 +28,19 @@ double from_whole(double n) { return std::abs(n - std::round(n)); }
 /// nothing.
 constexpr double whole_box = 1e-3;
 
-/// The nearest spacings below and above that fit each of these lengths. Those below are at most half as long, those above twice.
+/// The nearest spacings below and above that fit each of these lengths, from a quarter of this one to four times as much.
 std::vector<double> fitting_spacings(std::span<const double> lengths, double spacing) {
   const double shortest = std::ranges::min(lengths), cells = shortest / spacing;
   const auto fits = [&](double n) {
     return std::ranges::all_of(lengths, [&](double length) { return from_whole(length / shortest * n) < whole_box; });
   };
   std::vector<double> found;
-  for (double n = std::floor(cells) + 1; n <= 2 * cells + 1 && n <= cells + 1e5; ++n)
+  for (double n = std::floor(cells) + 1; n <= 4 * cells + 1 && n <= cells + 1e5; ++n)
     if (fits(n)) {
       found.push_back(shortest / n);
       break;
     }
-  for (double n = std::floor(cells); n >= 1 && n >= cells / 2; --n)
+  for (double n = std::floor(cells); n >= 1 && n >= cells / 4 && n >= cells - 1e5; --n)
     if (fits(n)) {
       found.push_back(shortest / n);
       break;
@@ -68,12 +68,14 @@ void find_cut_cells(const Scene& scene, const Body& body, std::vector<std::strin
   if (!differs) return;
   std::string remedy;
   for (const double spacing : fitting_spacings(asked, lattice.spacing)) remedy += fmt::format("{}{:.6g}", remedy.empty() ? "spacing = " : " or ", spacing);
-  if (remedy.empty()) {
+  if (!remedy.empty()) {
+    remedy += " would fit";
+  } else {
     std::string upper;
     for (std::size_t a = 0; a < d; ++a) upper += fmt::format("{}{:.6g}", a > 0 ? ", " : "", lattice.lower[a] + got[a]);
-    remedy = fmt::format("no spacing near it does, upper = [{}]", upper);
+    remedy = fmt::format("no spacing nearby fits, upper = [{}] does", upper);
   }
-  lines.push_back(fmt::format("the box of [body.lattice] is {} spacings, which are not whole numbers: the body is {} m, not {} m; what fits: {}",
+  lines.push_back(fmt::format("the box of [body.lattice] is {} spacings, which are not whole numbers: the body is {} m, not {} m; {}",
                               sizes(cells), sizes(got), sizes(asked), remedy));
 }
 
