@@ -6,6 +6,17 @@
 
 namespace perikit {
 
+InputError Jfnk::without_volumes() const {
+  return options_.values.error("preconditioner", std::string("found \"mixed\", which needs the point volumes of selective kinematics; allowed here: auto, none, companion") +
+                                                     (communicator().size() == 1 ? ", jacobi, factorisation" : ""));
+}
+
+std::string Jfnk::plan(Problem& problem) {
+  bonds_of_jacobian(options_.values, problem);
+  if (options_.krylov.preconditioner == "mixed" && !problem.volumetric_part()) throw without_volumes();
+  return {};
+}
+
 double Jfnk::memory(Problem& problem) {
   return krylov_solver_bytes(problem, options_.krylov.preconditioner, options_.krylov.restart);
 }
@@ -13,11 +24,7 @@ double Jfnk::memory(Problem& problem) {
 void Jfnk::run(Problem& problem, Observer& observer) {
   std::string chosen;
   const std::unique_ptr<LinearisedProblem> equations = make_krylov_equations(problem, options_.krylov, chosen);
-  if (!equations)
-    throw options_.values.error("preconditioner",
-                                std::string("found \"mixed\", which needs the point volumes of selective kinematics; allowed here: "
-                                            "auto, none, companion") +
-                                    (communicator().size() == 1 ? ", jacobi, factorisation" : ""));
+  if (!equations) throw without_volumes();
   observer.log("jfnk: preconditioner " + chosen);
   run_newton("jfnk", options_.values, problem, observer, *equations);
 }

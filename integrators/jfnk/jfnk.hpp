@@ -15,10 +15,14 @@ class Jfnk final : public Integrator {
   IntegratorTraits traits() const noexcept override {
     return {.dynamic = false, .quasi_static = true, .several_ranks = !needs_one_rank(options_.krylov.preconditioner)};
   }
+  /// Nothing to tell; refuses what the run would.
+  std::string plan(Problem& problem) override;
   double memory(Problem& problem) override;
   void run(Problem& problem, Observer& observer) override;
 
  private:
+  InputError without_volumes() const;
+
   JfnkOptions options_;
 };
 

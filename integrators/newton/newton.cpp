@@ -66,6 +66,11 @@ bool Newton::direct(Problem& problem) const {
          direct_solver_bytes(problem) <= memory_limit();
 }
 
+std::string Newton::plan(Problem& problem) {
+  bonds_of_jacobian(values_, problem);
+  return {};
+}
+
 double Newton::memory(Problem& problem) {
   if (!direct(problem)) return krylov_solver_bytes(problem, "companion", KrylovOptions().restart);
   return problem.loads().follow() ? krylov_solver_bytes(problem, "factorisation", KrylovOptions().restart) : direct_solver_bytes(problem);

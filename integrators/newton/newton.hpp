@@ -26,6 +26,8 @@ class Newton final : public Integrator {
  public:
   explicit Newton(const ParameterValues& values) : values_(values) {}
   IntegratorTraits traits() const noexcept override { return {.dynamic = false, .quasi_static = true}; }
+  /// Nothing to tell; refuses what the run would.
+  std::string plan(Problem& problem) override;
   double memory(Problem& problem) override;
   void run(Problem& problem, Observer& observer) override;
 

@@ -25,13 +25,17 @@ void add_bond_jacobian_key(ParameterTable& table) {
       .by_default("false");
 }
 
+std::unique_ptr<WeakeningBonds> bonds_of_jacobian(const ParameterValues& values, Problem& problem) {
+  if (!values.boolean("bond_jacobian")) return nullptr;
+  if (std::unique_ptr<WeakeningBonds> bonds = problem.weakening_bonds()) return bonds;
+  throw values.error("bond_jacobian", "found true; allowed here: false, as it needs a [damage] whose bonds weaken gradually, and one rank");
+}
+
 void run_newton(std::string_view integrator, const ParameterValues& values, Problem& problem, Observer& observer, LinearisedProblem& equations) {
   const LoadStepOptions options = load_step_options(values);
   NewtonIteration newton(equations, options.max_iterations, values.boolean("line_search"));
-  if (!values.boolean("bond_jacobian")) return run_load_steps(integrator, options, problem, observer, newton);
-  std::unique_ptr<WeakeningBonds> bonds = problem.weakening_bonds();
-  if (!bonds)
-    throw values.error("bond_jacobian", "found true; allowed here: false, as it needs a [damage] whose bonds weaken gradually, and one rank");
+  std::unique_ptr<WeakeningBonds> bonds = bonds_of_jacobian(values, problem);
+  if (!bonds) return run_load_steps(integrator, options, problem, observer, newton);
   BondJacobian jacobian(problem, newton, equations, std::move(bonds));
   run_load_steps(integrator, options, problem, observer, jacobian);
 }

@@ -13,8 +13,11 @@ namespace perikit {
 /// Adds the key `bond_jacobian`.
 void add_bond_jacobian_key(ParameterTable& table);
 
+/// The bonds of the Jacobian where `values` ask for it, else null. Throws InputError where they do and no bond weakens gradually, or on several ranks.
+std::unique_ptr<WeakeningBonds> bonds_of_jacobian(const ParameterValues& values, Problem& problem);
+
 /// Runs the load steps of `problem` with Newton's method on `equations`; with the Jacobian of the degrading bonds where `values`
-/// ask for it. Throws InputError where they do and no bond weakens gradually, or on several ranks.
+/// ask for it (bonds_of_jacobian).
 void run_newton(std::string_view integrator, const ParameterValues& values, Problem& problem, Observer& observer, LinearisedProblem& equations);
 
 /// Where bonds weakened at an equilibrium they go on weakening, as the body gives way. With r the force that is out of balance and the

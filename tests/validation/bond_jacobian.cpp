@@ -139,5 +139,6 @@ TEST_CASE("bond Jacobian: it is refused where no bond weakens gradually") {
                                                                      "integrator.bond_jacobian=true"});
     Rounds rounds;
     CHECK_THROWS_WITH_AS(simulation->integrator().run(simulation->problem(), rounds), doctest::Contains("bond_jacobian"), InputError);
+    CHECK_THROWS_WITH_AS(simulation->summary(), doctest::Contains("bond_jacobian"), InputError);   // `check`, and `run` before it writes anything
   }
 }

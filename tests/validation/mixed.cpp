@@ -228,8 +228,9 @@ TEST_CASE("mixed is refused without point volumes, and by kinsol") {
   std::string plain = scene(3, 3, 5, jfnk("mixed"));
   plain.replace(plain.find("\"selective\"\nbase = \"baqp\""), std::strlen("\"selective\"\nbase = \"baqp\""), "\"baqp\"");
   Protocol protocol;
-  CHECK_THROWS_WITH(make(plain)->run(protocol),
-                    doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective"));
+  const auto words = doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective");
+  CHECK_THROWS_WITH(make(plain)->run(protocol), words);
+  CHECK_THROWS_WITH(make(plain)->summary(), words);   // `check`, and `run` before it writes anything
   CHECK_THROWS_WITH(make(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
 }
 
