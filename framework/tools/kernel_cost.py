@@ -38,7 +38,7 @@ PLACES = [(2.015, 0, 0), (4.015, 0, 0), (5.015, 0, 0), (6.015, 0, 0), (3.015, 22
 
 def cell(options, kinematics, kernel, ratio, degrees, jitter):
     name = "%s_%s_%g_%g_%g" % (kinematics, kernel, ratio, degrees, jitter)
-    folder = options.out / "".join(c if c.isalnum() or c in "._" else "_" for c in name).replace("`", "")
+    folder = options.out / "".join(c if c.isalnum() else "_" for c in name)
     result = folder.with_suffix(".txt")
     if not result.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
