@@ -1,7 +1,16 @@
 #include "multigrid.hpp"
 
+// Eigen's kernels for AVX-512 begin with registers that the compiler's own header leaves undefined on purpose, which g++ 12 takes for forgotten values.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#endif
 #include <Eigen/Dense>
 #include <Eigen/Sparse>
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
 #include <algorithm>
 #include <cmath>
 

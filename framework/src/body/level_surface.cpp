@@ -91,7 +91,8 @@ std::optional<Foot> LevelSurface::foot(const Point& place) const {
     J.topRightCorner<3, 1>() = g;
     J.bottomLeftCorner<1, 3>() = g.transpose();
     Eigen::Vector4d residual;
-    residual << f - x + lambda * g, unit * fine.at(f);
+    residual.head<3>() = f - x + lambda * g;
+    residual[3] = unit * fine.at(f);
     const Eigen::Vector4d step = J.partialPivLu().solve(residual);
     if (!step.allFinite()) return std::nullopt;
     // Steps of many spacings would leave the part of the surface that is near.

@@ -1,6 +1,6 @@
 #include "core/symmetric_matrix.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "core/eigen.hpp"
 
 namespace perikit {
 

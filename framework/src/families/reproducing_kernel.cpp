@@ -1,8 +1,8 @@
 #include "families/reproducing_kernel.hpp"
 
-#include <Eigen/QR>
 #include <array>
 
+#include "core/eigen.hpp"
 #include "core/symmetric_matrix.hpp"
 #include "families/shape_tensor.hpp"
 

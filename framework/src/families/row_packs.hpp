@@ -27,7 +27,7 @@ inline const double* numbers(const Row& row) noexcept { return reinterpret_cast<
 inline Row row_at(const Pack* packs, int first) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && !defined(PERIKIT_COUNT_OPERATIONS)
   const __m512d pack = reinterpret_cast<__m512d>(packs->v);
-  return reinterpret_cast<Row>(first == 0 ? _mm512_castpd512_pd256(pack) : _mm512_extractf64x4_pd(pack, 1));
+  return reinterpret_cast<Row>(first == 0 ? _mm512_maskz_extractf64x4_pd(0xf, pack, 0) : _mm512_maskz_extractf64x4_pd(0xf, pack, 1));
 #else
   Row r{};
   for (int c = 0; c < 4; ++c) r[c] = packs[(first + c) / pack_width].v[(first + c) % pack_width];
@@ -38,7 +38,7 @@ inline Row row_at(const Pack* packs, int first) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
 /// Four numbers from each place, aligned as rows are.
 inline Pack load_fours(const double* first, const double* second) noexcept {
-  return {reinterpret_cast<detail::Lanes>(_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(first)), _mm256_load_pd(second), 1))};
+  return {reinterpret_cast<detail::Lanes>(_mm512_maskz_insertf64x4(0xff, _mm512_castpd256_pd512(_mm256_load_pd(first)), _mm256_load_pd(second), 1))};
 }
 #endif
 

@@ -195,6 +195,8 @@ inline std::uint32_t lane_bits(PackMask m) noexcept {
 #endif
 }
 
+// Where an instruction for AVX-512 has a form with a mask, that one is taken with a full mask: it is the same instruction, and its intrinsic does not begin with
+// an undefined register, which g++ 12 takes for a value that was forgotten.
 inline Pack sqrt(Pack a) noexcept {
   detail::count(pack_width);
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -214,7 +216,7 @@ inline Pack sqrt(Pack a) noexcept {
 /// 1/a for normal a > 0 to about one unit in the last place; not a number for 0 and infinity where it comes from an estimate.
 inline Pack reciprocal(Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_rcp14_pd(reinterpret_cast<__m512d>(a.v)))};
+  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rcp14_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
   r = r + r * (Pack(1.0) - a * r);
   return r + r * (Pack(1.0) - a * r);
 #else
@@ -227,11 +229,11 @@ struct ReciprocalRootAndSum {
   Pack root, sum;
   ReciprocalRootAndSum(Pack a, Pack b) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-    root = {reinterpret_cast<detail::Lanes>(_mm512_rsqrt14_pd(reinterpret_cast<__m512d>(a.v)))};
+    root = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rsqrt14_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
     const Pack half = Pack(0.5) * a;
     root = root * (Pack(1.5) - half * root * root);
     const Pack guess = a * root + b;  // to 27 bits
-    sum = {reinterpret_cast<detail::Lanes>(_mm512_rcp14_pd(reinterpret_cast<__m512d>(guess.v)))};
+    sum = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rcp14_pd(0xff, reinterpret_cast<__m512d>(guess.v)))};
     sum = sum + sum * (Pack(1.0) - guess * sum);
     root = root + root * (Pack(0.5) - half * root * root);
     sum = sum + sum * (Pack(1.0) - (a * root + b) * sum);
