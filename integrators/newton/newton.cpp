@@ -17,6 +17,7 @@ bool FactorisedEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, 
   const SparseSolver& factors = tangent_.factors();
   if (equilibrium.problem().constant_stiffness() && factors.factorised()) return true;
   const bool first = factors.unknowns() == 0;
+  in_step_ = true;
   if (!tangent_.make(equilibrium, u, true, failure)) return false;
   if (first) {
     equilibrium.note(fmt::format("  tangent: {} unknowns, {:.3g} numbers, {:.3g} in its factors", factors.unknowns(),
@@ -46,11 +47,14 @@ bool FactorisedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, do
   return true;
 }
 
-bool FactorisedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool) {
-  // The last tangent is that of an iterate next to the equilibrium: where it is definite, so is that of the equilibrium.
+bool FactorisedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
+  if (equilibrium.problem().constant_stiffness()) return tangent_.indefinite();
+  // The last tangent of the step is that of an iterate next to the equilibrium: where it is definite, so is that of the equilibrium. A step whose start was
+  // in balance made none.
+  const bool made = std::exchange(in_step_, false);
   std::string failure;
-  if (!tangent_.indefinite()) return false;
-  return equilibrium.problem().constant_stiffness() || (tangent_.make(equilibrium, u, false, failure) && tangent_.indefinite());
+  if (made ? !tangent_.indefinite() : !last) return false;
+  return tangent_.make(equilibrium, u, false, failure) && tangent_.indefinite();
 }
 
 bool Newton::direct(Problem& problem) const {
@@ -59,7 +63,7 @@ bool Newton::direct(Problem& problem) const {
   if (problem.dimension() == 1) return true;
   // Measured (README.md): operations a second of CHOLMOD with its assembly, and what a linear solve with the companion takes, of which the number of
   // iterations grows with the root of the bulk modulus unless pressures are unknowns of their own.
-  constexpr double operations_a_second = 1.6e10, seconds_a_point_2d = 2e-5, seconds_a_point_3d = 9e-5;
+  constexpr double operations_a_second = 1.6e10, seconds_a_point_2d = 1e-5, seconds_a_point_3d = 2.5e-5;
   const double bulk = mixed_pays(problem) ? 1 : std::sqrt(std::max(1.0, largest_bulk_ratio(problem) / 4));
   const double krylov = bulk * static_cast<double>(problem.body().points()) * (problem.dimension() == 2 ? seconds_a_point_2d : seconds_a_point_3d);
   return predict_factor(problem, static_cast<double>(problem.assembled_size().blocks)).operations <= operations_a_second * krylov &&

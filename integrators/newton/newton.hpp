@@ -19,6 +19,7 @@ class FactorisedEquations final : public LinearisedProblem {
   AssembledTangent tangent_;
   ConstFieldView u_;  ///< where the equations are linearised
   bool warned_ = false;
+  bool in_step_ = false;  ///< a tangent was made in this load step
 };
 
 /// Newton's method [Hashim et al., eqs. 21-29] with the exact tangent, assembled and factorised where that is predicted to be cheaper, else by GMRES.

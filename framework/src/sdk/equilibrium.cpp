@@ -70,7 +70,9 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   mask(free_, r);
   norm_ = norm(r);
   reference_ = unit * std::sqrt(std::max(squares, 0.0));
-  reference_ = std::max(reference_, 4 * std::numeric_limits<double>::epsilon() * stiffness_ * norm(u) / tolerance_);
+  // What displacements are rounded to: their last digit, or where they have none the smallest number.
+  const double rounding = std::numeric_limits<double>::epsilon() * norm(u) + std::numeric_limits<double>::denorm_min() * std::sqrt(static_cast<double>(u.size()));
+  reference_ = std::max(reference_, 4 * stiffness_ * rounding / tolerance_);
   if (std::isfinite(norm_) && std::isfinite(reference_)) return true;
   failure_ = "the forces are not finite";
   return false;

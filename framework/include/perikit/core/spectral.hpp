@@ -90,8 +90,7 @@ Spectral<T, Solid> spectral(const Tensor<T, Solid>& a) noexcept {
   using V = detail::Vector<T>;
   T largest = T(0.0);
   for (int k = 0; k < 9; ++k) largest = max(largest, abs(a[k]));
-  // The reciprocal of a number without digits would be infinite.
-  const T scale = select(largest > T(1e-290), largest, T(1.0)), inverse_scale = T(1.0) / scale;
+  const T scale = max(largest, T(1e-307)), inverse_scale = T(1.0) / scale;   // finite for numbers without digits, too
   const Tensor<T, Solid> b = inverse_scale * a;
   const T mean = trace(b) * T(1.0 / 3.0);
   const Tensor<T, Solid> d = add_diagonal(b, -mean);
