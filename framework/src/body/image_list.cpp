@@ -46,6 +46,11 @@ ImageList::ImageList(int dimension, const Point& x, std::int64_t number, std::in
       first_(2, images.terms.size()),
       images_(images) {}
 
+void ImageList::hold(const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
+  for (int c = 0; c < dimension_; ++c)
+    if (const auto i = static_cast<std::size_t>(c); odd[i]) images_.held.push_back({source_, c, motion[i]});
+}
+
 void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
   const auto number = static_cast<std::int32_t>(images_.size());
   const bool real = n == 0;

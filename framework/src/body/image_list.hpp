@@ -25,8 +25,8 @@ class ImageList {
   const Point& point() const { return position_.front(); }
   std::int64_t number() const noexcept { return number_; }
 
-  /// The point lies on a mirror, whose motion is this component of it.
-  void hold(int component, int motion) { images_.held.push_back({source_, component, motion}); }
+  /// The point lies on a mirror, and its odd components are those of the mirror's motion.
+  void hold(const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
   /// The image of place n. odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
   void add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
 

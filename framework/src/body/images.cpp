@@ -24,9 +24,7 @@ void add_across(std::span<const ImagePlane> all, std::span<const std::size_t> ac
     if (surface < 0) return false;
     Point foot = list.position(n);
     foot[static_cast<std::size_t>(plane.axis)] = plane.at;
-    if (mirror && on_plane && n == 0)
-      for (int c = 0; c < 3; ++c)
-        if (plane.odd[static_cast<std::size_t>(c)]) list.hold(c, plane.motion[static_cast<std::size_t>(c)]);
+    if (mirror && on_plane && n == 0) list.hold(plane.odd, plane.motion);
     list.add(n, {mirror && on_plane ? list.position(n) : image_of(plane, list.position(n)), foot, 1.0, surface}, plane.odd, plane.motion);
     from.push_back(k);
     return true;

@@ -135,9 +135,7 @@ void TurningMirrors::add_images(ImageList& list) const {
         const auto reflected = mirrors_[k]->reflect(list, n);
         const bool on_mirror = reflected && reflected->depth == 0;
         if (!reflected || (on_mirror && n > 0 && (list.position(n) != list.point() || from[n] >= k)) || !deepest(k, reflected->place.at, reflected->depth)) continue;
-        if (on_mirror && n == 0)
-          for (int c = 0; c < 3; ++c)
-            if (mirrors_[k]->odd()[static_cast<std::size_t>(c)]) list.hold(c, mirrors_[k]->motion()[static_cast<std::size_t>(c)]);
+        if (on_mirror && n == 0) list.hold(mirrors_[k]->odd(), mirrors_[k]->motion());
         list.add(n, reflected->place, mirrors_[k]->odd(), mirrors_[k]->motion());
         from.push_back(k);
         more = true;
