@@ -102,7 +102,7 @@ class SurfaceBuilder {
     if (depth < least * frame_.spacing && !on_surface)
       refuse(depth < 0 ? fmt::format("found a surface in front of the point at {}", place(x))
                        : fmt::format("found a surface {:.2g} spacings from the point at {}", depth / frame_.spacing, place(x)),
-             fmt::format("an expression that is zero at the points that lie on the surface, and else {:.3g} or more in front of them",
+             fmt::format("an expression that is negative at all points, and zero on them or {:.3g} or more in front of them",
                          least * frame_.spacing));
     if (depth < halo(frame_.horizon) && !surface_.foot(x))
       refuse(fmt::format("found no place on the surface that is nearest to the point at {}", place(x)),
