@@ -178,14 +178,9 @@ double Verlet::safety(const Problem& problem) const {
   return options_.safety > 0 ? options_.safety : problem.bonds().empty() ? 0.9 : 0.5;
 }
 
-double Verlet::tolerated(const Problem& problem) const {
-  const double share = safety(problem);
-  return std::max(share, std::min(1.2 * share, 0.97));
-}
-
-double Verlet::step_of(const Problem& problem, double eigenvalue) const {
-  const double step = eigenvalue > 0 ? safety(problem) * 2 / std::sqrt(eigenvalue) : options_.end_time;
-  return options_.bond_based ? std::min(step, safety(problem) * bond_based_time_step(problem.body(), problem.laws())) : step;
+double Verlet::step_of(const Problem& problem, double share, double eigenvalue) const {
+  const double step = eigenvalue > 0 ? share * 2 / std::sqrt(eigenvalue) : options_.end_time;
+  return options_.bond_based ? std::min(step, share * bond_based_time_step(problem.body(), problem.laws())) : step;
 }
 
 double Verlet::eigenvalue_around_failed_bonds(Problem& problem, double most) const {
@@ -208,7 +203,7 @@ double Verlet::first_step(Problem& problem) {
   const ConstFieldView u = problem.state().displacement();
   if (planned_.problem != &problem || !std::equal(u.data, u.data + u.size(), planned_.displacement.begin(), planned_.displacement.end()))
     planned_ = {&problem, largest_eigenvalue(problem, u), {u.data, u.data + u.size()}};
-  return step_of(problem, planned_.eigenvalue);
+  return step_of(problem, safety(problem), planned_.eigenvalue);
 }
 
 std::string Verlet::plan(Problem& problem) {
@@ -246,9 +241,10 @@ void Verlet::run(Problem& problem, Observer& observer) {
     counter = steps_to_end(start, step);
     dt = (options_.end_time - start) / counter;
   };
-  // The largest eigenvalue of which the step is tolerated.
+  // The share of the stable step that was asked for, and the one at which the step is planned anew: the largest eigenvalue that it tolerates.
+  const double share = safety(problem), tolerated = std::max(share, std::min(1.2 * share, 0.97));
   const auto most = [&] {
-    const double root = 2 * tolerated(problem) / dt;
+    const double root = 2 * tolerated / dt;
     return root * root;
   };
   const bool watched = estimated && !problem.constant_stiffness();
@@ -323,7 +319,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
       if (failed > 0 || stretched || state.step % options_.check_every == 0) {
         const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
-        if (const double stable = step_of(problem, eigenvalue); stable < dt) {
+        if (const double stable = step_of(problem, share, eigenvalue); stable < dt) {
           make_plan(stable);
           observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
         }

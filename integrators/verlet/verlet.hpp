@@ -24,10 +24,8 @@ class Verlet final : public Integrator {
  private:
   /// 0.9; half of the stable step where bonds may fail: what a crack takes per area is then within a few per cent of small steps.
   double safety(const Problem& problem) const;
-  /// The share of the longest stable step at which a step that was planned with less is planned anew.
-  double tolerated(const Problem& problem) const;
-  /// The step to take where this is the largest eigenvalue.
-  double step_of(const Problem& problem, double eigenvalue) const;
+  /// The step to take where this is the largest eigenvalue: this share of the stable one.
+  double step_of(const Problem& problem, double share, double eigenvalue) const;
   /// The largest eigenvalue around the bonds that failed in the last step; 0 where it lies below `most`.
   double eigenvalue_around_failed_bonds(Problem& problem, double most) const;
   /// A warning where the bond-based estimate, asked for, is longer than the stable step of the beginning; else empty.

@@ -13,6 +13,7 @@ import sys
 import time
 import tomllib
 
+from coverage import features
 from generate import Generator
 from scene_text import scene_text
 from smaller import smaller
@@ -128,6 +129,9 @@ def main():
                 outcome += ": " + without_digits(trial.words.split(": ", 1)[-1])[:110]
             for kind, words in findings:
                 print("FAILED  seed %d: %s: %s" % (seed, kind, words), flush=True)
+            if not findings and not options.only:
+                with open(options.folder + "/covered.csv", "a") as file:
+                    file.write(";".join([str(seed)] + features(scene)) + "\n")
             if findings:
                 failed.append(seed)
                 kind, words = findings[0]
