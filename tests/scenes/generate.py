@@ -375,6 +375,8 @@ class Generator:
                 initial["displacement"] = [self.shape(0.2 * amplitude) for _ in range(d)]
             if dynamic and (self.maybe(0.8) or not (boundaries or loads or initial)):
                 initial["velocity"] = [self.shape(self.strain * self.speed * self.between(0.1, 0.6)) for _ in range(d)]
+            if dynamic and boundaries:
+                initial.pop("displacement", None)   # it would jump to what is prescribed
             scene["initial"] = initial
         if statics:
             for condition in boundaries + loads:

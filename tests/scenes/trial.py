@@ -40,7 +40,7 @@ def call(program, arguments):
         done = subprocess.run([program] + arguments, capture_output=True, text=True, errors="replace", timeout=SECONDS, env=environment)
     except subprocess.TimeoutExpired:
         return Done(-99, "still running after %d s" % SECONDS)
-    return Done(done.returncode, done.stderr.strip() or (done.stdout.strip() if done.returncode else ""))
+    return Done(done.returncode, done.stderr.strip() or done.stdout.strip())
 
 
 def write_scene(scene, folder):
