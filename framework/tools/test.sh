@@ -4,6 +4,6 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 framework/tools/setup.sh "$@"
-cmake --preset release -DPERIKIT_TESTS=ON
+cmake --preset release -DPERIKIT_TESTS=ON -DPERIKIT_NATIVE=OFF
 cmake --build --preset release
 exec ctest --preset release

@@ -1,5 +1,5 @@
 /// Energies, forces and tangents of the stencils in dense_reference.cpp.
-#include <Eigen/Dense>
+#include "framework/src/core/eigen.hpp"
 #include <cmath>
 
 #include "contract/dense_reference.hpp"

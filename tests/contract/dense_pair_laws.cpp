@@ -1,5 +1,5 @@
 /// Pair laws and zero-energy penalties of the dense reference: formulations that are not of the form sum_q W psi(F_q).
-#include <Eigen/Dense>
+#include "framework/src/core/eigen.hpp"
 #include <cmath>
 #include <numbers>
 #include <stdexcept>

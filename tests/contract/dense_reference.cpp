@@ -1,6 +1,6 @@
 #include "contract/dense_reference.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "framework/src/core/eigen.hpp"
 #include <algorithm>
 #include <cmath>
 #include <map>

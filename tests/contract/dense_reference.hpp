@@ -5,7 +5,7 @@
 /// Displacements and forces are vectors of length d * n, component c of point i at d * i + c. Tensors that reach a material are
 /// 3 x 3, zero outside the space of the body (plane strain, uniaxial strain).
 
-#include <Eigen/Core>
+#include "framework/src/core/eigen.hpp"
 #include <functional>
 #include <memory>
 #include <optional>
