@@ -310,7 +310,7 @@ std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& pro
     const auto k = static_cast<std::size_t>(piece_at[static_cast<std::size_t>(p)]);
     const LoosePiece& piece = pieces[k];
     const std::size_t n = piece.motions.size();
-    std::array<double, most_motions> row;
+    std::array<double, most_motions> row{};
     for (std::size_t j = 0; j < n; ++j) row[j] = value(piece, piece.motions[j]);
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = 0; j < n; ++j) squares[k][i * n + j] += row[i] * row[j];
