@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "framework/src/core/eigen.hpp"
 #include "tests/contract/fixture.hpp"
 
 namespace perikit::stability {

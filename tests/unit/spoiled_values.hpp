@@ -55,11 +55,11 @@ inline std::vector<SpoiledValue> spoiled(const Parameter& p) {
   const std::string bad_expression = "\"1 + wrong_name\"";
   switch (p.type) {
     case Type::number:
-      each({"\"1\"", "true", "[1]", "{ a = 1 }", "2001-01-01"});
+      each({"\"one\"", "true", "[1]", "{ a = 1 }", "2001-01-01"});
       each(out_of_range(p));
       break;
     case Type::integer:
-      each({"1.0", "\"1\"", "false", "[1]"});
+      each({"1.0", "\"one\"", "false", "[1]"});
       each(out_of_range(p));
       break;
     case Type::boolean:

@@ -3,10 +3,10 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <chrono>
 #include <cmath>
 
+#include "framework/src/core/eigen.hpp"
 #include "tests/validation/quasi_static.hpp"
 
 using namespace perikit;

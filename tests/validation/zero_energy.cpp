@@ -4,11 +4,11 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "framework/src/core/eigen.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
