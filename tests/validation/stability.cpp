@@ -58,10 +58,12 @@ TEST_CASE("stability: needles among the parts of a cloud do not set the stable s
 }
 
 TEST_CASE("stability: penalties over families that are almost flat do not turn negative") {
-  for (const Setting& s : all_settings(registry())) {
+  for (Setting s : all_settings(registry())) {
     if (s.kinematics.find("stabilization") == std::string::npos || s.influence != "cubic_spline" || s.horizon_ratio != 1.015 ||
         s.dimension != 2)
       continue;
+    // Of clouds a horizon of one spacing would leave pieces of two points, which are refused.
+    if (s.jitter > 0) s.horizon_ratio = 1.3;
     INFO(s.label, " jitter ", s.jitter);
     CHECK(Specimen(registry(), s).spectrum().lowest >= -1e-13);
   }
