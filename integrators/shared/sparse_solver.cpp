@@ -21,6 +21,8 @@
 #include "perikit/core/errors.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+extern "C" void* blas_memory_alloc(int) __attribute__((weak));
+extern "C" void blas_memory_free(void*) __attribute__((weak));
 
 namespace perikit {
 
@@ -33,7 +35,7 @@ SuiteSparse_long* as_long(std::vector<FreeMatrix::Index>& v) {
 }
 
 /// Memory that OpenBLAS takes with its first product. Where it gets none it asks again, and for ever.
-constexpr double dense_memory = 128.1 * (1 << 20);
+constexpr double dense_memory = 130.0 * (1 << 20);
 
 /// What a limit of the address space leaves [bytes]; infinite without one.
 double address_space_left() {
@@ -56,6 +58,17 @@ class OneThread {
  private:
   int levels_ = omp_get_max_active_levels();
 };
+
+/// OpenBLAS takes its memory with the first product, keeps it for the next ones, and tries for ever where there is none. So it takes it here, while what is
+/// left is known: threads and factors take of it, too.
+void take_dense_memory() {
+  static bool held = false;
+  if (held) return;
+  if (const double left = address_space_left(); left < dense_memory)
+    throw RunError(fmt::format("not enough memory: dense products take {:.3g} MB, and the limit of this process leaves {:.3g} MB", dense_memory / 1e6, left / 1e6));
+  if (blas_memory_alloc && blas_memory_free) blas_memory_free(blas_memory_alloc(0));
+  held = true;
+}
 
 /// A view of compressed columns for CHOLMOD, upper triangle; pattern only where value is null.
 cholmod_sparse view(std::size_t n, FreeMatrix::Index* first, FreeMatrix::Index* row, double* value) {
@@ -110,9 +123,7 @@ struct SparseSolver::Implementation {
   explicit Implementation(double memory) : limit(memory) {
     if (openblas_set_num_threads) {
       openblas_set_num_threads(1);
-      static bool held = false;   // once it has the memory it keeps it
-      if (const double left = address_space_left(); !std::exchange(held, true) && left < dense_memory)
-        throw RunError(fmt::format("not enough memory: dense products take {:.3g} MB, and the limit of this process leaves {:.3g} MB", dense_memory / 1e6, left / 1e6));
+      take_dense_memory();
     }
     cholmod_l_start(&common);
     common.print = 0;

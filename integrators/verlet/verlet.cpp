@@ -183,6 +183,16 @@ double Verlet::step_of(const Problem& problem, double share, double eigenvalue) 
   return options_.bond_based ? std::min(step, share * bond_based_time_step(problem.body(), problem.laws())) : step;
 }
 
+/// A step after the first one: `step`, unless its share of the stable step of the softest state lies in the band of resonance, which it is then shortened to leave.
+/// Verlet gives the fastest motion of the body a period of three steps where the step is sqrt(3)/2 = 0.866 of the stable one. There each nonlinearity of the
+/// forces feeds that motion (resonance of the third order), until a corner of the body turns inside out.
+double Verlet::beside_resonance(double step, double softest) const {
+  constexpr double least = 0.855, largest = 0.885;   // measured (README.md)
+  if (!(softest > 0)) return step;
+  const double stable = 2 / std::sqrt(softest), share = step / stable;
+  return share > least && share < largest ? least * stable : step;
+}
+
 double Verlet::eigenvalue_around_failed_bonds(Problem& problem, double most) const {
   const std::unique_ptr<DamagedPart> part = problem.damaged_part();
   if (!part) return 0;
@@ -227,12 +237,13 @@ std::string Verlet::bond_based_doubt(const Problem& problem) const {
 void Verlet::run(Problem& problem, Observer& observer) {
   State& state = problem.state();
   // Equal steps that hit the end exactly; times are computed from step numbers, so that no rounding accumulates.
-  const std::span<double> plan = state.declare_numbers("verlet_plan", 5);
+  const std::span<double> plan = state.declare_numbers("verlet_plan", 6);
   double& first = plan[0];     // step at which the plan was made
   double& start = plan[1];     // and its time
   double& dt = plan[2];
   double& last_dt = plan[3];
   double& counter = plan[4];   // steps of the plan
+  double& softest = plan[5];   // the least eigenvalue of the body so far
   StretchWatch watch(state.declare_numbers("verlet_stretches", StretchWatch::numbers));
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
@@ -252,6 +263,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
   if (fresh) {
     check_time_step(problem, options_.values, &observer);
     make_plan(first_step(problem));   // before the fields of the steps are there: it has its own
+    softest = planned_.eigenvalue;
     if (watched) watch.estimated(problem.stretches(state.displacement()), 0, planned_.eigenvalue, most());
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
     if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
@@ -319,8 +331,9 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
       if (failed > 0 || stretched || state.step % options_.check_every == 0) {
         const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
+        softest = std::min(softest, eigenvalue);
         if (const double stable = step_of(problem, share, eigenvalue); stable < dt) {
-          make_plan(stable);
+          make_plan(beside_resonance(stable, softest));
           observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
         }
         watch.estimated(problem.stretches(state.displacement()), state.step, eigenvalue, most());

@@ -26,6 +26,7 @@ class Verlet final : public Integrator {
   double safety(const Problem& problem) const;
   /// The step to take where this is the largest eigenvalue: this share of the stable one.
   double step_of(const Problem& problem, double share, double eigenvalue) const;
+  double beside_resonance(double step, double softest) const;
   /// The largest eigenvalue around the bonds that failed in the last step; 0 where it lies below `most`.
   double eigenvalue_around_failed_bonds(Problem& problem, double most) const;
   /// A warning where the bond-based estimate, asked for, is longer than the stable step of the beginning; else empty.
