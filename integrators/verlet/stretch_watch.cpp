@@ -10,7 +10,7 @@ namespace {
 constexpr double shortest = 4, longest = 32;   // steps from look to look
 /// Eigenvalues rise at most about as the fourth power of a stretch (tension of a Saint Venant-Kirchhoff solid: the third; compression of laws
 /// with a logarithm of J: the third). Half of what may be left then serves what happens between two looks.
-constexpr double least_power = 2, largest_power = 8;
+constexpr double least_power = 1, largest_power = 8;
 /// An estimate after less tells nothing.
 constexpr double least_margin = 0.01;
 

@@ -332,8 +332,8 @@ void Verlet::run(Problem& problem, Observer& observer) {
       if (failed > 0 || stretched || state.step % options_.check_every == 0) {
         const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
         softest = std::min(softest, eigenvalue);
-        if (const double stable = step_of(problem, share, eigenvalue); stable < dt) {
-          make_plan(beside_resonance(stable, softest));
+        if (eigenvalue > most()) {
+          make_plan(beside_resonance(std::min(dt, step_of(problem, share, eigenvalue)), softest));
           observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
         }
         watch.estimated(problem.stretches(state.displacement()), state.step, eigenvalue, most());
