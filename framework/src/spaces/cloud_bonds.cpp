@@ -43,6 +43,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
 
 template <int D>
 void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
+  last_ = Last::other;
   for (const std::int32_t point : points) {
     const auto p = static_cast<std::size_t>(point);
     gradient_of_.renew(p);
@@ -294,9 +295,11 @@ void CloudBonds<D>::pressures(std::size_t b, const Pass& pass) noexcept {
 template <int D>
 void CloudBonds<D>::gradients(std::size_t b, Pass& pass) {
   over_points(b, [&](std::size_t p) {
-    // Of other points, too: what was left of them depends on what was evaluated before.
-    std::fill_n(&flux_[D * p], D, Row{});
-    if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
+    if (!pass.alone()) {
+      // Of other points, too: what was left of them depends on what was evaluated before.
+      std::fill_n(&flux_[D * p], D, Row{});
+      if (gradient_of_.shifted()) std::fill_n(&stress_[D * p], D, Row{});
+    }
     if (!pass.gradient_wanted(static_cast<std::int64_t>(p))) return;
     gradient_of_.at(p, u_, &gradient_[D * p]);
     if (pass.work.tangent()) gradient_of_.at(p, w_, &direction_[D * p]);
@@ -319,6 +322,7 @@ template <int D>
 void CloudBonds<D>::run(Pass& pass) {
   scratch_.prepare(laws_, pass.work.laminates());
   constexpr int last = 3;
+  last_ = pass.work.work() != Work::force || pass.work.balance() ? Last::other : pass.only ? Last::some_forces : Last::all_forces;
   const bool tangent = pass.work.tangent();
   ArrivingRows arrival(pieces_, pass.u, u_, pass.arrival, scale_.data());
   if (tangent) {

@@ -22,6 +22,13 @@ class CloudBonds final : public EvaluationSpace {
   void set_factors(std::span<const double> factors) override;
   void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;
+  PointFlux point_flux() const noexcept override {
+    if (last_ == Last::other || gradient_of_.stored() || gradient_of_.shifted()) return {};
+    const auto matrices = [](const AlignedVector<Row>& rows) {
+      return PointMatrices{reinterpret_cast<const double*>(rows.data()), D * sizeof(Row) / sizeof(double), 1, sizeof(Row) / sizeof(double)};
+    };
+    return {matrices(gradient_), matrices(flux_), last_ == Last::all_forces};
+  }
 
  private:
   void gradients(std::size_t b, Pass& pass);
@@ -72,6 +79,7 @@ class CloudBonds final : public EvaluationSpace {
   AlignedVector<Row> gradient_, direction_;  ///< Hbar of u and w, D rows a point
   AlignedVector<Row> stress_;                ///< on shifted gradients
   AlignedVector<Row> flux_;                  ///< the stress on Hbar, then Q; likewise
+  enum class Last { all_forces, some_forces, other } last_ = Last::other;  ///< run
   AlignedVector<Row> force_;                 ///< scattered bond forces
   AlignedVector<Row> volume_, pressure_;     ///< selective: volume changes of points; pressures on them and their rates
   ScratchPool scratch_;

@@ -22,7 +22,10 @@ class LatticeBonds final : public EvaluationSpace {
   void run(Pass& pass) override;
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
   void bonds_changed(std::span<const std::int32_t> points) override;
-  PointFlux point_flux() const noexcept override { return last_ == Last::other || stencils_ ? PointFlux() : PointFlux{gradient_, flux_, last_ == Last::all_forces}; }
+  PointFlux point_flux() const noexcept override {
+    if (last_ == Last::other || stencils_) return {};
+    return {PointMatrices::of(gradient_, D), PointMatrices::of(flux_, D), last_ == Last::all_forces};
+  }
   bool samples_along() const noexcept override { return pairs_ && !selective_ && laws_.single() && roles_.chunk.empty(); }
   void report(ModelReport& report) const override;
 

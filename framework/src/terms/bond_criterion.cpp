@@ -174,7 +174,10 @@ void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView 
 }
 
 void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldView u) {
-  if (!release_ || !release_->follows_from_flux()) return;
+  if (!release_ || !release_->follows_from_flux() || groups.empty()) return;
+  if (known_at(u)) flux_ = terms_.front()->point_flux();
+  if (flux_.everywhere) return;
+  flux_ = {};
   GroupMarks marks(own_.size(), 0);
   for (const std::int32_t g : groups) marks[static_cast<std::size_t>(g)] = 1;
   // The points of their families, and whatever has a bond with those.
@@ -293,8 +296,7 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   if (release_) mark_by_forces(u);
   looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), 0xff);
   const std::vector<std::int32_t> near = marked(looked_at_);
-  if (release_ && release_->follows_from_flux() && known_at(u)) flux_ = terms_.front()->point_flux();
-  if (!flux_.everywhere) flux_ = {};
+  find_flux(near, u);
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<Found>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
@@ -349,6 +351,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
 std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
   std::vector<BondEnergy> all;
   looked_at_.assign(own_.size(), 0xff);
+  find_flux(groups_, u);
   by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<BondEnergy>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
@@ -362,6 +365,7 @@ std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
     });
     for (const auto& of_group : found) all.insert(all.end(), of_group.begin(), of_group.end());
   });
+  flux_ = {};
   std::sort(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond < b.bond; });
   all.erase(std::unique(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond == b.bond; }),
             all.end());

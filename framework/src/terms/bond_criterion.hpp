@@ -65,7 +65,8 @@ class BondCriterion final : public BondFinder {
   template <class Visit>
   void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
   void sample(std::span<const std::int32_t> groups, ConstFieldView u);
-  /// Evaluates forces about these groups for the flux that they leave, where that is all that a look at bonds takes.
+  /// Where the flux that forces leave is all that a look at the bonds of these groups takes: that of the last forces if they were at u, else of forces
+  /// about the groups. So what a bond sets free has the same bits whatever was evaluated before.
   void find_flux(std::span<const std::int32_t> groups, ConstFieldView u);
   void collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept);
   /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "families/cloud_families.hpp"
 #include "families/lattice_families.hpp"
 #include "families/reproducing_kernel.hpp"
 #include "families/shape_tensor.hpp"
@@ -90,7 +91,8 @@ struct BondRelease::Memory {
 
 BondRelease::BondRelease(const ReleaseParts& parts)
     : parts_(parts),
-      mirrored_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws) && parts.factors.empty()) {}
+      one_state_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws)),
+      mirrored_(one_state_ && parts.factors.empty()) {}
 BondRelease::~BondRelease() = default;
 
 const char* BondRelease::unknown(const Formulation& f, int dimension, bool stabilized) {
@@ -115,32 +117,38 @@ double BondRelease::of(std::int32_t p, std::int32_t far) const noexcept {
 
 bool BondRelease::follows_from_flux() const noexcept {
   const Formulation& f = parts_.formulation;
-  return mirrored_ && f.bond && f.g_from_xi_only && !f.weighted && f.order == 1 && !parts_.stabilization && !parts_.shift.data && parts_.families.lattice();
+  return one_state_ && f.bond && f.g_from_xi_only && !f.weighted && f.order == 1 && !parts_.stabilization && !parts_.shift.data;
 }
 
-/// dE/dH : (z (x) g)/b with g = b omega V K^-1 xi is omega z . Q d, Q the flux and d the bond in cells; the far end sees -z and -d.
+/// dE/dH : (z (x) g)/b with g = b omega V K^-1 xi is omega z . Q d on a lattice, Q the flux and d the bond in cells, and omega V z . Q xi on a cloud; the far
+/// end sees -z and -d.
 void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const std::size_t> bonds, ConstFieldView u, const PointFlux& flux,
                      const BondSamples& samples, double* released) const noexcept {
-  const LatticeFamilies& lattice = *parts_.families.lattice();
+  const LatticeFamilies* const lattice = parts_.families.lattice();
   const int dimension = family.dimension;
   const auto normaliser = [&](std::int32_t of) { return parts_.families.normaliser(static_cast<std::size_t>(of), parts_.formulation.weight); };
+  const auto factor = [&](std::int32_t owner, std::int32_t far) {
+    return parts_.factors.empty() ? 1.0 : parts_.factors[static_cast<std::size_t>(parts_.families.cloud()->index(owner, far))];
+  };
   const double own = normaliser(p);
   for (const std::size_t k : bonds) {
     const std::int32_t far = family.far[k];
     double sum = 0;
-    for (int c = 0; c < dimension; ++c) {
-      const double relative = u.component(c)[far] - u.component(c)[p];
-      for (const std::int32_t end : {p, far}) {
-        double z = relative, t = 0;
+    for (const std::int32_t end : {p, far}) {
+      double of_end = 0;
+      for (int c = 0; c < dimension; ++c) {
+        double z = u.component(c)[far] - u.component(c)[p], t = 0;
         for (int e = 0; e < dimension; ++e) {
-          z -= flux.gradient.component(c * dimension + e)[end] * family.xi[e][k];
-          t += flux.flux.component(c * dimension + e)[end] * family.xi[lattice.grid.axis[static_cast<std::size_t>(e)]][k];
+          z -= flux.gradient(end, c, e) * family.xi[e][k];
+          t += flux.flux(end, c, e) * family.xi[lattice ? lattice->grid.axis[static_cast<std::size_t>(e)] : e][k];
         }
-        sum += z * t;
+        of_end += z * t;
       }
+      sum += lattice ? of_end / lattice->spacing : of_end * parts_.families.body().volume(static_cast<std::size_t>(end == p ? far : p));
     }
-    sum *= family.whole_omega(k) / lattice.spacing;
-    if (const BondSamples::Entry* const entry = samples.find(p, far)) sum += entry->energy / family.b(k) * (1 + own / normaliser(far));
+    sum *= family.whole_omega(k);
+    if (const BondSamples::Entry* const entry = samples.find(p, far))
+      sum += entry->energy / family.b(k) * (1 + own * factor(far, p) / (normaliser(far) * factor(p, far)));
     *released++ = sum;
   }
 }

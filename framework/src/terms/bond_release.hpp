@@ -46,7 +46,7 @@ class BondRelease {
   /// dE/db_ij by what belongs to p and its evaluation points [J], of an intact bond; the rest is that of the far end.
   double of(std::int32_t p, std::int32_t far) const noexcept;
 
-  /// Whether dE/db_ij follows from the flux at both ends and the energy of the bond alone: on lattices, of one gradient for both directions
+  /// Whether dE/db_ij follows from the flux at both ends and the energy of the bond alone: of one gradient for both directions
   /// of a bond that needs no more than the gradients of its ends.
   bool follows_from_flux() const noexcept;
   /// Then: of these bonds of p, whole, into `released`. samples: energies of the bonds of p. flux: of forces at u.
@@ -99,7 +99,8 @@ class BondRelease {
   const Owner& owner_of(std::int32_t p) const noexcept { return owners_[static_cast<std::size_t>(place_[static_cast<std::size_t>(p)])]; }
 
   ReleaseParts parts_;
-  bool mirrored_;  ///< both directions of a bond have the same gradient, law and stress, and weights as their normalisers say
+  bool one_state_;  ///< both directions of a bond have the same gradient, law and stress
+  bool mirrored_;   ///< and weights as their normalisers say
   std::vector<Owner> owners_;
   std::size_t count_ = 0;            ///< of them in use
   std::vector<std::int32_t> place_;  ///< by point: its owner, or -1
