@@ -3,6 +3,7 @@
 #include <span>
 
 #include "perikit/problem/problem.hpp"
+#include "perikit/sdk/eigenvalue.hpp"
 
 namespace perikit {
 
@@ -16,7 +17,7 @@ class StretchWatch {
       : least_(kept[0]), largest_(kept[1]), eigenvalue_(kept[2]), power_(kept[3]), margin_(kept[4]), before_(kept[5]), last_(kept[6]), next_(kept[7]) {}
 
   /// The largest eigenvalue, and the one that is tolerated.
-  void estimated(StretchRange range, std::int64_t step, double eigenvalue, double tolerated);
+  void estimated(StretchRange range, std::int64_t step, EigenvalueBounds eigenvalue, double tolerated);
   bool due(std::int64_t step) const noexcept { return static_cast<double>(step) >= next_; }
   /// Whether an estimate is needed.
   bool look(StretchRange range, std::int64_t step);
@@ -26,7 +27,7 @@ class StretchWatch {
   double change(StretchRange range) const;
 
   double &least_, &largest_;   ///< stretches at the last estimate
-  double& eigenvalue_;         ///< what it found
+  double& eigenvalue_;         ///< what it found; 0: a bound alone
   double& power_;              ///< of the stretch, with which eigenvalues are expected to rise; 0: nothing is known
   double& margin_;             ///< of the change
   double& before_;             ///< change at the last look

@@ -264,7 +264,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     check_time_step(problem, options_.values, &observer);
     make_plan(first_step(problem));   // before the fields of the steps are there: it has its own
     softest = planned_.eigenvalue;
-    if (watched) watch.estimated(problem.stretches(state.displacement()), 0, planned_.eigenvalue, most());
+    if (watched) watch.estimated(problem.stretches(state.displacement()), 0, {planned_.eigenvalue, planned_.eigenvalue}, most());
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
     if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
     planned_ = {};
@@ -330,13 +330,16 @@ void Verlet::run(Problem& problem, Observer& observer) {
       const double failed = fewer ? eigenvalue_around_failed_bonds(problem, most()) : 0;
       const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
       if (failed > 0 || stretched || state.step % options_.check_every == 0) {
-        const double eigenvalue = std::max(failed, largest_eigenvalue(problem, state.displacement()));
+        // That after a stretch tells how eigenvalues rise with stretches, too.
+        EigenvalueBounds found = eigenvalue_bounds(problem, state.displacement(), stretched ? 0 : most());
+        found.bound = std::max(found.bound, failed);
+        const double eigenvalue = found.bound;
         softest = std::min(softest, eigenvalue);
         if (eigenvalue > most()) {
           make_plan(beside_resonance(std::min(dt, step_of(problem, share, eigenvalue)), softest));
           observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
         }
-        watch.estimated(problem.stretches(state.displacement()), state.step, eigenvalue, most());
+        watch.estimated(problem.stretches(state.displacement()), state.step, found, most());
       }
     }
     observer.step_done(report());

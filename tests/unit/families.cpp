@@ -148,7 +148,7 @@ TEST_CASE("families: points with little support are fragments; pair laws have no
   }
 }
 
-TEST_CASE("families: marked are the groups of points and of what they reach, and no others, whatever the reach along a row") {
+TEST_CASE("families: marked are points and what they reach, on lattices their groups, and no others, whatever the reach along a row") {
   for (const double horizon : {1.01, 2.3, 5.1, 11.6, 37.2}) {
     BodyFrame frame;
     frame.space = Space::plane_strain;
@@ -159,20 +159,26 @@ TEST_CASE("families: marked are the groups of points and of what they reach, and
     for (std::int64_t k1 = 0; k1 < grid.extent[1]; ++k1)
       for (std::int64_t k0 = 0; k0 < grid.extent[0]; ++k0)
         if ((7 * k0 + 3 * k1) % 11 != 0) cells.push_back(static_cast<std::int32_t>(grid.index(k0, k1, 0)));  // with holes
-    const Body body(frame, grid, cells);
-    const auto families = Families::make(body, std::make_shared<Cone>(), {});
-    for (std::size_t first = 0; first < 40; ++first) {
-      INFO("horizon ", horizon, ", from point ", first);
-      std::vector<std::int32_t> points;
-      for (std::size_t n = first; n < body.points(); n += 1 + 29 * first) points.push_back(body.internal()[n]);
-      GroupMarks marks(body.stride() / padding, 0), expected = marks;
-      families->mark(points, marks);
-      for (const std::int32_t p : points)
-        for (const std::int32_t q : body.internal()) {
-          const Point a = body.position(static_cast<std::size_t>(p)), b = body.position(static_cast<std::size_t>(q));
-          if (std::hypot(a[0] - b[0], a[1] - b[1]) <= horizon) expected[static_cast<std::size_t>(q) / padding] = 1;
-        }
-      CHECK(marks == expected);
+    const Body lattice(frame, grid, cells);
+    std::vector<Point> positions;
+    for (const std::int32_t p : lattice.internal()) positions.push_back(lattice.position(static_cast<std::size_t>(p)));
+    const Body cloud(frame, positions, std::vector<double>(positions.size(), 1.0));
+    for (const Body* const body : {&lattice, &cloud}) {
+      const auto families = Families::make(*body, std::make_shared<Cone>(), {});
+      for (std::size_t first = 0; first < 40; ++first) {
+        INFO(body == &cloud ? "cloud" : "lattice", ", horizon ", horizon, ", from point ", first);
+        std::vector<std::int32_t> points;
+        for (std::size_t n = first; n < body->points(); n += 1 + 29 * first) points.push_back(body->internal()[n]);
+        GroupMarks marks(body->stride() / padding, 0), expected = marks;
+        families->mark(points, marks);
+        for (const std::int32_t p : points)
+          for (const std::int32_t q : body->internal()) {
+            const Point a = body->position(static_cast<std::size_t>(p)), b = body->position(static_cast<std::size_t>(q));
+            if (std::hypot(a[0] - b[0], a[1] - b[1]) <= horizon) mark(expected, static_cast<std::size_t>(q));
+          }
+        CHECK(marks == families->evaluated(expected));
+        CHECK((body == &lattice || marks == expected));   // of a cloud the points, not their groups
+      }
     }
   }
 }

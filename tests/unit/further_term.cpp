@@ -62,7 +62,7 @@ class Foundation final : public Term {
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum* energy) override {
     return add_forces(u, force, energy);
   }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum& energy) override {
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks&, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum& energy) override {
     return add_forces(u, force, &energy);
   }
   std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks&, const GroupMarks&, FieldView Kw) override {

@@ -8,14 +8,12 @@
 #include <memory>
 #include <vector>
 
+#include "core/group_marks.hpp"
 #include "core/loop_order.hpp"
 
 namespace perikit {
 
 class Body;
-
-/// One byte by group of eight points (internal index / 8): where something has to be evaluated.
-using GroupMarks = std::vector<std::uint8_t>;
 
 /// Units are any fixed grouping of points in which every block is one.
 struct BlockReach {

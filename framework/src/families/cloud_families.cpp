@@ -265,8 +265,8 @@ void CloudFamilies::each_class(const std::function<void(std::span<const std::int
 
 void CloudFamilies::mark(std::span<const std::int32_t> points, GroupMarks& marks) const {
   for (const std::int32_t point : points) {
-    marks[static_cast<std::size_t>(point) / padding] = 1;
-    for (const std::int32_t j : neighbours(static_cast<std::size_t>(point))) marks[static_cast<std::size_t>(j) / padding] = 1;
+    perikit::mark(marks, static_cast<std::size_t>(point));
+    for (const std::int32_t j : neighbours(static_cast<std::size_t>(point))) perikit::mark(marks, static_cast<std::size_t>(j));
   }
 }
 

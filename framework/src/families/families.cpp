@@ -36,17 +36,22 @@ void Families::let_fail() {
   make_room();
 }
 
-GroupMarks Families::groups_of(std::span<const std::int32_t> points) const {
-  GroupMarks marks(body_.stride() / padding, 0);
-  for (const std::int32_t p : points) marks[static_cast<std::size_t>(p) / padding] = 1;
+GroupMarks Families::evaluated(GroupMarks marks) const {
+  if (lattice()) mark_whole_runs(1, marks);
   return marks;
+}
+
+GroupMarks Families::marks_of(std::span<const std::int32_t> points) const {
+  GroupMarks marks(body_.stride() / padding, 0);
+  for (const std::int32_t p : points) perikit::mark(marks, static_cast<std::size_t>(p));
+  return evaluated(std::move(marks));
 }
 
 GroupMarks Families::around(const GroupMarks& marks) const {
   std::vector<std::int32_t> points;
   for (std::size_t group = 0; group < marks.size(); ++group)
     for (std::size_t p = group * padding; marks[group] && p < (group + 1) * padding; ++p)
-      if (body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
+      if (marked(marks, p) && body_.alive(p)) points.push_back(static_cast<std::int32_t>(p));
   GroupMarks reached(marks.size(), 0);
   mark(points, reached);
   return reached;

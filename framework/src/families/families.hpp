@@ -75,11 +75,13 @@ class Families {
   bool fails() const noexcept { return fails_; }
   /// Bonds may fail from now on: makes room for what that takes.
   void let_fail();
-  /// Marks the groups of the points and of everything in their families, whole or not.
+  /// Marks the points and everything in their families, whole or not; on lattices the groups of these.
   virtual void mark(std::span<const std::int32_t> points, GroupMarks& marks) const = 0;
-  /// The groups of these points alone.
-  GroupMarks groups_of(std::span<const std::int32_t> points) const;
-  /// The marked groups and those of everything in the families of their points.
+  /// What a loop over evaluation points takes for these marks: on lattices whole groups.
+  GroupMarks evaluated(GroupMarks marks) const;
+  /// These points alone, as loops take them.
+  GroupMarks marks_of(std::span<const std::int32_t> points) const;
+  /// The marked points and everything in their families.
   GroupMarks around(const GroupMarks& marks) const;
   /// known: what a loop over forces leaves behind; null: nothing. skip: see BondMonitor.
   virtual std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip, const NearestFailure* known) const = 0;

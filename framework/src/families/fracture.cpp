@@ -242,7 +242,7 @@ void Fracture::finish(BondUpdate& update) {
 
 /// Groups whose evaluation points depend on the bonds of these points; on all ranks the same.
 GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, const Body& body) const {
-  GroupMarks marks = families_.groups_of(ends);
+  GroupMarks marks = families_.marks_of(ends);
   if (!body.owners_alone) families_.mark(ends, marks);
   shared_.mark(marks);
   return marks;

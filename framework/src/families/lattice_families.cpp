@@ -298,9 +298,9 @@ void LatticeFamilies::mark(std::span<const std::int32_t> points, GroupMarks& mar
   for (const std::int64_t group : groups) {
     const unsigned own = lanes[static_cast<std::size_t>(group)];
     const int lowest = std::countr_zero(own), highest = static_cast<int>(std::bit_width(own)) - 1;
-    marks[static_cast<std::size_t>(group)] = 1;
+    marks[static_cast<std::size_t>(group)] = whole_group;
     const auto mark_if = [&](std::int64_t far, unsigned reached) {
-      if (far >= 0 && far < std::ssize(marks) && (reached & alive[static_cast<std::size_t>(far)])) marks[static_cast<std::size_t>(far)] = 1;
+      if (far >= 0 && far < std::ssize(marks) && (reached & alive[static_cast<std::size_t>(far)])) marks[static_cast<std::size_t>(far)] = whole_group;
     };
     // Of the points of a group its highest one reaches farthest in the groups after it, and its lowest one in those before it.
     const auto mark_row = [&](std::int64_t shift, int reach) {

@@ -166,7 +166,7 @@ bool LatticeTiles::moves(std::size_t b, ConstFieldView u) const noexcept {
 void LatticeTiles::complete(GroupMarks& marks) const {
   for (std::size_t b = 0; b < blocks.size(); ++b)
     for (std::size_t c = blocks[b].chunk_begin; c < blocks[b].chunk_end && marked(b, marks.data()); ++c)
-      marks[static_cast<std::size_t>(chunks[c].first / chunk_points)] = 1;
+      marks[static_cast<std::size_t>(chunks[c].first / chunk_points)] = whole_group;
 }
 
 void LatticeTiles::clear(std::size_t b, FieldView out) const noexcept {

@@ -26,9 +26,10 @@ void SharedBonds::mark(GroupMarks& marks) const {
   if (!part()) return;
   std::vector<std::int64_t> mine;
   for (const std::int32_t p : body_.internal())
-    if (marks[static_cast<std::size_t>(p) / padding]) mine.push_back(place(p));
-  for (const std::int64_t marked : told_to_all(gathered<std::int64_t>(mine)))
-    if (const std::int32_t p = body_.at_place(marked); p >= 0) marks[static_cast<std::size_t>(p) / padding] = 1;
+    if (marked(marks, static_cast<std::size_t>(p))) mine.push_back(place(p));
+  for (const std::int64_t there : told_to_all(gathered<std::int64_t>(mine)))
+    if (const std::int32_t p = body_.at_place(there); p >= 0) perikit::mark(marks, static_cast<std::size_t>(p));
+  if (body_.lattice()) mark_whole_runs(1, marks);
 }
 
 std::vector<std::uint8_t> SharedBonds::points_beside(std::span<const std::int32_t> points) const {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <vector>
 
+#include "core/group_marks.hpp"
 #include "maps/selective_map.hpp"
 #include "operators/bond_screen.hpp"
 #include "operators/laminates.hpp"
@@ -242,9 +243,8 @@ struct Pass {
   GroupEnergy* energies = nullptr;
   std::int64_t bad = -1;          ///< internal index
   std::mutex guard;
-  /// By group of eight points: only the evaluation points that these own are wanted; point gradients are needed at
-  /// `near`. Forces are then those of a whole pass on points whose families' families lie
-  /// in `only`, bit for bit; anything elsewhere.
+  /// GroupMarks: only the evaluation points that these points own are wanted; point gradients are needed at `near`. Forces are then those of a whole pass on
+  /// points whose families' families lie in `only`, bit for bit; anything elsewhere.
   const std::uint8_t* only = nullptr;
   const std::uint8_t* near = nullptr;
   BondSamples* bonds = nullptr;  ///< with Work::sample: where evaluation points go instead of `sums`
@@ -258,8 +258,10 @@ struct Pass {
   bool alone() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.
   bool everywhere() const noexcept { return only || alone() || work.samples() || work.tangent() || work.balance(); }
-  bool wanted(std::int64_t point) const noexcept { return !only || only[static_cast<std::size_t>(point) / padding]; }
-  bool gradient_wanted(std::int64_t point) const noexcept { return !near || near[static_cast<std::size_t>(point) / padding]; }
+  bool wanted(std::int64_t point) const noexcept { return !only || marked(only, static_cast<std::size_t>(point)); }
+  bool gradient_wanted(std::int64_t point) const noexcept { return !near || marked(near, static_cast<std::size_t>(point)); }
+  /// Of any of the eight points from here on.
+  bool gradients_wanted(std::size_t first) const noexcept { return !near || near[first / padding]; }
 
   void report(std::int64_t point) {
     const std::lock_guard lock(guard);

@@ -34,10 +34,9 @@ class BondSamples {
   /// From the next `clear` on.
   void ask(BondSampling what) noexcept { what_ = what; }
 
-  /// Before a parallel loop: empties all. Of directed bonds only those with an end in a group of `kept` are kept, by group of
-  /// eight points; empty: all.
+  /// Before a parallel loop: empties all. Of directed bonds only those with an end in `kept` (GroupMarks) are kept; empty: all.
   void clear(std::span<const std::uint8_t> kept);
-  /// Whether bonds of the points of this group are kept whatever their other ends.
+  /// Whether bonds of points of this group are kept whatever their other ends.
   bool keeps_group(std::size_t group) const noexcept { return kept_.empty() || kept_[group]; }
   /// The n lanes of a batch with their owners and far ends (-1: of the owner as a whole), after an evaluation with Work::sample.
   /// selective: of the selective map, whose stresses come with their weight.
@@ -47,7 +46,7 @@ class BondSamples {
   void merge();
   /// Until the next `clear`: by group of eight points, as bits, the points whose bonds are wanted; empty: all of them.
   void want(std::span<const std::uint8_t> points) noexcept { wanted_ = points; }
-  bool wants(std::size_t p) const noexcept { return wanted_.empty() || (wanted_[p / padding] >> p % padding & 1); }
+  bool wants(std::size_t p) const noexcept { return wanted_.empty() || marked(wanted_.data(), p); }
   /// Until the next `clear`: what is said of a directed bond is said of the bond, both ways.
   void take_both_ways() noexcept { both_ways_ = true; }
   bool both_ways() const noexcept { return both_ways_; }
@@ -59,7 +58,7 @@ class BondSamples {
 
  private:
   bool keeps(std::int32_t owner, std::int32_t far) const noexcept {
-    return far < 0 || keeps_group(static_cast<std::size_t>(owner) / padding) || keeps_group(static_cast<std::size_t>(far) / padding);
+    return far < 0 || kept_.empty() || marked(kept_.data(), static_cast<std::size_t>(owner)) || marked(kept_.data(), static_cast<std::size_t>(far));
   }
 
   Space space_;

@@ -79,7 +79,7 @@ std::vector<LaminateFinder::Found> LaminateFinder::take() {
 Laminates::Laminates(std::shared_ptr<const Interfaces> interfaces, std::size_t points, std::size_t numbers)
     : interfaces_(std::move(interfaces)), near_(points / padding, 0), group_(numbers / padding + 1, -1) {
   for (const Interface& interface : interfaces_->all)
-    for (const std::int32_t p : interface.point) near_[static_cast<std::size_t>(p) / padding] = 1;
+    for (const std::int32_t p : interface.point) near_[static_cast<std::size_t>(p) / padding] = whole_group;
 }
 
 void Laminates::set(std::int64_t number, const LaminatePoint& point) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "body/interfaces.hpp"
+#include "core/group_marks.hpp"
 #include "operators/laminate.hpp"
 
 namespace perikit {

@@ -28,7 +28,7 @@ RitzValue largest_ritz_value(const std::vector<double>& alpha, const std::vector
 
 }  // namespace
 
-double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm, double enough) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
   Field last = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
@@ -43,30 +43,34 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
     combine(1, vector, 0.05 * size, w, vector);
   }
   const double size = norm(vector);
-  if (!(size > 0)) return 0.0;  // nothing is free
+  if (!(size > 0)) return {};  // nothing is free
   for (std::size_t k = 0; k < n; ++k) q.data[k] /= size;
   std::vector<double> alpha, beta;
   const int most = 80;
-  double bound = 0;
+  EigenvalueBounds found;
   for (int k = 0; k < most; ++k) {
     for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
-    if (!problem.tangent_action(u, w, Kw).ok()) return 0.0;
+    if (!problem.tangent_action(u, w, Kw).ok()) return {};
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
     alpha.push_back(dot(Kw, q));
     const double b = beta.empty() ? 0.0 : beta.back();
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] -= alpha.back() * q.data[i] + b * before.data[i];
     const double next = norm(Kw);
     const auto [value, residual] = largest_ritz_value(alpha, beta, next);
-    bound = value + residual;
-    const bool converged = k >= (warm ? 5 : 12) && residual <= 0.02 * value;
-    if (converged || k + 1 == most || next <= 1e-14 * std::abs(value)) break;
+    found = {value, value + residual};
+    const bool converged = k >= (warm ? 5 : 12) && residual <= 0.02 * value, below = warm && k >= 2 && residual <= 0.1 * value && found.bound < enough;
+    if (below || converged || k + 1 == most || next <= 1e-14 * std::abs(value)) break;
     beta.push_back(next);
     std::swap(before, q);
     for (std::size_t i = 0; i < n; ++i) q.data[i] = Kw.data()[i] / next;
   }
   // The last Lanczos vector is rich in the top of the spectrum: a good start for the next call.
   if (q.data != vector.data) copy(q, vector);
-  return bound;
+  return found;
+}
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
+  return eigenvalue_bounds(problem, u, scale, vector, warm).bound;
 }
 
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale, double enough) {

@@ -8,7 +8,6 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/model/family_point.hpp"
-#include "perikit/sdk/eigenvalue.hpp"
 
 namespace perikit {
 
@@ -28,10 +27,12 @@ Field root_of_masses(Problem& problem) {
 
 }  // namespace
 
-double largest_eigenvalue(Problem& problem, ConstFieldView u) {
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough) {
   const FieldView eigenvector = problem.state().declare("eigenvector");
-  return largest_eigenvalue(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0);
+  return eigenvalue_bounds(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0, enough);
 }
+
+double largest_eigenvalue(Problem& problem, ConstFieldView u) { return eigenvalue_bounds(problem, u, 0).bound; }
 
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, double enough) {
   return largest_eigenvalue(problem, part, u, root_of_masses(problem), enough);

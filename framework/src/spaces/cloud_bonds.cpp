@@ -262,7 +262,7 @@ void CloudBonds<D>::volumes(std::size_t b, const Pass& pass) noexcept {
   double H[9 * padding], dH[9 * padding], volume[volume_components * padding] = {};
   const std::size_t end = blocks_.end(b);
   for (std::size_t first = blocks_.begin(b); first < end; first += padding) {
-    if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
+    if (!pass.gradients_wanted(first)) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
@@ -278,13 +278,13 @@ void CloudBonds<D>::pressures(std::size_t b, const Pass& pass) noexcept {
   double H[9 * padding], dH[9 * padding], pressure[2][padding] = {};
   const std::size_t end = blocks_.end(b);
   for (std::size_t first = blocks_.begin(b); first < end; first += padding) {
-    if (!pass.gradient_wanted(static_cast<std::int64_t>(first))) continue;
+    if (!pass.gradients_wanted(first)) continue;
     const std::size_t n = std::min(padding, end - first);
     OwnerGradients owners = gather_gradients<D>(gradient_, first, n, H);
     if (tangent) owners.dH = gather_gradients<D>(direction_, first, n, dH).H;
     double stress[9 * padding] = {};
     for (std::size_t l = 0; l < n; ++l)
-      for (int c = 0; c < 2; ++c) pressure[c][l] = pressure_[first + l][c];
+      for (int c = 0; c < 2; ++c) pressure[c][l] = pass.gradient_wanted(static_cast<std::int64_t>(first + l)) ? pressure_[first + l][c] : 0.0;
     add_owner_stress(laws_.space(), owners, pressure[0], pressure[1], stress, padding);
     for (std::size_t l = 0; l < n; ++l)
       for (int c = 0; c < D; ++c)

@@ -13,7 +13,7 @@ class CloudPoints final : public EvaluationSpace {
   explicit CloudPoints(const SpaceParts& parts);
 
   void run(Pass& pass) override;
-  void complete(GroupMarks& marks) const override { fill_blocks(batch_points / padding, marks); }
+  void complete(GroupMarks& marks) const override { mark_whole_runs(batch_points / padding, marks); }
   std::size_t numbers() const noexcept override { return padded(points_); }
   void bonds_changed(std::span<const std::int32_t> points) override;
   void shift_gradients(ConstFieldView lambda) override;

@@ -28,8 +28,8 @@ class EvaluationSpace {
   virtual bool moves_points() const noexcept { return false; }
   /// Runs with Work::force may take samples along (BatchWork::sample_along), of bodies without histories and laminates.
   virtual bool samples_along() const noexcept { return false; }
-  /// Marks the groups whose energies a run sums up together with those of marked ones (Pass::energies).
-  virtual void complete(GroupMarks&) const {}
+  /// Marks the points whose energies a run sums up together with those of marked ones (Pass::energies).
+  virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
   /// The numbers of evaluation points lie below this.
   virtual std::size_t numbers() const noexcept = 0;
   /// What follows from the bonds of these points is to be made anew.

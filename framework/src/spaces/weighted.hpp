@@ -30,7 +30,7 @@ class Weighted final : public EvaluationSpace {
   void run(Pass& pass) override;
   void complete(GroupMarks& marks) const override {
     if (lattice_) lattice_->tiles.complete(marks);
-    else fill_blocks(body_.block_points() / padding, marks);
+    else mark_whole_runs(body_.block_points() / padding, marks);
   }
   std::size_t numbers() const noexcept override { return numbers_; }
   void bonds_changed(std::span<const std::int32_t> points) override;

@@ -20,10 +20,6 @@ constexpr std::size_t most_at_once = std::size_t{1} << 19;
 /// framework/docs/fracture.md the least part with which a bond failed was 0.58 (`baqp`, `projection`) and 0.26 (`bond_augmented`,
 /// `bond_associated`).
 double least_held(const Formulation& formulation) noexcept { return formulation.bond && formulation.g_from_xi_only ? 0.25 : 0.125; }
-/// Adds point p to bits by group of eight points.
-void look_at(GroupMarks& bits, std::size_t p) noexcept {
-  bits[p / padding] |= static_cast<std::uint8_t>(1u << p % padding);
-}
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -46,7 +42,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
-  looked_at_.assign(count, 0xff);
+  looked_at_.assign(count, whole_group);
   if (damage && traits_.bound != ValueBound::none) set_screen(parts.factors);
 }
 
@@ -130,36 +126,42 @@ void BondCriterion::clear_forces(int components) {
   std::fill_n(forces_.data(), forces_.size(), 0.0);
 }
 
-/// By group of eight points: the points with bonds that may fail at u, as bits.
+/// The points with bonds that may fail at u.
 GroupMarks BondCriterion::near_failure(ConstFieldView u) {
   const bool known = known_at(u);
   if (known && terms_.size() == 1) return screen_.near;
-  if (!by_point_ || screen_.near.empty()) return known ? screen_.near : GroupMarks(own_.size(), 0xff);
+  if (!by_point_ || screen_.near.empty()) return known ? screen_.near : GroupMarks(own_.size(), whole_group);
   // What points hold of all terms is cheaper than a look at their bonds.
   const BondSampling asked = samples_.what();
   samples_.ask(BondSampling::energy);
-  collect(u, known ? screen_.near : GroupMarks(screen_.near.size(), 1), {});
+  collect(u, known ? families_.evaluated(screen_.near) : GroupMarks(screen_.near.size(), whole_group), {});
   GroupMarks near(screen_.near.size(), 0);
   for (const BondSamples::Entry& entry : samples_.entries()) {
     const auto p = static_cast<std::size_t>(entry.owner);
     const double left = body_.volume(p) * (1 - families_.damage(p));
-    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) look_at(near, p);
+    if (left > 0 && entry.energy > left * screen_.density[p] * static_cast<double>(terms_.size())) mark(near, p);
   }
   samples_.ask(asked);
   return near;
 }
 
-std::vector<std::int32_t> BondCriterion::marked(const GroupMarks& marks) const {
+std::vector<std::int32_t> BondCriterion::groups_with(const GroupMarks& marks) const {
   std::vector<std::int32_t> groups;
   for (const std::int32_t g : groups_)
     if (marks[static_cast<std::size_t>(g)]) groups.push_back(g);
   return groups;
 }
 
-/// What the evaluation points of these groups hold, and those of everything in their families.
+/// The points of these groups whose evaluation points tell of the bonds that are looked at.
+GroupMarks BondCriterion::looked_at(std::span<const std::int32_t> groups) const {
+  GroupMarks marks(own_.size(), 0);
+  for (const std::int32_t g : groups) marks[static_cast<std::size_t>(g)] = looked_at_[static_cast<std::size_t>(g)];
+  return families_.evaluated(std::move(marks));
+}
+
+/// What the evaluation points of these points hold, and those of everything in their families.
 void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
-  std::fill(own_.begin(), own_.end(), std::uint8_t{0});
-  for (const std::int32_t g : groups) own_[static_cast<std::size_t>(g)] = 1;
+  own_ = looked_at(groups);
   if (flux_.flux.data) {
     samples_.ask(BondSampling::energy);
     return collect(u, own_, own_);
@@ -178,10 +180,8 @@ void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldVi
   if (known_at(u)) flux_ = terms_.front()->point_flux();
   if (flux_.everywhere) return;
   flux_ = {};
-  GroupMarks marks(own_.size(), 0);
-  for (const std::int32_t g : groups) marks[static_cast<std::size_t>(g)] = 1;
   // The points of their families, and whatever has a bond with those.
-  marks = families_.around(families_.around(marks));
+  const GroupMarks marks = families_.around(families_.around(looked_at(groups)));
   clear_forces(u.components);
   if (terms_.front()->add_forces_of(u, marks, families_.around(marks), forces_, nullptr) < 0) flux_ = terms_.front()->point_flux();
 }
@@ -294,8 +294,8 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   found_.clear();
   found_at_ = u.data;
   if (release_) mark_by_forces(u);
-  looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), 0xff);
-  const std::vector<std::int32_t> near = marked(looked_at_);
+  looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), whole_group);
+  const std::vector<std::int32_t> near = groups_with(looked_at_);
   find_flux(near, u);
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<Found>> found(groups.size());
@@ -335,9 +335,9 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-  find_flux(groups, u);
   looked_at_.assign(own_.size(), 0);
-  for (const BondId bond : bonds) look_at(looked_at_, static_cast<std::size_t>(bond.point));
+  for (const BondId bond : bonds) mark(looked_at_, static_cast<std::size_t>(bond.point));
+  find_flux(groups, u);
   sample(groups, u);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {
@@ -350,7 +350,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
 
 std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
   std::vector<BondEnergy> all;
-  looked_at_.assign(own_.size(), 0xff);
+  looked_at_.assign(own_.size(), whole_group);
   find_flux(groups_, u);
   by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<BondEnergy>> found(groups.size());

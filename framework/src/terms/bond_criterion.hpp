@@ -53,17 +53,18 @@ class BondCriterion final : public BondFinder {
   };
 
   void set_screen(std::span<const double> factors);
+  bool looks_at(std::size_t p) const noexcept { return marked(own_, p) && marked(looked_at_, p); }
   /// Whether the last evaluation of forces with a screen was at u.
-  bool looks_at(std::size_t p) const noexcept { return own_[p / padding] && (looked_at_[p / padding] >> p % padding & 1); }
   bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
   GroupMarks near_failure(ConstFieldView u);
   /// Evaluates forces at u, where the last evaluation was at other displacements, for the marks that they leave.
   void mark_by_forces(ConstFieldView u);
   void clear_forces(int components);
-  std::vector<std::int32_t> marked(const GroupMarks& marks) const;
+  std::vector<std::int32_t> groups_with(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
   template <class Visit>
   void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
+  GroupMarks looked_at(std::span<const std::int32_t> groups) const;
   void sample(std::span<const std::int32_t> groups, ConstFieldView u);
   /// Where the flux that forces leave is all that a look at the bonds of these groups takes: that of the last forces if they were at u, else of forces
   /// about the groups. So what a bond sets free has the same bits whatever was evaluated before.
@@ -90,8 +91,8 @@ class BondCriterion final : public BondFinder {
   PointFlux flux_;                      ///< what is sampled has this at its points; without data: it is sampled in full
   Field forces_;                        ///< that nobody reads
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
-  GroupMarks looked_at_;              ///< by group of eight points: those whose bonds are looked at, as bits
-  GroupMarks own_, near_;             ///< what was sampled last: groups, and those of everything in their families
+  GroupMarks looked_at_;              ///< the points whose bonds are looked at
+  GroupMarks own_, near_;             ///< what was sampled last: points, and everything in their families
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
   std::size_t checked_ = 0;

@@ -160,7 +160,7 @@ void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMark
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Memory>());
   count_ = 0;
   for (const std::int32_t p : body.internal()) {
-    if (!wide[static_cast<std::size_t>(p) / padding]) continue;
+    if (!marked(wide, static_cast<std::size_t>(p))) continue;
     if (count_ == owners_.size()) owners_.emplace_back();
     owners_[count_].point = p;
     place_[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(count_++);
@@ -189,7 +189,7 @@ void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const Bon
     });
   // What other owners read of an owner stays as it is from here on.
   over_owners([&](Owner& owner, Memory& m) {
-    if (!near[static_cast<std::size_t>(owner.point) / padding]) return;
+    if (!marked(near, static_cast<std::size_t>(owner.point))) return;
     twice ? load<D>(owner.point, m) : with_bonds(owner, m);
     find_gradient<D>(owner.point, u, m);
     release<D>(owner, samples, m);
@@ -383,20 +383,34 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
     for (std::size_t e = 0; e < D; ++e)
       for (std::size_t c = 0; c < D; ++c) m.weighted[D * k + e] += entry->tensor[c * D + e] * z[c];
   }
-  for (std::size_t k = 0; k < n; ++k) {
-    const double whole = family.whole_omega(k), omega = family.omega[k];
-    double difference = 0;
-    for (const double by : {step, -step}) {
-      change_inverse<D>(inverse, whole * family.volume[k], &m.xi[D * k], by, family.inverse_shape);
-      family.omega[k] = omega + by * whole;
+  // A correction depends on K^-1 and on its own bond alone, as batches have parts of families.
+  const auto work_of = [&](std::size_t l) {
+    double sum = 0;
+    for (std::size_t e = 0; e < D; ++e) sum += m.weighted[D * l + e] * m.correction[e * size + l];
+    return sum;
+  };
+  double slope[6] = {};  // dE/dK^-1 through the corrections
+  const double by = step * *std::max_element(inverse, inverse + 6);
+  for (int c = 0; c < D * (D + 1) / 2; ++c)
+    for (const double sign : {1.0, -1.0}) {
+      family.inverse_shape[c] = inverse[c] + sign * by;
       parts_.formulation.bond->correction(family.view(horizon), m.correction.data(), size);
-      for (std::size_t l = 0; l < n; ++l)
-        for (std::size_t e = 0; e < D; ++e) difference += (by > 0 ? 1 : -1) * m.weighted[D * l + e] * m.correction[e * size + l];
+      family.inverse_shape[c] = inverse[c];
+      for (std::size_t l = 0; l < n; ++l) slope[c] += sign * work_of(l) / (2 * by);
     }
-    family.omega[k] = omega;
-    owner.released[k] += difference / (2 * step);
+  std::vector<double>& omega = m.shifted;
+  omega.assign(family.omega.begin(), family.omega.begin() + static_cast<std::ptrdiff_t>(n));
+  for (const double sign : {1.0, -1.0}) {
+    for (std::size_t k = 0; k < n; ++k) family.omega[k] = omega[k] + sign * step * (family.whole.empty() ? omega[k] : family.whole_omega(k));
+    parts_.formulation.bond->correction(family.view(horizon), m.correction.data(), size);
+    for (std::size_t k = 0; k < n; ++k) owner.released[k] += sign * work_of(k) / (2 * step);
   }
-  std::copy_n(inverse, 6, family.inverse_shape);
+  std::copy_n(omega.begin(), n, family.omega.begin());
+  for (std::size_t k = 0; k < n; ++k) {
+    double changed[6];
+    change_inverse<D>(inverse, family.whole_omega(k) * family.volume[k], &m.xi[D * k], 1, changed);
+    for (int c = 0; c < D * (D + 1) / 2; ++c) owner.released[k] += slope[c] * (changed[c] - inverse[c]);
+  }
 }
 
 template <int D>

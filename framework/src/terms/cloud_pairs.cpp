@@ -279,7 +279,7 @@ template <int D>
 template <PairWork work>
 void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
   for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) {
-    if (pass.only && !pass.only[p / padding]) continue;
+    if (pass.only && !marked(pass.only, p)) continue;
     double energy = 0;
     if (!run_point<work>(p, pass, energy)) return report_bad(static_cast<std::int64_t>(p));
     if (pass.energies) pass.energies[p / padding] += energy;

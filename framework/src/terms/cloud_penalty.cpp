@@ -38,10 +38,10 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return blocks_.moves(u, b); });
-    const auto marked = [](const std::uint8_t* groups, std::size_t p) { return !groups || groups[p / padding]; };
+    const auto wants = [](const std::uint8_t* marks, std::size_t p) { return !marks || marked(marks, p); };
     over_points([&](std::size_t b) { return quiet_.begins(b); },
                 [&](std::size_t p) {
-                  if (!marked(only, p)) {
+                  if (!wants(only, p)) {
                     std::fill_n(&flux_[D * p], D, Row{});
                     return;
                   }
@@ -51,7 +51,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
                 });
     over_points([&](std::size_t b) { return quiet_.awake(b, 2); },
                 [&](std::size_t p) {
-                  if (!marked(near, p)) return;
+                  if (!wants(near, p)) return;
                   const Row f = factor * position_[p][3] * force_of_point(p);
                   for (int c = 0; c < D; ++c) force.component(c)[p] += f[c];
                 });
@@ -61,7 +61,7 @@ class CloudPenalty final : public ZeroEnergyPenalty {
     mirror(u);
     quiet_.wake();
     over_points(everywhere, [&](std::size_t p) {
-      if (only && !only[p / padding]) return;
+      if (only && !marked(only, p)) return;
       gradient_.at(p, u_, &flux_[D * p]);
       density[p] += energy_of_point(p, &flux_[D * p]) / position_[p][3];
     });

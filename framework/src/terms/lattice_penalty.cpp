@@ -82,8 +82,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
     // B of a point depends on M of its family.
     GroupMarks changed(families_.body().stride() / padding, 0), near = changed;
     for (const std::int32_t p : points) {
-      changed[static_cast<std::size_t>(p) / padding] = near[static_cast<std::size_t>(p) / padding] = 1;
-      for (const std::int64_t shift : families_.slots.shifts) near[static_cast<std::size_t>(p + shift) / padding] = 1;
+      changed[static_cast<std::size_t>(p) / padding] = near[static_cast<std::size_t>(p) / padding] = whole_group;
+      for (const std::int64_t shift : families_.slots.shifts) near[static_cast<std::size_t>(p + shift) / padding] = whole_group;
     }
     const auto over = [&](const GroupMarks& marks, auto&& set) {
       for (const LatticeChunk& chunk : families_.tiles.chunks)

@@ -68,7 +68,7 @@ std::vector<HistoryPlace> Mechanics::history_points() {
   const std::size_t groups = body.stride() / padding;
   for (std::size_t first = 0; first < groups; first += at_once) {
     GroupMarks marks(groups, 0);
-    std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), std::uint8_t{1});
+    std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), whole_group);
     const GroupMarks near = parts_.families.around(marks);
     parts.clear();
     // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
@@ -91,7 +91,7 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
   const int d = body.dimension();
   bool any = false;
   for (std::size_t g = 0; g < marks.size(); ++g) {
-    marks[g] = marks[g] && laminates_->near()[g];
+    marks[g] &= laminates_->near()[g];
     any |= marks[g] != 0;
   }
   if (!any) return;
@@ -182,13 +182,13 @@ std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, 
   return pass.bad;
 }
 
-std::int64_t Mechanics::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+std::int64_t Mechanics::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
                                      ExactSum& energy) {
   const BatchWork work = this->work(Work::force, true);
   std::vector<GroupEnergy> renewed = no_energies();
   Pass pass{work, u, {}, force, nullptr, renewed.data(), -1, {}, only.data(), near.data()};
   space_->run(pass);
-  replace(only, renewed, energies_);
+  replace(complete, renewed, energies_);
   add_owned(energies_, &GroupEnergy::stored, energy);
   return pass.bad;
 }

@@ -32,7 +32,7 @@ class Mechanics final : public Term {
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                              ExactSum* energy) override;
   void complete(GroupMarks& marks) const override { space_->complete(marks); }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
                             ExactSum& energy) override;
   std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
                               FieldView Kw) override {

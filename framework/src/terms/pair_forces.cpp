@@ -135,10 +135,8 @@ std::int64_t PairForces<D>::forces_of(ConstFieldView u, const GroupMarks& only, 
   if (energies) energies->assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
     // At the rim of `near` dilatations are not complete, and not the same on several ranks.
-    const std::int64_t bad = dilatation(u, {}, energies ? energies->data() : nullptr, nullptr, near.data(), true);
+    const std::int64_t bad = dilatation(u, {}, energies ? energies->data() : nullptr, nullptr, near.data(), only.data());
     if (bad >= 0) return bad;
-    for (std::size_t g = 0; g < only.size() && energies; ++g)
-      if (!only[g]) (*energies)[g] = 0;
   }
   return loop_->run({PairWork::force, u, {}, q_, {}, force, energies ? energies->data() : nullptr, only.data(), true});
 }
@@ -153,11 +151,11 @@ std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& on
 }
 
 template <int D>
-std::int64_t PairForces<D>::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+std::int64_t PairForces<D>::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
                                          ExactSum& energy) {
   std::vector<double> renewed;
   const std::int64_t bad = forces_of(u, only, near, force, &renewed);
-  replace(only, renewed, energies_);
+  replace(complete, renewed, energies_);
   add_owned(body_, energies_, energy);
   return bad;
 }
@@ -241,8 +239,8 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
 
 template <int D>
 std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                                       const std::uint8_t* only, bool local, Arrival* arrival, PointMotion* motion) {
-  PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local};
+                                       const std::uint8_t* only, const std::uint8_t* local, Arrival* arrival, PointMotion* motion) {
+  PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local != nullptr};
   pass.arrival = arrival;
   pass.motion = motion;
   const std::int64_t bad = loop_->run(pass);
@@ -251,7 +249,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
   if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
   if (rates) {
     if (rate_.size() == 0) rate_ = body_.make_field(1);
-    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr, only, local});
+    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr, only, local != nullptr});
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
@@ -270,7 +268,7 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energies && body_.alive(p)) energies[p / padding] += body_.volume(p) * phi[l];
+      if (energies && body_.alive(p) && (!local || marked(local, p))) energies[p / padding] += body_.volume(p) * phi[l];
     }
   });
   return -1;
@@ -280,7 +278,7 @@ template <int D>
 std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, PointMotion* motion) {
   if (energy) energies_.assign(body_.stride() / padding, 0.0);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, false, arrival, motion);
+    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, nullptr, arrival, motion);
     if (bad >= 0) return bad;
   }
   PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
@@ -297,7 +295,7 @@ template <int D>
 std::int64_t PairForces<D>::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only,
                                        const std::uint8_t* near) {
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, w, nullptr, nullptr, near, near != nullptr);
+    const std::int64_t bad = dilatation(u, w, nullptr, nullptr, near, only);
     if (bad >= 0) return bad;
   }
   return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr, only, only != nullptr});

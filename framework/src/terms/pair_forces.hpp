@@ -40,7 +40,7 @@ class PairForces final : public Term {
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                              ExactSum* energy) override;
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
                             ExactSum& energy) override;
   std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
                               FieldView Kw) override {
@@ -77,9 +77,9 @@ class PairForces final : public Term {
   void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m; energies += V phi by group of eight points;
-  /// phi by point -> density. only, local, arrival, motion: see PairPass; null for all.
+  /// phi by point -> density. only, arrival, motion: see PairPass; null for all. local: PairPass::local, and the points whose energies are added.
   std::int64_t dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                          const std::uint8_t* only = nullptr, bool local = false, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
+                          const std::uint8_t* only = nullptr, const std::uint8_t* local = nullptr, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
 
   const Families& families_;
   const Body& body_;

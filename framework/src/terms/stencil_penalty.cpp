@@ -49,7 +49,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       if (!quiet_.awake(b, 1)) return;
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
-        if (only && !only[rows_.point(r) / padding]) return;
+        if (only && !marked(only, rows_.point(r))) return;
         const double twice = pull(r, factor, t);
         if (wanted.any()) energy_[r] = 0.5 * twice;
       });
@@ -65,7 +65,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     parallel_for(blocks(), [&](std::size_t b) {
       std::vector<Row> t;
       over_rows(b, [&](std::size_t r) {
-        if (stencil_[r] >= 0 && (!only || only[rows_.point(r) / padding])) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
+        if (stencil_[r] >= 0 && (!only || marked(only, rows_.point(r)))) density[rows_.point(r)] += 0.5 * springs(r, t) / rows_.volume(r);
       });
     });
   }

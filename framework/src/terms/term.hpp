@@ -49,22 +49,22 @@ class Term {
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
 
   // Where bonds fail.
-  /// force += the forces of the evaluation points that belong to the groups `only`, and of some others, the same ones whichever
-  /// bonds are left. `near`: those groups and everything in their families. On points whose families of order steps() - 1, and at
+  /// force += the forces of the evaluation points that belong to the points `only`, and of some others, the same ones whichever
+  /// bonds are left. `near`: those points and everything in their families. On points whose families of order steps() - 1, and at
   /// least 1, lie in `only`, all that add_forces adds, bit for bit.
   /// *energy += their E, of what this rank owns [J], where wanted.
   virtual std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                      ExactSum* energy) = 0;
-  /// Marks the groups whose energies are summed up together with those of marked ones.
-  virtual void complete(GroupMarks&) const {}
-  /// As add_forces_of, of groups that are complete. Their energies take the place of those that the last add_forces with an energy left,
-  /// or the last of these calls; energy += E of all groups, bit for bit as add_forces has it.
-  virtual std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+  /// Marks the points whose energies are summed up together with those of marked ones.
+  virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
+  /// As add_forces_of. The energies of the points of `complete`, which lie in `only`, take the place of those that the last add_forces with an
+  /// energy left, or the last of these calls; energy += E of all points, bit for bit as add_forces has it.
+  virtual std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
                                     ExactSum& energy) = 0;
   /// Kw += -d(force)/du w of the evaluation points that add_forces_of takes, with the same promise.
   virtual std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
                                       FieldView Kw) = 0;
-  /// What the evaluation points of the points of the marked groups hold; point gradients are needed in the groups of `near`.
+  /// What the evaluation points of the marked points hold; point gradients are needed at `near`.
   virtual void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) = 0;
   /// What follows from the bonds of these points is to be computed anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
@@ -95,11 +95,11 @@ void add_owned(const Body& body, const std::vector<Energy>& energies, Value&& va
 inline void add_owned(const Body& body, const std::vector<double>& energies, ExactSum& sum) {
   add_owned(body, energies, [](double energy) { return energy; }, sum);
 }
-/// kept[g] <- renewed[g] for the groups in `only`.
+/// kept[g] <- renewed[g] for the groups in `complete`.
 template <class Energy>
-void replace(const GroupMarks& only, const std::vector<Energy>& renewed, std::vector<Energy>& kept) {
+void replace(const GroupMarks& complete, const std::vector<Energy>& renewed, std::vector<Energy>& kept) {
   for (std::size_t g = 0; g < kept.size(); ++g)
-    if (only[g]) kept[g] = renewed[g];
+    if (complete[g]) kept[g] = renewed[g];
 }
 
 }  // namespace perikit

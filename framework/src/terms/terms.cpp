@@ -204,22 +204,26 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
     return marks;
   };
   const int reach = std::max(1, steps - 1);   // of the evaluation points at a point
-  GroupMarks renewed = around(families.groups_of(lost), reach);
-  const GroupMarks pulled = around(families.groups_of(moved), steps);
-  for (std::size_t g = 0; g < renewed.size(); ++g) renewed[g] |= pulled[g];
-  GroupMarks only = around(renewed, reach);
-  for (const auto& term : terms_)
-    if (energy) term->complete(only);
-  if (2 * std::ranges::count(only, 1) * static_cast<std::ptrdiff_t>(padding) > std::ssize(body.internal())) return forces(u, force, energy);
+  GroupMarks renewed = around(families.marks_of(lost), reach);
+  add(renewed, around(families.marks_of(moved), steps));
+  GroupMarks only = around(renewed, reach), complete;
+  if (energy) {
+    complete = renewed;
+    for (const auto& term : terms_) term->complete(complete);
+    add(only, complete);
+  }
+  if (2 * count(only) > body.internal().size()) return forces(u, force, energy);
   const GroupMarks near = families.around(only);
   const FieldView own = failing_->work(force, body);
   ExactSum sum;
   std::int64_t bad = -1;
   for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
-    bad = energy ? (*term)->renew_forces(u, only, near, own, sum) : (*term)->add_forces_of(u, only, near, own, nullptr);
+    bad = energy ? (*term)->renew_forces(u, only, complete, near, own, sum) : (*term)->add_forces_of(u, only, near, own, nullptr);
   if (energy) *energy = total_over_ranks(sum);
   for (std::size_t g = 0; g < renewed.size(); ++g)
-    for (int c = 0; c < force.components && renewed[g]; ++c) std::copy_n(own.component(c) + g * padding, padding, force.component(c) + g * padding);
+    for (int c = 0; c < force.components && renewed[g]; ++c)
+      for (std::size_t p = g * padding; p < (g + 1) * padding; ++p)
+        if (marked(renewed, p)) force.component(c)[p] = own.component(c)[p];
   failing_->take(near, 0, {});
   return status(bad);
 }
@@ -259,7 +263,7 @@ GroupRings Terms::near_failed_bonds() const {
   std::vector<std::int32_t> points;
   for (std::size_t p = 0; p < rings.inside.size(); ++p)
     if (rings.inside[p]) points.push_back(static_cast<std::int32_t>(p));
-  rings.only = families.groups_of(points);
+  rings.only = families.marks_of(points);
   int steps = 2;
   for (const auto& term : terms_) steps = std::max(steps, term->steps());
   for (int k = 1; k < steps; ++k) rings.only = families.around(rings.only);

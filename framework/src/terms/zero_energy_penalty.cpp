@@ -38,7 +38,7 @@ void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, con
   add_density(u, density.data(), marks.data());
   for (const std::int32_t p : body.internal()) {
     const auto at = static_cast<std::size_t>(p);
-    if (marks[at / padding]) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at)});
+    if (marked(marks, at)) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at)});
   }
 }
 

@@ -23,10 +23,10 @@ class ZeroEnergyPenalty : public Term {
     if (energy) add_owned(parts_.families.body(), energies, *energy);
     return -1;
   }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, ExactSum& energy) final {
+  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force, ExactSum& energy) final {
     std::vector<double> renewed;
     apply(u, 1.0, force, {&renewed}, only.data(), near.data());
-    replace(only, renewed, energies_);
+    replace(complete, renewed, energies_);
     add_owned(parts_.families.body(), energies_, energy);
     return -1;
   }

@@ -4,6 +4,7 @@
 #include "perikit/plugin/parameters.hpp"
 #include "perikit/problem/integrator.hpp"
 #include "perikit/problem/problem.hpp"
+#include "perikit/sdk/eigenvalue.hpp"
 
 namespace perikit {
 
@@ -11,6 +12,8 @@ namespace perikit {
 /// exact tangent, plus its residual bound. Later calls start from the last eigenvector, which is kept in the state.
 /// Central differences are stable up to steps of 2 over its root.
 double largest_eigenvalue(Problem& problem, ConstFieldView u);
+/// Likewise. Later calls end early where the bound is found to lie below `enough`.
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough);
 
 /// That of a part of the body alone: not above that of the body. Where it is found to lie below `enough`, any bound below that. Nothing is kept.
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, double enough);
