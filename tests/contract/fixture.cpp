@@ -56,7 +56,13 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   if (d == 1) text += fmt::format("line = \"{}\"\narea = {:.17g}\n", o.plane == "stress" ? "stress" : "strain", 1.5 * o.scale * o.scale);
   text += fmt::format("[body.lattice]\nspacing = {:.17g}\nlower = {}\nupper = {}\n", o.scale, vector([](int) { return 0.0; }),
                       vector([&](int a) { return o.scale * cells[static_cast<std::size_t>(a)]; }));
-  if (o.cloud) text += "jitter = 0.25\nseed = 7\n";
+  // Points of a tongue on a cloud lie on a line, but for their last digits.
+  if (o.cloud) text += fmt::format("jitter = {}\nseed = 7\n", o.tongues ? 1e-9 : 0.25);
+  if (o.tongues) {
+    const char* const rod = d == 2 ? "abs(y - 3.5*{0:.17g}) < 0.4*{0:.17g}" : "abs(y - 2.5*{0:.17g}) < 0.4*{0:.17g} && abs(z - 1.5*{0:.17g}) < 0.4*{0:.17g}";
+    const char* const flange = d == 2 ? "" : " || (y > 3*{0:.17g} && abs(z - 1.5*{0:.17g}) < 0.4*{0:.17g})";
+    text += fmt::format("inside = \"x < 3*{:.17g} || ({}){}\"\n", o.scale, fmt::format(fmt::runtime(rod), o.scale), fmt::format(fmt::runtime(flange), o.scale));
+  }
   text += fmt::format("[sets]\npart = \"x < {:.17g}\"\n", 0.4 * o.scale * cells[0]) + o.sets;
   text += fmt::format("[family]\nhorizon_ratio = {}\ninfluence = {}\n", o.horizon_ratio,
                       o.influence.find('=') == std::string::npos ? "\"" + o.influence + "\"" : "{ " + o.influence + " }");
@@ -78,7 +84,7 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
 }
 
 std::string Case::label() const {
-  return fmt::format("{} ({}{}) {}D {}{}{}{}", example.part, example.table, example.stabilization, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : "",
+  return fmt::format("{} ({}{}) {}D {}{}{}{}", example.part, example.table, example.stabilization, body.dimension, body.cloud ? "cloud" : "lattice", body.crack ? " cracked" : body.tongues ? " with tongues" : "",
                      body.two_materials ? " two materials" : "", body.plane == "stress" ? " plane stress" : "");
 }
 
@@ -115,6 +121,28 @@ std::vector<Case> cases() {
       }
     }
   }
+  return all;
+}
+
+std::vector<BodyOptions> bodies_with_tongues() {
+  std::vector<BodyOptions> all;
+  for (const int d : {2, 3})
+    for (const bool cloud : {false, true}) {
+      BodyOptions body;
+      body.dimension = d;
+      body.cloud = cloud;
+      body.tongues = true;
+      body.cells = 8;
+      body.horizon_ratio = 1.515;
+      all.push_back(body);
+    }
+  return all;
+}
+
+std::vector<Case> cases_and_tongues() {
+  std::vector<Case> all = cases();
+  for (const Example& example : kinematics_examples())
+    for (const BodyOptions& body : bodies_with_tongues()) all.push_back({example, body});
   return all;
 }
 

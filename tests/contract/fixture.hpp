@@ -40,6 +40,7 @@ struct BodyOptions {
   bool cloud = false;       ///< jittered
   bool consistent = false;  ///< [family]
   bool crack = false;       ///< about a tenth of the bonds cut
+  bool tongues = false;     ///< rods and (3D) a flange of one layer of points, whose families have no gradient
   bool two_materials = false;
   std::string influence = "gaussian";
   std::string material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
@@ -72,6 +73,10 @@ struct Case {
 };
 /// Every kinematics in every space, on lattices and clouds, intact and cracked.
 std::vector<Case> cases();
+/// The bodies with tongues, in the plane and in space.
+std::vector<BodyOptions> bodies_with_tongues();
+/// Both.
+std::vector<Case> cases_and_tongues();
 
 /// Uniform in [-1, 1).
 class Noise {

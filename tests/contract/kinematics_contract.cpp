@@ -49,7 +49,7 @@ Field poisoned(const BodyProblem& problem) {
 }  // namespace
 
 TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
-  for (const Case& c : cases()) {
+  for (const Case& c : cases_and_tongues()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
     BodyProblem& problem = simulation->problem();
@@ -118,7 +118,7 @@ TEST_CASE("kinematics: the volumetric part is the derivative of the volumes of p
 
 TEST_CASE("kinematics: linear and angular momentum") {
   Exceptions exceptions;
-  for (const Case& c : cases()) {
+  for (const Case& c : cases_and_tongues()) {
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));
     BodyProblem& problem = simulation->problem();
@@ -200,7 +200,7 @@ TEST_CASE("kinematics: affine motion is exact") {
 
 TEST_CASE("kinematics: a rigid rotation stores nothing, a rotated state stores the same and its forces rotate") {
   Exceptions exceptions;
-  for (const Case& c : cases()) {
+  for (const Case& c : cases_and_tongues()) {
     if (c.body.dimension == 1) continue;
     INFO(c.label());
     const auto simulation = build(scene_text(c.body, kinematics_table(c.example)));

@@ -27,6 +27,7 @@ std::vector<BodyOptions> bodies() {
         body.cells = d == 3 ? 7 : d == 2 ? 10 : 20;
         all.push_back(body);
       }
+  for (const BodyOptions& body : bodies_with_tongues()) all.push_back(body);
   return all;
 }
 
@@ -42,7 +43,8 @@ TEST_CASE("kinematics: agrees with the dense reference") {
       continue;
     }
     for (const BodyOptions& options : bodies()) {
-      INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice", options.crack ? " cracked" : ""));
+      INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice",
+                       options.crack ? " cracked" : options.tongues ? " with tongues" : ""));
       const auto simulation = build(scene_text(options, kinematics_table(example)));
       BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();

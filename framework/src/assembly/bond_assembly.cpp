@@ -70,6 +70,8 @@ void BondAssembly<D>::read_bonds() {
       }
       bond.weight = rows_.volume(i) * s.share[k] * (factors_.empty() ? 1.0 : factors_[rows_.first(i) + k]);
       const auto j = static_cast<std::size_t>(neighbours[k]);
+      bond.shares = end_shares(rows_.families(), far_share_, rows_.point(i), rows_.point(j));
+      if (bond.shares.none()) bond.weight = 0;
       const auto back = rows_.neighbours(j);
       bond.reverse =
           rows_.first(j) +
@@ -95,7 +97,8 @@ void BondAssembly<D>::gradient_of(std::size_t i, std::size_t k, const Value& val
   double near[D] = {}, far[D] = {}, A[D];
   of_point(i, near);
   if (far_share_ > 0) of_point(j, far);
-  for (std::size_t e = 0; e < D; ++e) A[e] = far_share_ == 0 ? near[e] : (1 - far_share_) * near[e] + far_share_ * far[e];
+  const EndShares& shares = bond_[k].shares;
+  for (std::size_t e = 0; e < D; ++e) A[e] = shares.near * near[e] + shares.far * far[e];
   double H[D];
   bond_shape_row<D>(A, value(rows_.point(j)) - value(rows_.point(i)), bond_[k].xi, bond_[k].correction, H);
   std::copy_n(H, D, g);
@@ -157,8 +160,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const double* far = Hbar_.data() + entries * j;
   for (std::size_t c = 0; c < D; ++c) {
     double A[D], H[D];
-    for (std::size_t e = 0; e < D; ++e)
-      A[e] = far_share_ == 0 ? own[c * D + e] : (1 - far_share_) * own[c * D + e] + far_share_ * far[c * D + e];
+    for (std::size_t e = 0; e < D; ++e) A[e] = bond.shares.near * own[c * D + e] + bond.shares.far * far[c * D + e];
     bond_shape_row<D>(A, u.component(static_cast<int>(c))[q] - u.component(static_cast<int>(c))[p], bond.xi, bond.correction, H);
     for (std::size_t e = 0; e < D; ++e) {
       m.batch.H(lane, static_cast<int>(c * D + e)) = H[e];
@@ -168,7 +170,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
 }
 
 // On y = [columns of A_b, du]: H_ae = sum_s R_es y_as with R_es = delta_es - xi_s g_e (s < D), g_e (s = D), so that the matrix of
-// the bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (1 - far_share, -1) of i and (far_share, 1) of j.
+// the bond is M = R^T A R; y_s = sum over both ends of share_s X_s with shares (near, -1) of i and (far, 1) of j.
 template <int D>
 void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept {
   const Bond& bond = bond_[k];
@@ -180,8 +182,8 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
   }
   double near_share[slots], far_share[slots];
   for (std::size_t s = 0; s < D; ++s) {
-    near_share[s] = 1 - far_share_;
-    far_share[s] = far_share_;
+    near_share[s] = bond.shares.near;
+    far_share[s] = bond.shares.far;
   }
   near_share[D] = -1;
   far_share[D] = 1;

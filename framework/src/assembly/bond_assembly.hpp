@@ -4,6 +4,7 @@
 #include "assembly/tangent_batch.hpp"
 #include "body/interfaces.hpp"
 #include "families/cloud_rows.hpp"
+#include "spaces/bond_ends.hpp"
 #include "spaces/evaluation_space.hpp"
 
 namespace perikit {
@@ -40,6 +41,7 @@ class BondAssembly final : public Assembly {
     double correction[D];  ///< g_b
     double gradient[D];    ///< g_ij of Hbar_i
     double weight;         ///< V_i w_ij
+    EndShares shares;      ///< of Hbar_i and Hbar_j in A_b
     std::size_t reverse;   ///< the bond j -> i
   };
 

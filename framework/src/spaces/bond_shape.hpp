@@ -15,6 +15,15 @@ struct BondVectors {
   const double* xi[3];
   const double* g[3];
   bool per_slot;
+
+  template <int D>
+  void of(int lane, int slot, double (&bond)[D], double (&correction)[D]) const noexcept {
+    const int at = per_slot ? slot : lane;
+    for (int e = 0; e < D; ++e) {
+      bond[e] = xi[e][at];
+      correction[e] = g[e][at];
+    }
+  }
 };
 
 template <bool per_slot>

@@ -4,6 +4,21 @@
 
 namespace perikit {
 
+namespace {
+
+/// As read_bonds leaves them.
+BondVectors vectors_in(const BatchScratch& s) noexcept {
+  const auto rows = [](const double* first, const double*(&to)[3]) {
+    for (int c = 0; c < 3; ++c) to[c] = first + c * batch_points;
+  };
+  BondVectors vectors{.per_slot = false};
+  rows(s.bond[0], vectors.xi);
+  rows(s.bond[1], vectors.g);
+  return vectors;
+}
+
+}  // namespace
+
 template <int D>
 CloudBonds<D>::CloudBonds(const SpaceParts& parts)
     : families_(*parts.families.cloud()),
@@ -11,6 +26,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
       laws_(parts.laws),
       selective_(formulation_.selective()),
       far_share_(formulation_.far_share),
+      without_(families_),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
       points_(families_.body().points()),
@@ -44,6 +60,7 @@ CloudBonds<D>::CloudBonds(const SpaceParts& parts)
 template <int D>
 void CloudBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
   last_ = Last::other;
+  without_.renew(points);
   for (const std::int32_t point : points) {
     const auto p = static_cast<std::size_t>(point);
     gradient_of_.renew(p);
@@ -159,6 +176,52 @@ void CloudBonds<D>::bond_gradients(std::size_t p, std::int64_t begin, int n, int
   }
 }
 
+template <int D>
+template <class Visit>
+void CloudBonds<D>::over_one_sided(std::size_t p, std::int64_t begin, int n, const BatchScratch& s, Visit&& visit) const {
+  for (int l = 0; l < n; ++l) {
+    const auto far = static_cast<std::size_t>(s.far[l]);
+    if ((without_[p] || without_[far]) && families_.b(static_cast<std::size_t>(begin + l)) > 0)
+      visit(l, far, end_shares(far_share_, !without_[p], !without_[far]));
+  }
+}
+
+/// Replaces the H of bonds beside points without a gradient. Where neither end has one, a law with history may still hold a stress: it has no weight.
+template <int D>
+void CloudBonds<D>::one_sided_gradients(std::size_t p, std::int64_t begin, int n, BatchScratch& s, const AlignedVector<Row>& u,
+                                        const AlignedVector<Row>& H, double* out) const noexcept {
+  const BondVectors vectors = vectors_in(s);
+  over_one_sided(p, begin, n, s, [&](int lane, std::size_t far, const EndShares& shares) {
+    if (shares.none()) s.weight[lane] = s.far_weight[lane] = 0;
+    double xi[D], g[D], A[D], row[D];
+    vectors.of(lane, lane, xi, g);
+    for (int c = 0; c < D; ++c) {
+      for (std::size_t e = 0; e < D; ++e) A[e] = shares.near * H[D * p + e][c] + shares.far * H[D * far + e][c];
+      bond_shape_row<D>(A, u[far][c] - u[p][c], xi, g, row);
+      for (int e = 0; e < D; ++e) out[(c * D + e) * batch_points + lane] = shares.none() ? 0.0 : row[e];
+    }
+  });
+}
+
+/// Gives the ends of these bonds what their shares differ from those that `scatter` has taken for granted.
+template <int D>
+void CloudBonds<D>::one_sided_stress(std::size_t p, std::int64_t begin, int n, const BatchScratch& s) noexcept {
+  const BondVectors vectors = vectors_in(s);
+  over_one_sided(p, begin, n, s, [&](int lane, std::size_t far, const EndShares& shares) {
+    if (shares.none()) return;
+    double xi[D], g[D], row[D];
+    vectors.of(lane, lane, xi, g);
+    for (int c = 0; c < D; ++c) {
+      for (int e = 0; e < D; ++e) row[e] = (s.stress_weight ? s.stress_weight[lane] : 1.0) * s.P[(c * D + e) * batch_points + lane];
+      bond_shape_row_adjoint<D>(row, xi, g);
+      for (std::size_t e = 0; e < D; ++e) {
+        flux_[D * p + e][c] += (shares.near - (1 - far_share_)) * row[e];
+        flux_[D * far + e][c] += (shares.far - far_share_) * row[e];
+      }
+    }
+  });
+}
+
 /// One group for the owner, then those of the far ends.
 template <int D>
 void CloudBonds<D>::volumes_of_bonds(std::size_t p, int lanes, bool both_ends, BatchScratch& s) const noexcept {
@@ -194,6 +257,10 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
     for (int e = 0; e < D; ++e) std::fill(g + e * batch_points + n, g + e * batch_points + lanes, 0.0);
     bond_gradients(p, begin, n, lanes, s, u_, gradient_, H);
     if (tangent) bond_gradients(p, begin, n, lanes, s, w_, direction_, dH);
+    if (without_.any()) {
+      one_sided_gradients(p, begin, n, s, u_, gradient_, H);
+      if (tangent) one_sided_gradients(p, begin, n, s, w_, direction_, dH);
+    }
     if (pass.work.numbered()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
@@ -203,6 +270,7 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
     if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;
     scatter(p, n, s, both_ends, tangent);
+    if (without_.any()) one_sided_stress(p, begin, n, s);
   }
   return -1;
 }

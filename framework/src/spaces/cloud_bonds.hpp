@@ -3,6 +3,7 @@
 
 #include "families/blocks.hpp"
 #include "families/row_packs.hpp"
+#include "spaces/bond_ends.hpp"
 #include "spaces/bond_shape.hpp"
 #include "spaces/cloud_gradient.hpp"
 #include "spaces/evaluation_space.hpp"
@@ -47,6 +48,12 @@ class CloudBonds final : public EvaluationSpace {
   double share_of_volume(std::size_t p) const noexcept {
     return std::isfinite(families_.condition(p)) ? families_.left(p) : 0.0;
   }
+  /// Calls visit(lane, far, shares) for those of n intact bonds of p that have an end without a gradient.
+  template <class Visit>
+  void over_one_sided(std::size_t p, std::int64_t begin, int n, const BatchScratch& s, Visit&& visit) const;
+  void one_sided_gradients(std::size_t p, std::int64_t begin, int n, BatchScratch& s, const AlignedVector<Row>& u, const AlignedVector<Row>& H,
+                           double* out) const noexcept;
+  void one_sided_stress(std::size_t p, std::int64_t begin, int n, const BatchScratch& s) noexcept;
   template <class Visit>
   void over_points(std::size_t b, Visit&& visit) const {
     for (std::size_t p = blocks_.begin(b); p < blocks_.end(b); ++p) visit(p);
@@ -59,6 +66,7 @@ class CloudBonds final : public EvaluationSpace {
   const Laws& laws_;
   bool selective_;
   double far_share_;
+  PointsWithoutGradient without_;
   bool pairs_;       ///< each bond evaluated once for both ends
   bool two_states_;  ///< and yet with a history of its own for each
   std::size_t points_;

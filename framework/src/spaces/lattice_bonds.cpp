@@ -28,6 +28,7 @@ LatticeBonds<D>::LatticeBonds(const SpaceParts& parts)
       laws_(parts.laws),
       selective_(formulation_.selective()),
       far_share_(formulation_.far_share),
+      without_(families_),
       pairs_(formulation_.pair_symmetric && parts.share),
       two_states_(pairs_ && (selective_ || !laws_.single())),
       slots_at_once_(selective_ && pairs_ ? slots_at_once / 2 : slots_at_once),
@@ -59,6 +60,7 @@ double LatticeBonds<D>::share_of_volume(std::size_t p) const noexcept {
 template <int D>
 void LatticeBonds<D>::bonds_changed(std::span<const std::int32_t> points) {
   last_ = Last::other;
+  without_.renew(points);
   for (const std::int32_t p : points) {
     const LatticeChunk& chunk = tiles_.chunks[static_cast<std::size_t>(tiles_.chunk_of(p))];
     if (selective_) volume_.component(volume_share)[p] = share_of_volume(static_cast<std::size_t>(p));
@@ -201,6 +203,10 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   };
   weigh(pattern.scale_of(formulation_.weight), nullptr, s.weight);
   if (both_ends || sampled_pairs) weigh(scale_.data() + p, shifts, s.far_weight);
+  if (without_.any()) {
+    one_sided_gradients(chunk, slot, slots, vectors, pass.u, gradient_, H, s);
+    if (tangent) one_sided_gradients(chunk, slot, slots, vectors, pass.w, direction_, dH, s);
+  }
   for (int k = 0; k < slots && (pass.work.samples() || (!laws_.single() && s.one_law < 0)); ++k)
     for (int l = 0; l < chunk_points; ++l) {
       s.owner[k * chunk_points + l] = chunk.first + l;
@@ -217,8 +223,56 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   }
   if (pass.alone()) return -1;
   s.stress_weight ? choose(adjoint, true_type()) : choose(adjoint, false_type());
+  if (without_.any()) one_sided_stress(chunk, slot, slots, vectors, s);
   if (selective_) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
+}
+
+template <int D>
+template <class Visit>
+void LatticeBonds<D>::over_one_sided(const LatticeChunk& chunk, std::size_t slot, int slots, Visit&& visit) const {
+  const LatticePattern& pattern = families_.pattern(chunk);
+  for (int k = 0; k < slots; ++k)
+    for (int l = 0; l < chunk_points; ++l) {
+      if (!pattern.intact(slot + static_cast<std::size_t>(k), l)) continue;
+      const auto near = static_cast<std::size_t>(chunk.first + l);
+      const auto far = near + static_cast<std::size_t>(families_.slots.shifts[slot + static_cast<std::size_t>(k)]);
+      if (without_[near] || without_[far]) visit(k * chunk_points + l, k, near, far, end_shares(far_share_, !without_[near], !without_[far]));
+    }
+}
+
+/// Replaces the H of bonds beside points without a gradient. Where neither end has one, a law with history may still hold a stress: it has no weight.
+template <int D>
+void LatticeBonds<D>::one_sided_gradients(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, ConstFieldView u,
+                                          ConstFieldView Hbar, double* H, BatchScratch& s) const noexcept {
+  over_one_sided(chunk, slot, slots, [&](int lane, int k, std::size_t near, std::size_t far, const EndShares& shares) {
+    if (shares.none()) s.weight[lane] = s.far_weight[lane] = 0;
+    double xi[D], g[D], A[D], row[D];
+    vectors.of(lane, k, xi, g);
+    for (int c = 0; c < D; ++c) {
+      for (int e = 0; e < D; ++e) A[e] = shares.near * Hbar.component(c * D + e)[near] + shares.far * Hbar.component(c * D + e)[far];
+      bond_shape_row<D>(A, u.component(c)[far] - u.component(c)[near], xi, g, row);
+      for (int e = 0; e < D; ++e) H[(c * D + e) * batch_points + lane] = shares.none() ? 0.0 : row[e];
+    }
+  });
+}
+
+/// Gives the ends of these bonds what their shares differ from those that the adjoint has taken for granted.
+template <int D>
+void LatticeBonds<D>::one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s) noexcept {
+  over_one_sided(chunk, slot, slots, [&](int lane, int k, std::size_t near, std::size_t far, const EndShares& shares) {
+    if (shares.none()) return;
+    double xi[D], g[D], row[D];
+    vectors.of(lane, k, xi, g);
+    for (int c = 0; c < D; ++c) {
+      for (int e = 0; e < D; ++e) row[e] = (s.stress_weight ? s.stress_weight[lane] : 1.0) * s.P[(c * D + e) * batch_points + lane];
+      bond_shape_row_adjoint<D>(row, xi, g);
+      for (int e = 0; e < D; ++e) {
+        flux_.component(c * D + e)[near] += (shares.near - (1 - far_share_)) * row[e];
+        flux_.component(c * D + e)[far] += (shares.far - far_share_) * row[e];
+      }
+    }
+  });
 }
 
 template <int D>

@@ -4,6 +4,7 @@
 
 #include "families/lattice_families.hpp"
 #include "spaces/chunk_roles.hpp"
+#include "spaces/bond_ends.hpp"
 #include "spaces/bond_shape.hpp"
 #include "spaces/lattice_gradient.hpp"
 #include "spaces/lattice_stencils.hpp"
@@ -38,6 +39,12 @@ class LatticeBonds final : public EvaluationSpace {
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();
   void store_corrections();
+  /// Calls visit(lane, slot, shares) for the bonds of a chunk beside points without a gradient.
+  template <class Visit>
+  void over_one_sided(const LatticeChunk& chunk, std::size_t slot, int slots, Visit&& visit) const;
+  void one_sided_gradients(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, ConstFieldView u, ConstFieldView Hbar,
+                           double* H, BatchScratch& s) const noexcept;
+  void one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s) noexcept;
   void divergence(Pass& pass, int number) const;
   bool samples_pairs(const Pass& pass) const noexcept;
   int sample_far_ends(int lanes, BatchScratch& s, Pass& pass);
@@ -58,6 +65,7 @@ class LatticeBonds final : public EvaluationSpace {
   const Laws& laws_;
   bool selective_;
   double far_share_;
+  PointsWithoutGradient without_;
   bool pairs_;         ///< each bond evaluated once for both ends
   bool two_states_;    ///< and yet with a history of its own for each
   int slots_at_once_;  ///< of a bond batch

@@ -10,6 +10,7 @@
 #include "maps/selective_map.hpp"
 #include "perikit/core/dimension.hpp"
 #include "perikit/core/parallel.hpp"
+#include "spaces/bond_ends.hpp"
 #include "spaces/local_stencil.hpp"
 #include "spaces/shift.hpp"
 #include "terms/family_point.hpp"
@@ -319,12 +320,14 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
   const double of_owner = mirrored_ ? normaliser(owner.point) : 0.0;
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
     const double* const own = &owner.onto[k * D * D];
-    const double both = (1 - share) + (mirrored_ ? share * of_owner / normaliser(owner.far[k]) : 0.0);
+    const auto near = static_cast<std::size_t>(owner.point), other_end = static_cast<std::size_t>(owner.far[k]);
+    const double here = end_shares(parts_.families, share, near, other_end).near, there = end_shares(parts_.families, share, other_end, near).far;
+    const double both = here + (mirrored_ ? there * of_owner / normaliser(owner.far[k]) : 0.0);
     for (int c = 0; c < D * D; ++c) S[c] += both * own[c];
-    if (share > 0 && !mirrored_) {
+    if (there > 0 && !mirrored_) {
       const Owner& far = owner_of(owner.far[k]);
       const double* const other = &far.onto[far.place_of(owner.point) * D * D];
-      for (int c = 0; c < D * D; ++c) S[c] += share * other[c];
+      for (int c = 0; c < D * D; ++c) S[c] += there * other[c];
     }
   }
   if (!parts_.formulation.g_from_xi_only) release_corrections<D>(owner, samples, m);
@@ -364,6 +367,7 @@ void BondRelease::release_volume(Owner& owner, double pressure, double by_share,
 template <int D>
 void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, Memory& m) const {
   FamilyArrays& family = m.family;
+  const auto p = static_cast<std::size_t>(owner.point);
   const std::size_t n = owner.far.size(), size = family.size;
   const double horizon = parts_.families.body().horizon(), share = parts_.formulation.far_share;
   double inverse[6];
@@ -377,7 +381,8 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
     if (!entry) continue;
     double A[D * D], z[D];
     const double* const other = share > 0 ? owner_of(owner.far[k]).H : m.H;
-    for (int c = 0; c < D * D; ++c) A[c] = (1 - share) * m.H[c] + share * other[c];
+    const EndShares shares = end_shares(parts_.families, share, p, static_cast<std::size_t>(owner.far[k]));
+    for (int c = 0; c < D * D; ++c) A[c] = shares.near * m.H[c] + shares.far * other[c];
     std::copy_n(&m.u[D * k], D, z);
     subtract<D>(A, &m.xi[D * k], z);
     for (std::size_t e = 0; e < D; ++e)
