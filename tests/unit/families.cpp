@@ -166,7 +166,7 @@ TEST_CASE("families: marked are points and what they reach, on lattices their gr
     for (const Body* const body : {&lattice, &cloud}) {
       const auto families = Families::make(*body, std::make_shared<Cone>(), {});
       for (std::size_t first = 0; first < 40; ++first) {
-        INFO(body == &cloud ? "cloud" : "lattice", ", horizon ", horizon, ", from point ", first);
+        INFO((body == &cloud ? "cloud" : "lattice"), ", horizon ", horizon, ", from point ", first);
         std::vector<std::int32_t> points;
         for (std::size_t n = first; n < body->points(); n += 1 + 29 * first) points.push_back(body->internal()[n]);
         GroupMarks marks(body->stride() / padding, 0), expected = marks;

@@ -248,32 +248,17 @@ GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, const Body
   return marks;
 }
 
-/// Those and more of them where families of these points have lost much: bonds of fragments may follow.
-GroupMarks Fracture::widened(GroupMarks marks, std::span<const std::int32_t> ends) const {
-  constexpr double much = 0.5;
-  const auto poor = [&](std::int32_t p) {
-    const auto point = static_cast<std::size_t>(p);
-    return families_.body().owns(point) && families_.damage(point) > much;
-  };
-  if (!on_any_rank(std::ranges::any_of(ends, poor))) return marks;
-  for (int ring = 0; ring < 2; ++ring) {
-    marks = families_.around(marks);
-    shared_.mark(marks);
-  }
-  return marks;
-}
-
 void Fracture::fail(std::span<const Found> found, ConstFieldView at, FieldView force, const Body& body, BondUpdate& update) {
   std::vector<BondChange> changes;
   if (!damage_.second_law) {
     for (const Found& f : found) changes.push_back(f.change);
-    return lower(std::move(changes), at, force, true, body, update);
+    return lower(changes, at, force, true, body, update);
   }
   std::vector<BondChange> before;
   try_to_fail(ties(found), at, body, changes, before, update);
   // Once more, with forces, and together.
   take_back(before, body);
-  lower(std::move(changes), at, force, false, body, update);
+  lower(changes, at, force, false, body, update);
 }
 
 /// Lowers bonds, and those of fragments, where the energy at `at` does not rise, and halves of them where it does. lawful: those
@@ -285,19 +270,9 @@ void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, ConstF
   std::vector<BondChange> changes;
   for (const std::vector<BondChange>& tie : ties) changes.insert(changes.end(), tie.begin(), tie.end());
   const std::size_t known = before.size();
-  std::vector<std::int32_t> all;
-  const auto lower_all = [&] {
-    for (std::vector<BondChange> falling = changes; on_any_rank(!falling.empty());) {
-      for (const BondChange& change : falling) before.push_back({change.bond, families_.integrity(change.bond)});
-      const std::vector<std::int32_t> ends = families_.lower(falling);
-      body.changed(ends);
-      all.insert(all.end(), ends.begin(), ends.end());
-      falling.clear();
-      for (const BondId bond : gradual_ ? std::vector<BondId>() : fragments(ends)) falling.push_back({bond, 0.0});
-    }
-  };
-  lower_all();
-  const GroupMarks marks = dependent_on(all, body);
+  const std::vector<std::int32_t> ends = lower_with_fragments(changes, before);
+  body.changed(ends);
+  const GroupMarks marks = dependent_on(ends, body);
   const double after = body.energy(at, marks);
   std::vector<BondChange> tried(before.begin() + static_cast<std::ptrdiff_t>(known), before.end());
   before.resize(known);
@@ -305,7 +280,7 @@ void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, ConstF
   const double now = body.energy(at, marks);
   // Points that are inside out already say nothing.
   if (after <= now || !std::isfinite(now)) {
-    lower_all();
+    body.changed(lower_with_fragments(changes, before));
     lawful.insert(lawful.end(), changes.begin(), changes.end());
     if (std::isfinite(after) && std::isfinite(now)) update.dissipated += now - after;
     return;
@@ -328,50 +303,53 @@ void Fracture::take_back(std::vector<BondChange>& before, const Body& body) {
   body.changed(families_.raise(before));
 }
 
-/// Between the first bonds and the last ones of fragments nothing is evaluated where that can be helped: points that are about to
-/// go may be turned inside out.
-void Fracture::lower(std::vector<BondChange> changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update) {
-  if (force.data && part_.size() == 0) part_ = families_.body().make_field(force.components);
-  const bool evaluates = force.data || account;
-  const FieldView part = force.data ? FieldView(part_) : FieldView{};
-  GroupMarks marks;   // empty: no forces are waiting for those without the bonds
-  double before = 0;
-  const auto settle = [&] {
-    if (marks.empty()) return;
-    const double after = body.forces(at, marks, -1, part);
-    marks.clear();
-    if (!std::isfinite(before) || !std::isfinite(after)) {
-      ++update.inside_out;
-      return;
-    }
-    if (account) update.dissipated += before - after;
-    if (force.data) combine(1, force, 1, part, force);
-  };
+std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange> changes, std::vector<BondChange>& before) {
+  std::vector<std::int32_t> all;
   while (on_any_rank(!changes.empty())) {
-    std::vector<std::int32_t> ends;
-    for (const BondChange& c : changes) {
-      ends.push_back(c.bond.point);
-      ends.push_back(c.bond.far);
-    }
-    std::sort(ends.begin(), ends.end());
-    ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    GroupMarks of_these = evaluates ? dependent_on(ends, body) : GroupMarks();
-    const auto marked = [](std::uint8_t wanted, std::uint8_t have) { return !wanted || have; };
-    if (evaluates && on_any_rank(marks.empty() || !std::equal(of_these.begin(), of_these.end(), marks.begin(), marked))) {
-      settle();
-      marks = widened(std::move(of_these), ends);
-      if (force.data) fill(0.0, part);
-      before = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit
-    }
-    families_.lower(changes);
-    body.changed(ends);
-    update.ends.insert(update.ends.end(), ends.begin(), ends.end());
-    update.changed += std::max<std::size_t>(changes.size(), 1);
+    for (const BondChange& change : changes) before.push_back({change.bond, families_.integrity(change.bond)});
+    const std::vector<std::int32_t> ends = families_.lower(changes);
+    all.insert(all.end(), ends.begin(), ends.end());
     changes.clear();
-    if (gradual_) break;  // bonds of fragments fade
+    if (gradual_) break;   // bonds of fragments fade
     for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
-  settle();
+  std::ranges::sort(all);
+  const auto rest = std::ranges::unique(all);
+  all.erase(rest.begin(), rest.end());
+  return all;
+}
+
+void Fracture::lower(const std::vector<BondChange>& changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update) {
+  if (!on_any_rank(!changes.empty())) return;
+  const bool evaluates = force.data || account;
+  std::vector<BondChange> before;
+  std::vector<std::int32_t> ends = lower_with_fragments(changes, before);
+  if (force.data && part_.size() == 0) part_ = families_.body().make_field(force.components);
+  const FieldView part = force.data ? FieldView(part_) : FieldView{};
+  GroupMarks marks;
+  double stored = 0;
+  if (evaluates) {
+    // All of them are known now, and those of fragments fall together with those that made them so: between them points that are about to go may be turned
+    // inside out.
+    std::ranges::reverse(before);
+    families_.raise(before);
+    marks = dependent_on(ends, body);
+    if (force.data) fill(0.0, part);
+    stored = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit
+    before.clear();
+    ends = lower_with_fragments(changes, before);
+  }
+  body.changed(ends);
+  update.ends.insert(update.ends.end(), ends.begin(), ends.end());
+  update.changed += std::max<std::size_t>(before.size(), 1);
+  if (!evaluates) return;
+  const double left = body.forces(at, marks, -1, part);
+  if (!std::isfinite(stored) || !std::isfinite(left)) {
+    ++update.inside_out;
+    return;
+  }
+  if (account) update.dissipated += stored - left;
+  if (force.data) combine(1, force, 1, part, force);
 }
 
 std::vector<BondId> Fracture::fragments(std::span<const std::int32_t> points) const {

@@ -71,7 +71,6 @@ class Fracture {
   /// All ranks must call it.
   Ties ties(std::span<const Found> found) const;
   GroupMarks dependent_on(std::span<const std::int32_t> ends, const Body& body) const;
-  GroupMarks widened(GroupMarks marks, std::span<const std::int32_t> ends) const;
   /// Lowers bonds, and those of fragments with them. at: where they fail; force += their forces there, where it has data. With the second law, those
   /// without which the energy does not rise: what was found is tried together, then in halves, those that exceed their limits most first, down to
   /// ties, which stay.
@@ -79,7 +78,9 @@ class Fracture {
   void try_to_fail(std::span<const std::vector<BondChange>> ties, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
                    std::vector<BondChange>& before, BondUpdate& update);
   /// account: what the energy at `at` falls by is dissipated.
-  void lower(std::vector<BondChange> changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update);
+  void lower(const std::vector<BondChange>& changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update);
+  /// In the families alone; returns the ends. before: what the bonds had, in the order in which they fell. All ranks must call it.
+  std::vector<std::int32_t> lower_with_fragments(std::vector<BondChange> changes, std::vector<BondChange>& before);
   void take_back(std::vector<BondChange>& before, const Body& body);
   void finish(BondUpdate& update);
   /// What the criterion leaves of these bonds at u, whatever they had before.
