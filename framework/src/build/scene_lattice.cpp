@@ -28,6 +28,11 @@ double scene_horizon(const Scene& scene, double spacing) {
 }
 
 BodyFrame scene_frame(const Scene& scene, double spacing) {
+  // Shape tensors are volumes times squares of lengths: beyond, their squares are no numbers.
+  constexpr double least = 1e-30, most = 1e30;
+  if (!(spacing >= least && spacing <= most))
+    throw InputError(scene.body.position, scene.body.lattice ? "body.lattice.spacing" : "body.points",
+                     fmt::format("found points {:.6g} m apart; allowed: {} to {} m", spacing, least, most));
   BodyFrame frame{scene.body.space, scene.body.section, spacing, scene_horizon(scene, spacing), {}};
   for (const CrackDescription& crack : scene.cracks) frame.cracks.emplace_back(crack.vertices);
   return frame;

@@ -55,7 +55,7 @@ double shape_support(int d, const double* K, const double* whole) {
       double sum = 0;
       for (int i = 0; i < d; ++i)
         for (int j = 0; j < d; ++j) sum += all.vector(i, a) * k(i, j) * all.vector(j, b);
-      relative(a, b) = sum / std::sqrt(all.value(a) * all.value(b));
+      relative(a, b) = sum / (std::sqrt(all.value(a)) * std::sqrt(all.value(b)));   // the product of two may have no number
     }
   return std::clamp(SymmetricEigen(d, relative.entries, false).least(), 0.0, 1.0);
 }

@@ -7,6 +7,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/power_of_two.hpp"
 
 namespace perikit {
 
@@ -19,11 +20,12 @@ struct RitzValue {
 /// The largest eigenvalue of the tridiagonal matrix with this diagonal and these entries beside it, and the bound of its residual.
 RitzValue largest_ritz_value(const std::vector<double>& alpha, const std::vector<double>& beta, double next) {
   const auto order = static_cast<Eigen::Index>(alpha.size());
-  const Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(alpha.data(), order);
-  const Eigen::VectorXd off = Eigen::Map<const Eigen::VectorXd>(beta.data(), order - 1);
+  const Eigen::Map<const Eigen::VectorXd> diagonal(alpha.data(), order), off(beta.data(), order - 1);
+  // The solver compares squares of the entries beside the diagonal with entries on it: both are to be of order 1.
+  const double unit = power_of_two(diagonal.cwiseAbs().maxCoeff());
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-  ritz.computeFromTridiagonal(diagonal, off);
-  return {ritz.eigenvalues()(order - 1), next * std::abs(ritz.eigenvectors()(order - 1, order - 1))};
+  ritz.computeFromTridiagonal(diagonal / unit, off / unit);
+  return {unit * ritz.eigenvalues()(order - 1), next * std::abs(ritz.eigenvectors()(order - 1, order - 1))};
 }
 
 }  // namespace
