@@ -87,8 +87,10 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
 
 bool MixedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
   std::string failure;
+  // The companion does not know the bulk moduli: where these are large, conjugate gradients hardly ever come to their end. They meet a buckling mode long before.
+  constexpr int most = 200;
   return last && system_.linearise(equilibrium, u, failure) &&
-         has_negative_curvature(equilibrium, u, [this](ConstFieldView r, FieldView z) { system_.invert_companion(r, z); });
+         has_negative_curvature(equilibrium, u, [this](ConstFieldView r, FieldView z) { system_.invert_companion(r, z); }, most);
 }
 
 double MixedEquations::accuracy_for_motions(double accuracy) const {
