@@ -156,6 +156,8 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
   ExactSum total;
   SurfaceSamples samples;
   std::int32_t group = 0;
+  std::vector<std::int32_t> groups;
+  std::int64_t thin = 0;   // columns of this rank that the opposite face reaches into
   const auto add = [&](std::int32_t p, double share) {
     if (p < 0) return;
     shares[p].area += share;
@@ -169,18 +171,33 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
     const std::int32_t outermost = columns.below(end, 0);
     const bool mine = !(end.kind & End::image) && outermost >= 0 && body.owns(static_cast<std::size_t>(outermost));
     group = add_cell(body.dimension(), face.axis, middle, body.spacing(), mine ? area : 0.0, samples);
+    groups.push_back(group);
     if (!exact || (depth == 1 && !(end.kind & End::image))) {
       add(columns.below(end, 0), depth > 1 ? 1.5 * area : area);
       if (depth > 1) add(columns.below(end, 1), -0.5 * area);
       continue;
     }
+    thin += mine && depth < 2 * layers;
     // What is nearer to the opposite face belongs to that one.
     for (std::int64_t k = 0; k < std::min(layers, depth / 2); ++k)
       if (const std::int32_t p = columns.below(end, k); p >= 0) add(p, face.outward * areas.data()[p]);
   }
   const double wanted = static_cast<double>(counted(columns.own_faces()).all) * area, found = total_of(body, total);
-  if (exact)
-    for (auto& [p, share] : shares) share.area *= wanted / found;
+  if (!exact) return in_order(shares, std::move(samples));
+  if (thin = counted(thin).all; thin > 0) {
+    // Parts of this face beyond the middle are missing, and there are as large ones of the opposite face: the first moment of the half is right, its sum is not.
+    // What the sum lacks acts in the middle of the columns. It has no moment there, and under the same stress on both faces it cancels.
+    const double lack = (wanted - found) / static_cast<double>(thin);
+    for (std::size_t n = 0; n < groups.size(); ++n) {
+      const End& end = columns.faces()[n];
+      const std::int64_t depth = columns.depth(end);
+      if ((end.kind & End::image) || depth == 1 || depth >= 2 * layers) continue;
+      group = groups[n];
+      for (const std::int64_t k : {(depth - 1) / 2, depth / 2}) add(columns.below(end, k), 0.5 * lack);
+    }
+    return in_order(shares, std::move(samples));
+  }
+  for (auto& [p, share] : shares) share.area *= wanted / found;
   return in_order(shares, std::move(samples));
 }
 
