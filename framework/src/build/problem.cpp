@@ -231,10 +231,10 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
   if (scene.damage) steps.begin("limits of bonds");
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static));
+  std::vector<std::string> warnings;
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static, warnings));
   of_terms.damage = parts.fracture.damage();
   steps.begin("weights");
-  std::vector<std::string> warnings;
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   of_terms.further = std::move(further);
