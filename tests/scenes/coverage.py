@@ -1,13 +1,6 @@
-"""What scenes cover: parts, keys, and pairs of parts with bodies, criteria and boundaries.
+"""What scenes cover: parts, keys, and pairs of parts with bodies, criteria and boundaries."""
 
-    coverage.py PROGRAM COVERED.csv [--choose N]
-
-COVERED.csv is what net.py writes of the scenes that it found in order. Prints what none of them has; with --choose, the N seeds that have most of it."""
-
-import argparse
 import itertools
-
-from tables import read_tables
 
 BODIES = ("lattice", "jittered", "voronoi", "file")
 
@@ -60,30 +53,3 @@ def wanted(tables):
     out |= {"key %s.%s" % (kind, key) for kind in ("kinematics", "material", "damage", "integrator") for table in tables.parts[kind].values()
             for key in table.keys}
     return out
-
-
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("program")
-    parser.add_argument("covered")
-    parser.add_argument("--choose", type=int)
-    options = parser.parse_args()
-    rows = {}
-    with open(options.covered) as file:
-        for line in file:
-            seed, *found = line.rstrip("\n").split(";")
-            rows[int(seed)] = set(found)
-    missing = wanted(read_tables(options.program)) - set().union(*rows.values())
-    if options.choose:
-        left, chosen = set().union(*rows.values()), []
-        while left and len(chosen) < options.choose:
-            best = max(rows, key=lambda seed: (len(rows[seed] & left), -seed))
-            chosen.append(best)
-            left -= rows[best]
-        print(" ".join(str(seed) for seed in sorted(chosen)))
-        missing |= left
-    print("\n".join("# none has: " + what for what in sorted(missing)))
-
-
-if __name__ == "__main__":
-    main()

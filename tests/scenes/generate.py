@@ -1,5 +1,8 @@
 """Random valid scenes over everything that the program's tables name.
 
+A wish decides what chance would: wishes = {"kinematics": "baqp", "body": "voronoi 3D", "damage": "max_stress" or "none", "integrator": "newton",
+"condition": "symmetry", "keys": ("initial.from",)}, any of them.
+
 Values of physical meaning (lengths, stiffnesses, loads, times) follow from a random scale of the body: waves cross it about once, strains are 1e-3 to 0.3. Every
 other key gets a value that its table allows, so that a new key or part is tried without a change here."""
 
@@ -15,15 +18,30 @@ def rounded(value):
     return float("%.6g" % value)
 
 
+def read_wishes(words):
+    """Of a line of seeds.txt: kinematics=baqp body=voronoi-3D keys=initial.from,run.seed."""
+    wishes = {}
+    for word in words:
+        what, value = word.split("=")
+        wishes[what] = tuple(value.split(",")) if what == "keys" else value.replace("-", " ")
+    return wishes
+
+
 class Generator:
-    def __init__(self, tables, seed, explicit_only=False):
+    def __init__(self, tables, seed, explicit_only=False, wishes=None):
         self.tables, self.random, self.explicit_only = tables, random.Random(seed), explicit_only
-        self.seed = seed
+        self.seed, self.wishes = seed, wishes or {}
 
     # -- values by their tables ---------------------------------------------------------------------------------------------------------------
 
-    def maybe(self, share):
-        return self.random.random() < share
+    def maybe(self, share, key=""):
+        """key: with its section, where a wish may ask for it."""
+        return self.random.random() < share or key in self.wishes.get("keys", ())
+
+    def wish(self, what, otherwise):
+        """What is wished for, or what chance says: a function that is called either way, so that other draws stay as they are."""
+        drawn = otherwise()
+        return self.wishes.get(what, drawn)
 
     def between(self, low, high):
         return self.random.uniform(low, high)
@@ -59,21 +77,23 @@ class Generator:
             value = max(value, low + 1e-3)
         return rounded(value)
 
-    def filled(self, table, hints, share=0.3, leave=()):
+    def filled(self, table, hints, share=0.3, leave=(), section=""):
         """A section: required keys, others with this probability, as many of each group as it asks for."""
         taken = {}
         grouped = set()
         for how, count, names in table.groups:
             grouped.update(names)
             usable = [name for name in names if name not in leave and (name in hints or self.has_value(table.keys[name]))]
-            if any(name in taken for name in names) or (how == "at most" and not self.maybe(share)):
+            wished = [name for name in usable if "%s.%s" % (section, name) in self.wishes.get("keys", ())]
+            if any(name in taken for name in names) or (how == "at most" and not self.maybe(share) and not wished):
                 continue
-            for name in self.random.sample(usable, min(count, len(usable))):
+            others = [name for name in self.random.sample(usable, len(usable)) if name not in wished]
+            for name in (wished + others)[:count]:
                 taken[name] = None
         for name, key in table.keys.items():
             if name in leave or (name in grouped and name not in taken):
                 continue
-            if name in taken or key.required or self.maybe(share):
+            if name in taken or key.required or self.maybe(share, "%s.%s" % (section, name)):
                 hint = hints.get(name, lambda: self.allowed_value(key))
                 value = hint() if callable(hint) else hint
                 if value is not None:
@@ -86,9 +106,10 @@ class Generator:
     def part(self, kind, name=None, among=None, leave=()):
         """A part with keys: its name alone, or a table."""
         names = [part for part in self.tables.parts[kind] if among is None or part in among]
-        name = name or self.random.choice(names)
+        drawn = self.random.choice(names)
+        name = name or self.wishes.get(kind if kind in ("material", "influence", "stabilization") and self.wishes.get(kind) in names else "", drawn)
         hints = getattr(self, "hints_of_" + kind, lambda part: {})(name)
-        keys = self.filled(self.tables.parts[kind][name], hints, 0.3, leave)
+        keys = self.filled(self.tables.parts[kind][name], hints, 0.3, leave, kind)
         return {"type": name, **keys} if keys or self.maybe(0.2) else name
 
     # -- parts whose keys have a scale --------------------------------------------------------------------------------------------------------
@@ -130,11 +151,12 @@ class Generator:
         return {"coefficient": lambda: rounded(self.scale(-1, 0.5))}
 
     def hints_of_integrator(self, name):
-        return {"end_time": self.end_time, "time_step": lambda: None, "safety": lambda: rounded(self.between(0.2, 0.9)),
-                "check_every": lambda: self.random.choice([20, 100, 500]), "allow_unstable": lambda: None,
-                "steps": lambda: self.random.randint(1, 4), "tolerance": lambda: rounded(self.scale(-9, -6)), "max_iterations": lambda: None,
-                "cut_backs": lambda: self.random.randint(3, 8), "bond_rounds": lambda: None, "restart": lambda: self.random.randint(20, 60),
-                "max_restarts": lambda: None, "anderson": lambda: self.random.randint(2, 10)}
+        return {"end_time": self.end_time, "time_step": lambda: rounded(0.08 * self.spacing / self.speed) if self.maybe(0.3, "integrator.time_step") else None,
+                "safety": lambda: rounded(self.between(0.2, 0.9)), "check_every": lambda: self.random.choice([20, 100, 500]),
+                "steps": lambda: self.random.randint(1, 4), "tolerance": lambda: rounded(self.scale(-9, -6)),
+                "max_iterations": lambda: self.random.randint(50, 400) * (100 if name == "dynamic_relaxation" else 1),
+                "cut_backs": lambda: self.random.randint(3, 8), "bond_rounds": lambda: self.random.randint(100, 400), "restart": lambda: self.random.randint(20, 60),
+                "max_restarts": lambda: self.random.randint(10, 40), "anderson": lambda: self.random.randint(2, 10)}
 
     # -- the scene ----------------------------------------------------------------------------------------------------------------------------
 
@@ -149,25 +171,27 @@ class Generator:
         scene["family"] = self.family()
         self.end_time = rounded(self.between(0.4, 2.5) * self.size / self.speed)
         explicit = self.explicit_only or self.maybe(0.6)
-        self.integrator_name = "verlet" if explicit else r.choice(list(self.tables.parts["integrator"]))
+        self.integrator_name = self.wish("integrator", lambda: "verlet" if explicit else r.choice(list(self.tables.parts["integrator"])))
         scene["kinematics"] = self.kinematics()
         laws = [law for law in self.tables.parts["material"] if law != "hypoelastic" or self.integrator_name not in STATICS]
         scene["material"] = self.law(laws)
         failing = self.integrator_name != "evaluate" and self.maybe(0.45)
-        if self.maybe(0.2):
+        failing = self.wishes.get("damage", "none" if not failing else "") != "none"
+        if self.maybe(0.2, "region.set"):
             scene["region"] = [{"set": "part", "material": self.softer(laws)}]
-            if self.maybe(0.3):
+            if self.maybe(0.3, "family.interfaces"):
                 scene["family"]["interfaces"] = r.choice(["laminate", "parallel"])
         if failing:
             scene["damage"] = self.damage(scene)
-        if self.dimension > 1 and self.maybe(0.15):
+        if self.dimension > 1 and self.maybe(0.15, "crack.%s" % ("segment" if self.dimension == 2 else "polygon")):
             scene["crack"] = [self.crack()]
         self.conditions(scene)
         integrator = self.part("integrator", self.integrator_name)
         scene["integrator"] = integrator if isinstance(integrator, dict) else {"type": integrator}
         scene["output"] = self.output(scene)
-        run = self.filled(self.tables.sections["run"], {"threads": lambda: None, "weak_springs": lambda: None,
-                                                       "seed": lambda: r.randint(1, 99)}, 0.1)
+        statics = self.integrator_name in STATICS
+        run = self.filled(self.tables.sections["run"], {"threads": 1, "weak_springs": lambda: rounded(self.scale(-5, -3)) if statics else None,
+                                                       "seed": lambda: r.randint(1, 99)}, 0.1, section="run")
         if run:
             scene["run"] = run
         return scene
@@ -175,8 +199,10 @@ class Generator:
     def draw_scales(self):
         r = self.random
         self.dimension = r.choice([1, 2, 2, 2, 3, 3])
+        if "body" in self.wishes:
+            self.dimension = int(self.wishes["body"][-2])
         self.spacing = r.choice([0.001, 0.02, 0.1, 0.25, 1.0, 3.0])
-        cells = {1: (8, 60), 2: (4, 12), 3: (3, 7)}[self.dimension]
+        cells = {1: (8, 60), 2: (4, 12), 3: (3, 7)}[self.dimension] if not self.wishes else {1: (8, 30), 2: (4, 9), 3: (3, 5)}[self.dimension]
         self.extent = [r.randint(*cells) for _ in range(self.dimension)]
         self.lower = [rounded(self.spacing * r.choice([0, 0, r.randint(-20, 20), self.between(-9, 9)])) for _ in self.extent]
         self.upper = [rounded(low + n * self.spacing) for low, n in zip(self.lower, self.extent)]
@@ -197,14 +223,19 @@ class Generator:
                  "area": lambda: rounded(self.between(0.1, 2))}
         leave = ("thickness", "plane") if self.dimension != 2 else ()
         leave += ("line", "area") if self.dimension != 1 else ()
-        body = self.filled(self.tables.sections["body"], hints, 0.3, leave + ("plane",)) | body
+        body = self.filled(self.tables.sections["body"], hints, 0.3, leave + ("plane",), "body") | body
         self.stress = body.get("plane") == "stress" or (self.dimension == 1 and body.get("line", "stress") == "stress")
         self.section = body.get("thickness", 1.0) if self.dimension == 2 else body.get("area", 1.0) if self.dimension == 1 else 1.0
         self.cloud = self.maybe(0.35)
         self.from_file = self.cloud and self.maybe(0.4)
-        inside = self.inside() if self.maybe(0.25) else None
+        kind = self.wishes.get("body", "").split(" ")[0]
+        if kind:
+            self.cloud, self.from_file = kind != "lattice", kind == "file" or kind == "voronoi" and self.from_file
+        clipped = self.wishes.get("keys", ()) and "body.points.inside" in self.wishes["keys"]
+        self.from_file = self.from_file or clipped
+        inside = self.inside() if self.maybe(0.25, "body.lattice.inside") or clipped else None
         if self.from_file:
-            body["points"] = self.points(scene)
+            body["points"] = self.points(scene, inside, kind)
             return body
         lattice = {"spacing": self.spacing, "lower": self.lower, "upper": self.upper}
         if inside:
@@ -215,6 +246,8 @@ class Generator:
                 lattice["seed"] = r.randint(0, 99)
         if self.dimension > 1 and self.maybe(0.4 if self.cloud else 0.05):
             lattice["volume"] = r.choice(["cell", "voronoi"])
+        if kind:
+            lattice["volume"] = "voronoi" if kind == "voronoi" else "cell"
         self.has_inside = bool(inside)
         body["lattice"] = lattice
         return body
@@ -227,7 +260,7 @@ class Generator:
             return " + ".join("(%s - (%.6g))^2" % pair for pair in zip(axes, at)) + " > %.6g" % (1.3 * self.spacing) ** 2
         return " + ".join("%.3g*(%s - (%.6g))" % (self.between(-1, 1), axis, low) for axis, low in zip(axes, self.lower)) + " > %.6g" % (-0.3 * self.size)
 
-    def points(self, scene):
+    def points(self, scene, inside, kind):
         """Jittered points in random order, in a file."""
         r = self.random
         jitter = self.between(0, 0.25)
@@ -238,15 +271,20 @@ class Generator:
         rows = []
         for cell in cells:
             x = [low + (k + 0.5 + self.between(-jitter, jitter)) * self.spacing for low, k in zip(self.lower, cell)]
+            if inside and not eval(inside.replace("^", "**"), {}, dict(zip(AXES, x))):
+                continue
             rows.append(",".join("%.9g" % value for value in x + [0.0] * (3 - len(x)) + [volume]))
         if self.maybe(0.5):
             r.shuffle(rows)
         scene["files"] = {"points.csv": "x,y,z,volume\n" + "\n".join(rows) + "\n"}
         points = {"file": "points.csv"}
-        if self.dimension > 1 and self.maybe(0.3):
+        voronoi = self.maybe(0.3)
+        if self.dimension > 1 and (kind == "voronoi" or inside and self.maybe(0.6, "body.points.inside") or not kind and voronoi):
             points["volume"] = "voronoi"
-            if self.maybe(0.7):
+            if self.maybe(0.7, "body.points.lower"):
                 points.update(lower=self.lower, upper=self.upper)
+            if inside:
+                points["inside"] = inside
         self.has_inside = False
         return points
 
@@ -271,12 +309,12 @@ class Generator:
             family["horizon"] = rounded(self.horizon)
         hints = {"consistent": lambda: self.maybe(0.6) if self.cloud else None,
                  "partial_volume": lambda: self.maybe(0.7) if lattice and self.has_inside else None}
-        return family | self.filled(self.tables.sections["family"], hints, 0.3, ("horizon", "horizon_ratio", "interfaces"))
+        return family | self.filled(self.tables.sections["family"], hints, 0.3, ("horizon", "horizon_ratio", "interfaces"), "family")
 
     def kinematics(self):
         leave = () if not self.stress else ("selective",)
         names = [name for name in self.tables.parts["kinematics"] if name not in leave]
-        name = self.random.choice(names + ["conventional"])
+        name = self.wish("kinematics", lambda: self.random.choice(names + ["conventional"]))
         self.kinematics_name = name
         part = self.part("kinematics", name)
         if name == "conventional" and self.maybe(0.85):
@@ -297,12 +335,12 @@ class Generator:
         return law
 
     def damage(self, scene):
-        part = self.part("damage")
+        part = self.part("damage", self.wishes.get("damage"))
         part = part if isinstance(part, dict) else {"type": part}
         explicit = self.integrator_name == "verlet"
         hints = {"no_fail": lambda: [self.random.choice(["low", "high"])], "gradual": lambda: self.maybe(0.7) if explicit else None}
-        part |= self.filled(self.tables.sections["damage"], hints, 0.25)
-        if "region" in scene and self.maybe(0.4) and "softening" not in part and part["type"] != "smooth_degradation":
+        part |= self.filled(self.tables.sections["damage"], hints, 0.25, section="damage")
+        if "region" in scene and self.maybe(0.4, "interface.between") and "softening" not in part and part["type"] != "smooth_degradation":
             other = self.part("damage", part["type"], leave=("softening",))
             scene["interface"] = [{"between": ["part", "rest"], "damage": other}]
         return part
@@ -341,35 +379,43 @@ class Generator:
         amplitude = self.strain * self.size
         dynamic = self.integrator_name == "verlet"
         taken = set()   # axes with images
-        if self.maybe(0.1) and not statics:
-            axis = r.randrange(d)
+        wished = self.wishes.get("condition")
+        across = [axis for axis in range(d) if axis != self.axis] if statics else list(range(d))   # the rest stays held at the ends
+        if (self.maybe(0.1) or wished == "symmetry") and across:
+            axis = r.choice(across)
             taken.add(axis)
             scene["symmetry"] = [{"axis": AXES[axis]} | ({"at": self.lower[axis]} if self.cloud or self.maybe(0.3) else {})]
-        if self.maybe(0.1) and len(taken) < d:
-            axis = r.choice([a for a in range(d) if a not in taken])
+        across = [axis for axis in across if axis not in taken]
+        if (self.maybe(0.1) or wished == "periodic") and across:
+            axis = r.choice(across)
             taken.add(axis)
             scene["periodic"] = [{"axis": AXES[axis]} | ({"lower": self.lower[axis], "upper": self.upper[axis]} if self.cloud or self.maybe(0.3) else {})]
         boundaries, loads = [], []
-        held = statics or self.maybe(0.35)
+        held = statics or self.maybe(0.35) or wished == "boundary"
         if held and self.axis not in taken:
             boundaries.append({"set": "low", "displacement": [0.0] * d})
-            if self.maybe(0.3 if statics else 0.15):
+            if self.cloud and self.maybe(0.1, "boundary.surface"):
+                boundaries[-1] = {"surface": "%.9g - %s" % (self.place("low"), AXES[self.axis]), "displacement": [0.0] * d}
+            elif self.maybe(0.3 if statics else 0.15, "boundary.face"):
                 boundaries[-1]["face"] = self.face("low")
-                boundaries[-1] |= {"at": self.place("low")} if self.from_file or self.maybe(0.2) else {}
+                boundaries[-1] |= {"at": self.place("low")} if self.from_file or self.maybe(0.2, "boundary.at") else {}
         if held and self.axis not in taken and self.maybe(0.5):
             pulled = ["free"] * d
             key = r.choice(["displacement", "velocity"]) if dynamic else "displacement"
+            key = "velocity" if "boundary.velocity" in self.wishes.get("keys", ()) else key
             size = amplitude if key == "displacement" else self.strain * self.speed
             pulled[self.axis] = self.course(size, not dynamic) if key == "displacement" else rounded(size * r.choice([-1, 1]))
             boundaries.append({"set": "high", key: pulled})
             if self.maybe(0.2):
                 boundaries[-1]["face"] = self.face("high")
                 boundaries[-1] |= {"at": self.place("high")} if self.from_file else {}
-        if (held and len(boundaries) < 2 or self.maybe(0.2)) and self.axis not in taken:
+        if (held and len(boundaries) < 2 or self.maybe(0.2) or wished == "load") and self.axis not in taken:
             loads.append(self.load())
         if self.maybe(0.1):
             loads.append({"set": "all", "body_force": [self.course(self.E * self.strain / self.size * self.between(-1, 1)) for _ in range(d)]})
-        if not statics:
+        if self.maybe(0.05, "initial.from") and not (dynamic and boundaries):
+            scene["initial"] = {"from": "earlier/results.h5"}
+        elif not statics:
             initial = {}
             if self.integrator_name == "evaluate" or self.maybe(0.2):
                 initial["displacement"] = [self.shape(0.2 * amplitude) for _ in range(d)]
@@ -380,7 +426,7 @@ class Generator:
             scene["initial"] = initial
         if statics:
             for condition in boundaries + loads:
-                if self.maybe(0.15):
+                if self.maybe(0.15, "load.ramp"):
                     condition["ramp"] = False
         if boundaries:
             scene["boundary"] = boundaries
@@ -394,7 +440,8 @@ class Generator:
         area = self.section
         for axis in range(d):
             area *= 1 if axis == self.axis else self.extent[axis] * self.spacing
-        kind = r.choice(["force", "body_force", "traction", "pressure"])
+        kinds = ["force", "body_force", "traction", "pressure"]
+        kind = next((kind for kind in kinds if "load." + kind in self.wishes.get("keys", ())), r.choice(kinds))
         vector = lambda size: [self.course(size * self.between(-1, 1)) if axis == self.axis or self.maybe(0.3) else 0.0 for axis in range(d)]
         load = {"set": "high"}
         if kind == "force":
@@ -407,7 +454,7 @@ class Generator:
             load["pressure"] = self.course(stress * r.choice([-1, 1]))
             if self.maybe(0.7):
                 load["face"] = self.face("high")
-            if self.maybe(0.4):
+            if self.maybe(0.4, "load.follower"):
                 load["follower"] = True
         return load
 
@@ -417,8 +464,8 @@ class Generator:
         r, dynamic = self.random, self.integrator_name == "verlet"
         hints = {"frames": lambda: r.randint(1, 5), "every": lambda: r.choice([3, 10]) if dynamic else 1,
                  "times": lambda: [0.0, rounded(0.5 * self.end_time)] if dynamic else None, "history_every": 1,
-                 "checkpoint_every": lambda: None}
-        output = self.filled(self.tables.sections["output"], hints, 0.2)
+                 "checkpoint_every": lambda: r.randint(2, 9)}
+        output = self.filled(self.tables.sections["output"], hints, 0.2, section="output")
         output["history_every"] = 1
         if "frames" not in output and "every" not in output and "times" not in output:
             output["frames"] = 3
@@ -429,7 +476,11 @@ class Generator:
             if self.kinematics_name in PAIR_LAWS:
                 fields = [name for name in fields if name not in ("cauchy", "von_mises")]
             output["fields"] = sorted({"displacement", *(["velocity"] if dynamic else []), *fields})
-        if self.maybe(0.2):
+        if self.maybe(0.2, "output.history.name"):
             output["history"] = [{"name": "end", "set": r.choice(["high", "probe", "all"]), "quantity": "displacement", "component": AXES[self.axis],
                                   "reduce": r.choice(["mean", "sum", "min", "max"])}]
+        middle = [rounded(0.5 * (low + high)) for low, high in zip(self.lower, self.upper)]
+        for key, reduction in (("at", {"reduce": "fit", "at": middle}), ("exact", {"reduce": "error", "exact": self.shape(self.strain * self.size)})):
+            if self.maybe(0.05, "output.history." + key):
+                output.setdefault("history", []).append({"name": reduction["reduce"], "quantity": "displacement", "component": AXES[0]} | reduction)
         return output

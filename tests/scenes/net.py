@@ -13,25 +13,31 @@ import sys
 import time
 import tomllib
 
-from coverage import features
-from generate import Generator
-from scene_text import scene_text
+from coverage import features, wanted
+from generate import Generator, read_wishes
+from scene_text import scene_text, write_scene
 from smaller import smaller
 from tables import read_tables
-from trial import Trial, call, without_digits, write_scene
+from results import call
+from trial import Trial, make_earlier_results, without_digits
 
 
 MOST_STEPS = 1000
 
 
 def repaired(program, folder, scene, attempts=8):
-    """The scene without the keys that `check` refuses: rules that bind several keys are the program's. Returns it with the refusals."""
+    """The scene without the keys that `check` refuses, and `run` must refuse, too: rules that bind several keys are the program's. Returns it with the refusals."""
     refusals = []
     for _ in range(attempts):
         shutil.rmtree(folder, ignore_errors=True)
-        checked = call(program, ["check", write_scene(scene, folder)])
+        path = write_scene(scene, folder)
+        make_earlier_results(program, scene, folder)
+        checked = call([program, "check", path])
         if checked.status != 2:
             return shortened(scene, checked), refusals, checked
+        ran = call([program, "run", path, "-o", folder + "/refused", "--quiet", "--threads", "1"])
+        if ran.status != 2:
+            print("FAILED  check: refuses what run ends with %d: %s\n%s" % (ran.status, checked.first_line, scene_text(scene)), flush=True)
         refusals.append(checked.first_line)
         match = re.search(r"scene\.toml:\d+:\d+: ([\w.\[\]]+): ", checked.words)
         if not match or not drop(scene, match.group(1).split(".")):
@@ -69,12 +75,12 @@ def drop(scene, path):
     return False
 
 
-def try_kept(program, work, folder, name, only):
+def try_kept(program, tables, work, folder, name, options):
     """A scene that failed once. Its comments say what it is for, and may ask for more than other scenes are: words in run.log, energies that
     add up to a share of the largest. Returns findings."""
     with open(os.path.join(folder, name)) as file:
         text = file.read()
-    trial = Trial(program, os.path.join(work, name), tomllib.loads(text), only)
+    trial = Trial(program, tables, os.path.join(work, name), tomllib.loads(text), options.only, options.others)
     findings = trial.try_scene()
     if trial.status != 0:
         return findings + [("status %d" % trial.status, trial.words[:300])]
@@ -89,6 +95,14 @@ def try_kept(program, work, folder, name, only):
     return findings
 
 
+def read_seeds(path):
+    """Seeds with their wishes, and what no scene can have: "# feature: reason"."""
+    with open(path) as file:
+        lines = file.read().split("\n")
+    words = [line.split() for line in lines if line and not line.startswith("#")]
+    return [(int(row[0]), read_wishes(row[1:])) for row in words], {line[2:].split(": ")[0] for line in lines if re.match("# .+: ", line)}
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
@@ -99,6 +113,8 @@ def main():
     parser.add_argument("--scenes", help="a folder of scenes to be tried before the seeds")
     parser.add_argument("--explicit", action="store_true")
     parser.add_argument("--only", help="kinds of findings that begin so: what they do not need is not run")
+    parser.add_argument("--others", type=int, default=2, help="how many other runs of a scene (ranks, kills, mirrored ...) are tried")
+    parser.add_argument("--all-others", action="store_true")
     parser.add_argument("--no-shrink", action="store_true")
     options = parser.parse_args()
     tables = read_tables(options.program)
@@ -108,23 +124,23 @@ def main():
     if os.path.exists(done_file) and not options.seeds:
         with open(done_file) as file:
             done = {int(line.split(",")[0]) for line in file}
-    seeds = range(options.first, options.first + options.count)
+    cases = [(seed, {}) for seed in range(options.first, options.first + options.count)]
+    impossible = set()
     if options.seeds:
-        with open(options.seeds) as file:
-            seeds = [int(word) for line in file for word in line.split("#")[0].split()]
-    kinds, refused, failed = collections.Counter(), collections.Counter(), []
+        cases, impossible = read_seeds(options.seeds)
+    kinds, refused, failed, covered = collections.Counter(), collections.Counter(), [], set()
     began = time.time()
     for name in sorted(os.listdir(options.scenes)) if options.scenes else []:
-        findings = try_kept(options.program, options.folder, options.scenes, name, options.only)
+        findings = try_kept(options.program, tables, options.folder, options.scenes, name, options)
         for kind, words in findings:
             print("FAILED  %s: %s: %s" % (name, kind, words), flush=True)
         failed += [name] if findings else []
         kinds["FAILED, kept" if findings else "status 0, kept"] += 1
-    for seed in seeds:
+    for seed, wishes in cases:
         if seed in done:
             continue
         folder = "%s/%d" % (options.folder, seed)
-        scene = Generator(tables, seed, options.explicit).scene()
+        scene = Generator(tables, seed, options.explicit, wishes).scene()
         scene, refusals, checked = repaired(options.program, folder, scene)
         for words in refusals:
             refused[without_digits(words.split(": ", 1)[-1])[:160]] += 1
@@ -133,7 +149,7 @@ def main():
             if checked.status not in (0, 2):
                 outcome = "check ends with %d" % checked.status
         else:
-            trial = Trial(options.program, folder, scene, options.only)
+            trial = Trial(options.program, tables, folder, scene, options.only, None if options.all_others else options.others)
             findings = trial.try_scene()
             outcome = "status %d" % trial.status
             if trial.status == 1:
@@ -141,13 +157,12 @@ def main():
             for kind, words in findings:
                 print("FAILED  seed %d: %s: %s" % (seed, kind, words), flush=True)
             if not findings and not options.only:
-                with open(options.folder + "/covered.csv", "a") as file:
-                    file.write(";".join([str(seed)] + features(scene)) + "\n")
+                covered.update(features(scene))
             if findings:
                 failed.append(seed)
                 kind, words = findings[0]
                 outcome = "FAILED " + kind
-                small = scene if options.no_shrink else smaller(options.program, folder + "_small", scene, kind)
+                small = scene if options.no_shrink else smaller(options.program, tables, folder + "_small", scene, kind)
                 write_scene(small, "%s/failing/%d" % (options.folder, seed))
                 with open("%s/failing/%d/finding" % (options.folder, seed), "w") as file:
                     file.write("%s: %s\n" % (kind, words))
@@ -163,7 +178,13 @@ def main():
     print("keys that `check` refused and that were taken out:")
     for words, count in refused.most_common(30):
         print("%5d  %s" % (count, words))
-    sys.exit(1 if failed or not kinds else 0)
+    missing = sorted(wanted(tables) - covered - impossible)
+    for feature in missing:
+        print("%s %s" % ("FAILED  no seed has" if options.seeds else "no scene has", feature))
+    if missing and options.seeds:
+        print("A part or a key is new, or scenes are others than they were: choose.py chooses seeds anew.")
+    sys.exit(1 if failed or not kinds or missing and options.seeds else 0)
 
 
-main()
+if __name__ == "__main__":
+    main()

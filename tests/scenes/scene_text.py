@@ -1,5 +1,7 @@
 """Scenes as dictionaries, and their text."""
 
+import os
+
 SUB_SECTIONS = {"body": ("lattice", "points")}
 
 
@@ -43,3 +45,14 @@ def scene_text(scene):
 
 def is_tables(value):
     return isinstance(value, list) and len(value) > 0 and isinstance(value[0], dict)
+
+
+def write_scene(scene, folder):
+    os.makedirs(folder, exist_ok=True)
+    for name, text in scene.get("files", {}).items():
+        with open(os.path.join(folder, name), "w") as file:
+            file.write(text)
+    path = os.path.join(folder, "scene.toml")
+    with open(path, "w") as file:
+        file.write(scene_text(scene))
+    return path

@@ -46,7 +46,7 @@ def candidates(scene):
         yield {**scene, "integrator": {**scene["integrator"], "end_time": float("%.4g" % (0.5 * scene["integrator"]["end_time"]))}}
 
 
-def smaller(program, folder, scene, kind, seconds=60):
+def smaller(program, tables, folder, scene, kind, seconds=60):
     began = time.time()
     going_on = True
     while going_on:
@@ -55,7 +55,7 @@ def smaller(program, folder, scene, kind, seconds=60):
             if time.time() - began > seconds:
                 return scene
             try:
-                findings = Trial(program, folder, candidate, only=kind).try_scene()
+                findings = Trial(program, tables, folder, candidate, only=kind).try_scene()
             except (KeyError, TypeError, ValueError, OSError):
                 continue
             if any(found == kind for found, _ in findings):

@@ -1,74 +1,34 @@
 """What every scene must come to, whatever it holds. A finding is (kind, words): the kind stays the same while a scene is made smaller."""
 
-import glob
 import os
+import random
 import re
 import shutil
-import subprocess
-import sys
-from dataclasses import dataclass
 
 import numpy
 
-try:
-    import h5py
-except ImportError:
-    print("skipped: no h5py for " + sys.executable)
-    sys.exit(77)
+from generate import STATICS
+from other_runs import kinds_for, try_other
+from results import call, difference, frames, history, read, reference
+from scene_text import scene_text, write_scene
 
-from scene_text import scene_text
-
-SECONDS = 100   # of one run; scenes are small
 FEW_STEPS = 30   # runs of fewer steps are too short to tell an unstable step from a coarse one
-STATICS = ("newton", "jfnk", "kinsol", "dynamic_relaxation")
+MPIRUN = ["mpirun", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1", "-np"]
 
 
-@dataclass
-class Done:
-    status: int
-    words: str
-
-    @property
-    def first_line(self):
-        lines = [line for line in self.words.split("\n") if line.strip()]
-        return lines[0][:300] if lines else ""
-
-
-def call(program, arguments):
-    environment = dict(os.environ, OMP_WAIT_POLICY="passive")
-    try:
-        done = subprocess.run([program] + arguments, capture_output=True, text=True, errors="replace", timeout=SECONDS, env=environment)
-    except subprocess.TimeoutExpired:
-        return Done(-99, "still running after %d s" % SECONDS)
-    return Done(done.returncode, done.stderr.strip() or done.stdout.strip())
-
-
-def write_scene(scene, folder):
-    os.makedirs(folder, exist_ok=True)
-    for name, text in scene.get("files", {}).items():
-        with open(os.path.join(folder, name), "w") as file:
-            file.write(text)
-    path = os.path.join(folder, "scene.toml")
-    with open(path, "w") as file:
-        file.write(scene_text(scene))
-    return path
-
-
-def frames(folder):
-    return sorted(glob.glob(folder + "/frames/*.h5"))
-
-
-def read(path):
-    with h5py.File(path) as file:
-        return {name: file[name][()] for name in file}, float(file.attrs["time"])
-
-
-def history(folder):
-    """The columns of history.csv, without those that measure what a run took."""
-    with open(folder + "/history.csv") as file:
-        names = file.readline().strip().split(",")
-        rows = [line.strip().split(",") for line in file]
-    return {name: numpy.array([float(row[k]) if row[k] else 0.0 for row in rows]) for k, name in enumerate(names)}
+def make_earlier_results(program, scene, folder):
+    """Where the scene starts from results: those of the same body, deformed, in the folder that it names."""
+    name = scene.get("initial", {}).get("from")
+    if not name:
+        return
+    d = scene["body"]["dimension"]
+    lattice = scene["body"].get("lattice")
+    size = max(high - low for low, high in zip(lattice["lower"], lattice["upper"])) if lattice else 1.0
+    waves = ["%r*sin(%r*x)" % (0.003 * size, 3 / size)] + [0.0] * (d - 1)
+    kept = ("format", "body", "sets", "family", "kinematics", "material", "region", "files")
+    earlier = {key: value for key, value in scene.items() if key in kept} | {"initial": {"displacement": waves}, "integrator": {"type": "evaluate"}}
+    path = write_scene(earlier, os.path.join(folder, "earlier_scene"))
+    call([program, "run", path, "-o", os.path.join(folder, os.path.dirname(name)), "--quiet"])
 
 
 def without_digits(words):
@@ -76,11 +36,12 @@ def without_digits(words):
 
 
 class Trial:
-    """Runs a scene and collects findings. only: of the kinds of findings, the one that matters (a scene that is made smaller)."""
+    """Runs a scene and collects findings. only: of the kinds of findings, the one that matters (a scene that is made smaller). others: how many of the
+    other runs that make sense for the scene are tried, chosen by the scene; None: all of them."""
 
-    def __init__(self, program, folder, scene, only=None):
-        self.program, self.folder, self.scene, self.only = program, folder, scene, only
-        self.findings, self.words, self.status, self.imbalance = [], "", None, 0.0
+    def __init__(self, program, tables, folder, scene, only=None, others=2):
+        self.program, self.tables, self.folder, self.scene, self.only, self.others = program, tables, folder, scene, only, others
+        self.findings, self.words, self.status, self.seconds, self.imbalance = [], "", None, 0.0, 0.0
 
     def found(self, kind, words):
         self.findings.append((kind, words))
@@ -88,19 +49,24 @@ class Trial:
     def wants(self, kind):
         return self.only is None or self.only.startswith(kind)
 
-    def run(self, name, *settings, threads=1):
+    def command(self, out, settings, threads, ranks, options, path=None):
+        sets = [word for setting in settings for word in ("--set", setting)]
+        return [*(MPIRUN + [str(ranks)] if ranks > 1 else []), self.program, "run", path or self.path, "-o", out, "--quiet", "--threads", str(threads), *sets, *options]
+
+    def run(self, name, *settings, threads=1, ranks=1, scene=None):
+        """The scene, or another one, in a folder of this name. Returns how it ended, and the folder of the results."""
         out = os.path.join(self.folder, name)
         shutil.rmtree(out, ignore_errors=True)
-        sets = [word for setting in settings for word in ("--set", setting)]
-        done = call(self.program, ["run", self.path, "-o", out, "--quiet", "--threads", str(threads)] + sets)
-        return done, out
+        path = write_scene(scene, os.path.join(self.folder, name + "_scene")) if scene else None
+        return call(self.command(out, settings, threads, ranks, [], path)), out
 
     def try_scene(self):
         shutil.rmtree(self.folder, ignore_errors=True)
         self.path = write_scene(self.scene, self.folder)
-        checked = call(self.program, ["check", self.path]) if self.wants("check") else None
+        make_earlier_results(self.program, self.scene, self.folder)
+        checked = call([self.program, "check", self.path]) if self.wants("check") else None
         done, out = self.run("out")
-        self.status, self.words = done.status, done.words
+        self.status, self.words, self.seconds = done.status, done.words, done.seconds
         if done.status not in (0, 1, 2):
             self.found("status %d" % done.status, done.first_line)
             return self.findings
@@ -120,7 +86,7 @@ class Trial:
                 self.found(kind, done.first_line)
 
     def compare(self, out, done):
-        """The same bits with two threads and without skipping; the same to rounding without sharing."""
+        """The same bits with two threads and without skipping, and what else must give the same."""
         cases = {"threads": ((), 2), "skip": (("run.skip=false",), 1)}
         for kind, (settings, threads) in cases.items():
             if not self.wants("bits " + kind):
@@ -131,20 +97,22 @@ class Trial:
             if other.status != done.status:
                 self.found("bits " + kind, "status %d instead of %d: %s" % (other.status, done.status, other.first_line or done.first_line))
                 continue
-            difference = self.difference(out, folder)
-            if difference:
-                self.found("bits " + kind, difference)
+            words = difference(out, folder)
+            if words:
+                self.found("bits " + kind, words)
+        for kind in self.other_kinds():
+            self.findings += try_other(kind, self, out, done)
 
-    def difference(self, one, other):
-        if len(frames(one)) != len(frames(other)):
-            return "%d frames instead of %d" % (len(frames(other)), len(frames(one)))
-        for a, b in zip(frames(one), frames(other)):
-            fields, others = read(a)[0], read(b)[0]
-            for name in fields:
-                if not numpy.array_equal(fields[name], others[name], equal_nan=True):
-                    off = numpy.nanmax(numpy.abs(fields[name] - others[name]))
-                    return "%s of frame %s by %.3g of %.3g" % (name, os.path.basename(a), off, numpy.nanmax(numpy.abs(fields[name])))
-        return ""
+    def other_kinds(self):
+        kinds = kinds_for(self.scene, os.path.exists(self.ranks_library()), self.only == "memory" or self.others is None)
+        if self.only is not None:
+            return [kind for kind in kinds if kind == self.only or self.only == "others"]
+        if self.others is None:
+            return kinds
+        return random.Random(scene_text(self.scene)).sample(kinds, min(self.others, len(kinds)))
+
+    def ranks_library(self):
+        return os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(self.program))), "lib", "libperikit_mpi.so")
 
     # -- values -------------------------------------------------------------------------------------------------------------------------------
 
@@ -166,6 +134,8 @@ class Trial:
         parts = [rows[name] for name in ("strain_energy", "kinetic_energy", "dissipated_energy", "external_work")]
         if not self.conservative():
             return
+        if len(parts[0]) == 0:
+            return   # it ended before its first row
         total = parts[0] + parts[1] + parts[2] - parts[3]
         off = numpy.max(numpy.abs(total - total[0]))
         largest = max(numpy.max(numpy.abs(part)) for part in parts)
@@ -186,13 +156,13 @@ class Trial:
         scene = self.scene
         if any(section in scene for section in ("boundary", "load", "symmetry", "periodic")) or not self.conservative():
             return
-        with h5py.File(out + "/reference.h5") as file:
-            X, V, law = file["position"][()], file["volume"][()], file["material_id"][()].astype(int)
+        body = reference(out)
+        X, V, law = body["position"], body["volume"], body["material_id"].astype(int)
         laws = [scene["material"]] + [region["material"] for region in scene.get("region", [])]
         masses = V * self.densities(laws, law, X)
         states = []
         for path in frames(out):
-            fields, _ = read(path)
+            fields = read(path)[0]
             if "velocity" not in fields:
                 return
             states.append((X + fields["displacement"], fields["velocity"]))
