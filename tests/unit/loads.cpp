@@ -177,3 +177,26 @@ TEST_CASE("pressure that varies: force and moment of a hydrostatic wall, and of 
       CHECK(std::abs(work[0][0]) < 1e-10);
     }
 }
+
+TEST_CASE("pressure that varies: force and moments on a cloud under water") {
+  for (const char* kinematics : with_faces) {
+    if (std::string(kinematics).find("ordinary") != std::string::npos || std::string(kinematics).find("bond_based") != std::string::npos) continue;   // refused
+    INFO(kinematics);
+    const auto simulation = plate("x > -1", 0.2, "pressure = \"7*(5 - y) + 2*x\"", kinematics);
+    const Work work = virtual_work(*simulation);
+    // - int of d(p x_b)/dx_c over the body.
+    Work wanted{};
+    const Body& body = simulation->problem().body();
+    for (const std::int32_t index : body.internal()) {
+      const auto p = static_cast<std::size_t>(index);
+      const Point x = body.position(p);
+      const double slope[] = {2, -7}, pressure = 7 * (5 - x[1]) + 2 * x[0];
+      for (std::size_t c = 0; c < 2; ++c) {
+        wanted[c][0] -= body.volume(p) * slope[c];
+        for (std::size_t b = 0; b < 2; ++b) wanted[c][1 + b] -= body.volume(p) * (slope[c] * x[b] + (b == c ? pressure : 0));
+      }
+    }
+    for (std::size_t c = 0; c < 2; ++c)
+      for (std::size_t b = 0; b < 3; ++b) CHECK(work[c][b] == doctest::Approx(wanted[c][b]).epsilon(1e-11));
+  }
+}

@@ -91,6 +91,16 @@ void correct_total(const Body& body, const std::vector<std::uint8_t>& in_set, Su
   }
 }
 
+/// To the samples of the surface the places of the points that carry it.
+void add_points(const Body& body, SurfaceSamples& samples, std::size_t axis, SurfaceAreas& areas) {
+  for (const std::int32_t p : areas.points) {
+    samples.place.push_back(body.position(static_cast<std::size_t>(p)));
+    samples.weight.push_back(0);
+    samples.group.push_back(samples.end_group());
+  }
+  areas.samples[axis] = std::move(samples);
+}
+
 /// The free cell faces of the set, and the places of the points that carry them.
 void add_samples(const Body& body, const std::vector<std::uint8_t>& in_set, SurfaceAreas& areas) {
   const double area = body.uniform_volume() / body.spacing();
@@ -101,13 +111,24 @@ void add_samples(const Body& body, const std::vector<std::uint8_t>& in_set, Surf
     middle[axis] += 0.5 * sign * body.spacing();
     add_cell(body.dimension(), static_cast<int>(axis), middle, body.spacing(), sign * area, samples[axis]);
   });
+  for (std::size_t axis = 0; axis < static_cast<std::size_t>(body.dimension()); ++axis) add_points(body, samples[axis], axis, areas);
+}
+
+/// Of the whole surface of a cloud, whose faces nobody knows: by Gauss's theorem the integral of f n over it is that of grad f over the body. Cells of points have
+/// two faces across each axis; where those of neighbours meet they cancel, and what is left is exact for linear pressures and their first moments.
+void add_cells(const Body& body, SurfaceAreas& areas) {
+  const double side = body.spacing();
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(body.dimension()); ++axis) {
-    for (const std::int32_t p : areas.points) {
-      samples[axis].place.push_back(body.position(static_cast<std::size_t>(p)));
-      samples[axis].weight.push_back(0);
-      samples[axis].group.push_back(samples[axis].end_group());
-    }
-    areas.samples[axis] = std::move(samples[axis]);
+    SurfaceSamples samples;
+    for (const std::int32_t p : body.owned())
+      for (const double sign : {-1.0, 1.0}) {
+        Point x = body.position(static_cast<std::size_t>(p));
+        x[axis] += 0.5 * sign * side;
+        samples.place.push_back(x);
+        samples.weight.push_back(sign * body.volume(static_cast<std::size_t>(p)) / side);
+        samples.end_group();
+      }
+    add_points(body, samples, axis, areas);
   }
 }
 
@@ -148,6 +169,7 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
   for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
   if (body.lattice() && !images) correct_total(body, in_set, found);
   if (body.lattice()) add_samples(body, in_set, found);
+  else if (!images && counted(std::ssize(surface)).all == counted(chosen).all) add_cells(body, found);
   return found;
 }
 

@@ -16,7 +16,7 @@ namespace perikit {
 struct SurfaceAreas {
   std::vector<std::int32_t> points;
   std::vector<Point> area;
-  std::array<std::optional<SurfaceSamples>, 3> samples;  ///< of the faces across each axis, where they are known
+  std::array<std::optional<SurfaceSamples>, 3> samples;  ///< of the faces across each axis, or of the whole surface, where they are known
 };
 
 /// What of the free surface each point has that lies nearest to a surface point of the load's set, or (face) of that side of the

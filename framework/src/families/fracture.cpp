@@ -331,8 +331,7 @@ void Fracture::lower(const std::vector<BondChange>& changes, ConstFieldView at, 
   if (evaluates) {
     // All of them are known now, and those of fragments fall together with those that made them so: between them points that are about to go may be turned
     // inside out.
-    std::ranges::reverse(before);
-    families_.raise(before);
+    take_back(before, body);
     marks = dependent_on(ends, body);
     if (force.data) fill(0.0, part);
     stored = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit

@@ -22,7 +22,9 @@ RitzValue largest_ritz_value(const std::vector<double>& alpha, const std::vector
   const auto order = static_cast<Eigen::Index>(alpha.size());
   const Eigen::Map<const Eigen::VectorXd> diagonal(alpha.data(), order), off(beta.data(), order - 1);
   // The solver compares squares of the entries beside the diagonal with entries on it: both are to be of order 1.
-  const double unit = power_of_two(diagonal.cwiseAbs().maxCoeff());
+  double largest = 0;
+  for (const double entry : alpha) largest = std::max(largest, std::abs(entry));
+  const double unit = power_of_two(largest);
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
   ritz.computeFromTridiagonal(diagonal / unit, off / unit);
   return {unit * ritz.eigenvalues()(order - 1), next * std::abs(ritz.eigenvectors()(order - 1, order - 1))};
