@@ -149,7 +149,10 @@ class Builder {
   Stencil bond_stencil(int i, int j) {
     if (description_.name == "baqp") return projected(i, j, own_gradient(i), own_gradient(j));
     if (description_.name == "projection") return projected(i, j, own_gradient(i), own_gradient(i));
-    const double limit = description_.name == "bond_augmented" ? description_.singular : description_.poor;   // it holds the whole family
+    const auto omega = [&](int k) { return cloud_.intact(i, k) * cloud_.omega(i, k); };
+    const double limit = description_.name == "bond_augmented"   // it holds the whole family
+                             ? description_.singular
+                             : std::max(description_.poor, description_.domain * eigenvalue_ratio(cloud_, i, family_, omega));
     Stencil g = kernel_gradient(cloud_, i, 1, limit, family_,
                                 [&](int k) { return cloud_.intact(i, k) * bond_influence(i, j, k); });
     whole_ = g.empty();

@@ -57,6 +57,7 @@ struct Description {
   double poor = 1e-3;
   /// A part's must moreover not be below this share of the family's own fraction: a needle in a family that is none.
   double part = 0.05;
+  double domain = 0.02;   ///< likewise of a domain's
 };
 
 /// g_k of the points k that move the gradient, ascending in k: H = sum_k u_k (x) g_k. Empty: dead, H = 0.

@@ -56,8 +56,8 @@ std::string scene_text(const BodyOptions& o, const std::string& kinematics) {
   if (d == 1) text += fmt::format("line = \"{}\"\narea = {:.17g}\n", o.plane == "stress" ? "stress" : "strain", 1.5 * o.scale * o.scale);
   text += fmt::format("[body.lattice]\nspacing = {:.17g}\nlower = {}\nupper = {}\n", o.scale, vector([](int) { return 0.0; }),
                       vector([&](int a) { return o.scale * cells[static_cast<std::size_t>(a)]; }));
-  // Points of a tongue on a cloud lie on a line, but for their last digits.
-  if (o.cloud) text += fmt::format("jitter = {}\nseed = 7\n", o.tongues ? 1e-9 : 0.25);
+  // Points of a tongue on a cloud lie on a line, but for a millionth of the spacing.
+  if (o.cloud) text += fmt::format("jitter = {}\nseed = {}\n", o.tongues ? 1e-6 : 0.25, o.tongues ? 8 : 7);
   if (o.tongues) {
     const char* const rod = d == 2 ? "abs(y - 3.5*{0:.17g}) < 0.4*{0:.17g}" : "abs(y - 2.5*{0:.17g}) < 0.4*{0:.17g} && abs(z - 1.5*{0:.17g}) < 0.4*{0:.17g}";
     const char* const flange = d == 2 ? "" : " || (y > 3*{0:.17g} && abs(z - 1.5*{0:.17g}) < 0.4*{0:.17g})";

@@ -28,6 +28,11 @@ std::vector<BodyOptions> bodies() {
         all.push_back(body);
       }
   for (const BodyOptions& body : bodies_with_tongues()) all.push_back(body);
+  BodyOptions lean;   // small families on a cloud: domains of bonds, and parts, that are needles
+  lean.cloud = true;
+  lean.cells = 6;
+  lean.horizon_ratio = 1.515;
+  all.push_back(lean);
   return all;
 }
 
@@ -43,7 +48,9 @@ TEST_CASE("kinematics: agrees with the dense reference") {
       continue;
     }
     for (const BodyOptions& options : bodies()) {
-      INFO(fmt::format("{} ({}) {}D {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice",
+      const int order = description->base ? description->base->order : description->order;
+      if (options.cloud && options.horizon_ratio < 2 && order > 1) continue;   // hardly any point has bonds enough for it
+      INFO(fmt::format("{} ({}) {}D {} m = {}{}", example.part, example.table, options.dimension, options.cloud ? "cloud" : "lattice", options.horizon_ratio,
                        options.crack ? " cracked" : options.tongues ? " with tongues" : ""));
       const auto simulation = build(scene_text(options, kinematics_table(example)));
       BodyProblem& problem = simulation->problem();

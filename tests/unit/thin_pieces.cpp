@@ -12,16 +12,19 @@ using namespace perikit;
 
 namespace {
 
+std::string scene_of(int dimension, const std::string& body, const std::string& kinematics = "type = \"baqp\"", const std::string& further = "") {
+  return fmt::format(
+      "format = 1\n[body]\ndimension = {}\n{}{}[family]\nhorizon_ratio = 2.015\n[kinematics]\n{}\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\n"
+      "poisson_ratio = 0.25\n{}[integrator]\ntype = \"evaluate\"\n",
+      dimension, dimension == 2 ? "plane = \"stress\"\n" : "", body, kinematics, further);
+}
+
 /// What is said against a body; empty: nothing.
 std::string refusal(int dimension, const std::string& body, const std::string& kinematics = "type = \"baqp\"", const std::string& further = "") {
   static Registry registry;
   if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  const std::string text = fmt::format(
-      "format = 1\n[body]\ndimension = {}\n{}{}[family]\nhorizon_ratio = 2.015\n[kinematics]\n{}\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\n"
-      "poisson_ratio = 0.25\n{}[integrator]\ntype = \"evaluate\"\n",
-      dimension, dimension == 2 ? "plane = \"stress\"\n" : "", body, kinematics, further);
   try {
-    Simulation(parse_scene(text, "thin.toml", registry), registry);
+    Simulation(parse_scene(scene_of(dimension, body, kinematics, further), "thin.toml", registry), registry);
     return "";
   } catch (const InputError& error) {
     return error.what();
@@ -70,6 +73,16 @@ TEST_CASE("clouds one point thick and pieces that are, beside thick ones, are re
   CHECK(has(cloud, "dimension = 2, plane = \"stress\", thickness = ..."));
   const std::string piece = refusal(2, lattice("12, 12", "inside = \"y < 4 || y > 11\"\n"));
   CHECK(has(piece, "found a piece of the body, at (0.5, 11.5, 0), in 2 dimensions that is one point thick along y (12 such points)"));
+}
+
+TEST_CASE("chips beside a body are warned of") {
+  const std::string chip = "inside = \"y < 18 || (y > 20 && x < 2)\"\n";   // two points of 380
+  Registry registry;
+  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  CHECK(refusal(2, lattice("21, 21", chip)).empty());
+  Simulation simulation(parse_scene(scene_of(2, lattice("21, 21", chip)), "chip.toml", registry), registry);
+  CHECK(has(simulation.summary(), "warning       2 points in pieces that are one point thick, 0.0053 of the volume of the body, the first one at (0.5, 20.5, 0)"));
+  CHECK(has(refusal(2, lattice("21, 21", "inside = \"y < 18 || (y > 20 && x < 6)\"\n")), "found a piece of the body, at (0.5, 20.5, 0)"));
 }
 
 TEST_CASE("bodies that are thick somewhere, and single points, are not refused") {

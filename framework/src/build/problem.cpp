@@ -226,7 +226,8 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   refuse_order(scene, of_terms.formulation, *parts.families);
   const auto ghosts = partition ? std::make_unique<Ghosts>(*partition, 1) : nullptr;
-  refuse_thin_pieces(scene, *parts.families, ghosts.get());
+  std::vector<std::string> warnings;
+  refuse_thin_pieces(scene, *parts.families, ghosts.get(), warnings);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;

@@ -9,6 +9,7 @@
 #include "core/symmetric_matrix.hpp"
 #include "families/shape_tensor.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/exact_sum.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -132,9 +133,18 @@ std::string remedy(const Scene& scene, const ThinPoint& point, double spacing) {
   return fmt::format("dimension = 1, {}, or several points across", section("area", point.volume / spacing));
 }
 
+/// Chips that `inside` cuts off at the edge of a body are no part of what it was built for: pieces with up to this share of its volume, all together.
+constexpr double share_of_chips = 0.01;
+
+double volume_of(const Body& body, std::span<const std::int32_t> points) {
+  ExactSum sum;
+  for (const std::int32_t p : points) sum.add(body.volume(static_cast<std::size_t>(p)));
+  return total_over_ranks(sum);
+}
+
 }  // namespace
 
-void refuse_thin_pieces(const Scene& scene, const Families& families, Ghosts* ghosts) {
+void refuse_thin_pieces(const Scene& scene, const Families& families, Ghosts* ghosts, std::vector<std::string>& warnings) {
   const Body& body = families.body();
   if (body.dimension() == 1 || !communicator().complete()) return;
   if (families.needs().shapes && communicator().largest(static_cast<double>(families.singular())) == 0) return;
@@ -146,6 +156,13 @@ void refuse_thin_pieces(const Scene& scene, const Families& families, Ghosts* gh
   if (!mine.empty()) firsts.push_back(thin_point(families, *std::ranges::min_element(mine, {}, number)));
   firsts = told_to_all(gathered<ThinPoint>(firsts));
   const ThinPoint first = *std::ranges::min_element(firsts, {}, &ThinPoint::number);
+  const double share = volume_of(body, mine) / volume_of(body, body.owned());
+  if (share <= share_of_chips) {
+    warnings.push_back(fmt::format("{} points in pieces that are one point thick, {:.2g} of the volume of the body, the first one at ({:.6g}, {:.6g}, {:.6g}): no "
+                                   "bond joins them to the rest, and what they store depends on the kinematics, not on the material; `inside` may leave them out",
+                                   count.all, share, first.x[0], first.x[1], first.x[2]));
+    return;
+  }
   const bool whole = count.all == static_cast<std::int64_t>(body.points_of_all_ranks());
   throw InputError(
       scene.body.position, "body.dimension",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 #include "families/cloud_rows.hpp"
 #include "families/shape_tensor.hpp"
@@ -121,7 +122,7 @@ void CloudFamilies::make_room() {
   integrity_.assign(lists_.neighbour.size(), 1.0);
   whole_ = omega_;
   left_.assign(n, 1.0);
-  support_.assign(n, 1.0);
+  fragment_.assign(n, 0);
   intact_.assign(n, 0.0);
   const Row* position = positions(body_);
   for (std::size_t p = 0; p < n; ++p)
@@ -151,7 +152,10 @@ void CloudFamilies::renew(std::size_t p) {
   if (!needs_.shapes) return;
   for (const CutBond& bond : cut_bonds(p)) add_shape<D>(bond.omega * position[bond.far][3], position[bond.far] - position[p], uncut);
   invert_shape(D, K, &inverse_[6 * p], &condition_[p]);
-  support_[p] = shape_support(D, K, uncut);
+  fragment_[p] = left_[p] < 1 && shape_support(D, K, uncut) < least_support;
+  if (!fragment_[p]) return;
+  std::fill_n(&inverse_[6 * p], 6, 0.0);
+  condition_[p] = std::numeric_limits<double>::infinity();
 }
 
 std::vector<std::int32_t> CloudFamilies::set_bonds(std::span<const BondChange> changes) {
@@ -228,6 +232,7 @@ void CloudFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) const 
     sqrt(square).store(out.length.data() + k);
   }
   if (needs_.shapes) std::copy_n(&inverse_[6 * p], 6, out.inverse_shape);
+  out.fragment = is_fragment(p);
 }
 
 void CloudFamilies::load_broken(std::size_t p, BondsOf which, FamilyArrays& out) const {
@@ -272,10 +277,10 @@ void CloudFamilies::mark(std::span<const std::int32_t> points, GroupMarks& marks
 
 std::size_t CloudFamilies::bytes() const noexcept {
   std::size_t doubles = 0;
-  for (const auto* values : {&omega_, &inverse_, &condition_, &volumes_, &influences_, &damage_, &integrity_, &whole_, &intact_, &left_, &support_})
+  for (const auto* values : {&omega_, &inverse_, &condition_, &volumes_, &influences_, &damage_, &integrity_, &whole_, &intact_, &left_})
     doubles += values->size();
   return lists_.neighbour.size() * sizeof(std::int32_t) + lists_.first.size() * sizeof(std::int64_t) + doubles * sizeof(double) +
-         cuts_.size() * sizeof(CutBond);
+         cuts_.size() * sizeof(CutBond) + fragment_.size();
 }
 
 }  // namespace perikit

@@ -52,7 +52,7 @@ class CloudFamilies final : public Families {
   std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend_bonds() override;
   void make_room() override;
-  double support(std::size_t p) const noexcept override { return support_[p]; }
+  bool is_fragment(std::size_t p) const noexcept override { return !fragment_.empty() && fragment_[p]; }
 
   struct CutBond {
     std::int32_t point, far;
@@ -68,7 +68,8 @@ class CloudFamilies final : public Families {
   AlignedVector<double> damage_;
   // Where bonds may fail: by bond, and by point.
   AlignedVector<double> integrity_, whole_;       ///< b; omega where it is not b omega
-  AlignedVector<double> intact_, left_, support_; ///< sum omega V_j at the set-up, the share of it that is left; of K
+  AlignedVector<double> intact_, left_;           ///< sum omega V_j at the set-up, the share of it that is left
+  std::vector<std::uint8_t> fragment_;            ///< is_fragment
 };
 
 }  // namespace perikit

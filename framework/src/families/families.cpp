@@ -61,7 +61,7 @@ std::vector<BondId> Families::fragment_bonds(std::span<const std::int32_t> point
   std::vector<BondId> bonds;
   FamilyArrays family;
   for (const std::int32_t p : points) {
-    if (!needs_.shapes || support(static_cast<std::size_t>(p)) >= least_support) continue;
+    if (!needs_.shapes || !is_fragment(static_cast<std::size_t>(p))) continue;
     load(static_cast<std::size_t>(p), BondsOf::intact, family);
     for (const std::int32_t far : family.far) bonds.push_back(BondId::of(p, far));
   }

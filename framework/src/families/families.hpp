@@ -98,8 +98,8 @@ class Families {
   virtual std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) = 0;
   virtual std::vector<std::int32_t> mend_bonds() = 0;
   virtual void make_room() = 0;
-  /// What the bonds left to a point support of its uncut shape tensor: see shape_support.
-  virtual double support(std::size_t p) const noexcept = 0;
+  /// Whether bonds that failed have left the point with less than least_support of its uncut shape tensor.
+  virtual bool is_fragment(std::size_t p) const noexcept = 0;
 
   const Body& body_;
   std::shared_ptr<const InfluenceFunction> influence_;

@@ -35,7 +35,7 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
 }
 
 int point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
-  if (order > 1) return reproducing_kernel(family, horizon, order, g);
+  if (order > 1 && !family.fragment) return reproducing_kernel(family, horizon, order, g);
   const int d = family.dimension;
   g.assign(static_cast<std::size_t>(family.bonds * d), 0.0);
   for (int k = 0; k < family.bonds; ++k)

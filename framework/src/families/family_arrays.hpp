@@ -18,7 +18,8 @@ struct FamilyArrays {
   AlignedVector<double> integrity, whole;  ///< b, and omega without it, where some bond of the family is not whole; else empty
   std::vector<std::int32_t> far;    ///< internal indices
   std::int32_t owner = -1;          ///< likewise; -1: of a class of points
-  double inverse_shape[6] = {};     ///< K^-1; 0 where singular
+  double inverse_shape[6] = {};     ///< K^-1; 0 where the point has no gradient
+  bool fragment = false;            ///< failed bonds have left too little for any gradient, of the point or of parts of its family
 
   double whole_omega(std::size_t k) const noexcept { return whole.empty() ? omega[k] : whole[k]; }
   double b(std::size_t k) const noexcept { return integrity.empty() ? 1.0 : integrity[k]; }

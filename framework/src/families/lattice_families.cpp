@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 
@@ -44,8 +45,17 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
     const auto weight = [&](std::size_t s) { return live_mask[s] >> l & 1 ? p.b(s, l) * slots.omega[s] : 0.0; };
     for (std::size_t s = 0; s < slots.half; ++s)
       for (int a = 0; a < d; ++a) moment[a] += (weight(s) - weight(slots.reverse(s))) * slots.offsets[s][static_cast<std::size_t>(a)];
-    const bool invertible = invert_shape(d, K, inverse, &condition), regular = needs_.shapes ? invertible : intact_omega > 0;
-    p.singular = static_cast<std::uint8_t>((p.singular & ~(1u << l)) | (live && !regular ? 1u << l : 0u));
+    if (set_up) p.intact_at_set_up[l] = intact_omega;
+    p.left[l] = p.intact_at_set_up[l] > 0 ? intact_omega / p.intact_at_set_up[l] : 1.0;
+    const bool fragment = live && needs_.shapes && p.left[l] < 1 && shape_support(d, K, uncut) < least_support;
+    const bool invertible = invert_shape(d, K, inverse, &condition) && !fragment, regular = needs_.shapes ? invertible : intact_omega > 0;
+    if (fragment) {
+      std::fill_n(inverse, 6, 0.0);
+      condition = std::numeric_limits<double>::infinity();
+    }
+    const auto mark = [l](std::uint8_t& lanes, bool marked) { lanes = static_cast<std::uint8_t>((lanes & ~(1u << l)) | (marked ? 1u << l : 0u)); };
+    mark(p.singular, live && !regular);
+    mark(p.fragment, fragment);
     for (int c = 0; c < 6; ++c) p.inverse[c][l] = live ? inverse[c] : 0.0;
     for (int c = 0; c < 3; ++c) p.moment[c][l] = live ? moment[c] : 0.0;
     const double share = live_omega > 0 ? intact_omega / live_omega : 0.0;
@@ -54,9 +64,6 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
     p.scale[0][l] = live && volumes > 0 ? volume / volumes : 0.0;
     p.scale[1][l] = live && influences > 0 ? volume / influences : 0.0;
     p.condition[l] = live ? condition : 0.0;
-    if (set_up) p.intact_at_set_up[l] = intact_omega;
-    p.left[l] = p.intact_at_set_up[l] > 0 ? intact_omega / p.intact_at_set_up[l] : 1.0;
-    p.support[l] = irregular ? shape_support(d, K, uncut) : 1.0;
   }
 }
 
@@ -128,6 +135,7 @@ std::vector<std::uint16_t> LatticeFamilies::intact_slots(const LatticePattern& p
 
 void LatticeFamilies::load(std::span<const std::uint16_t> of, FamilyArrays& out) const {
   out.resize(grid.dimension, static_cast<int>(of.size()));
+  out.fragment = false;
   out.integrity.clear();
   out.whole.clear();
   for (std::size_t k = 0; k < of.size(); ++k) {
@@ -157,6 +165,7 @@ void LatticeFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) cons
   out.owner = static_cast<std::int32_t>(p);
   for (std::int32_t& far : out.far) far += out.owner;
   inverse_shape(now, lane, out.inverse_shape);
+  out.fragment = is_fragment(p);
   if (!broken) return;
   out.whole = out.omega;
   out.integrity.assign(out.size, 1.0);

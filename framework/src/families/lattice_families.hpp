@@ -25,10 +25,10 @@ struct LatticePattern {
   alignas(64) double condition[chunk_points];  ///< of K
   alignas(64) double intact_at_set_up[chunk_points];   ///< sum omega over its bonds then
   alignas(64) double left[chunk_points];       ///< the share of it that is left
-  alignas(64) double support[chunk_points];    ///< of K relative to that of the whole family; 1 where nothing is broken
   std::uint8_t live = 0xff;
   std::uint8_t irregular = 0;                  ///< lanes with bonds that are not whole
-  std::uint8_t singular = 0;                   ///< live lanes without a regular K
+  std::uint8_t singular = 0;                   ///< live lanes without a gradient
+  std::uint8_t fragment = 0;                   ///< those of them that failed bonds have left without
 
   bool intact(std::size_t slot, int lane) const noexcept { return mask[slot] >> lane & 1; }
   double b(std::size_t slot, int lane) const noexcept {
@@ -95,7 +95,7 @@ class LatticeFamilies final : public Families {
   std::vector<std::int32_t> set_bonds(std::span<const BondChange> changes) override;
   std::vector<std::int32_t> mend_bonds() override;
   void make_room() override {}
-  double support(std::size_t p) const noexcept override { return pattern_at(p).support[p % chunk_points]; }
+  bool is_fragment(std::size_t p) const noexcept override { return pattern_at(p).fragment >> p % chunk_points & 1; }
 
   struct Owned {
     std::int32_t chunk, original;              ///< its pattern at the set-up

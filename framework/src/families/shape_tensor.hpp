@@ -22,6 +22,10 @@ inline constexpr double poor_ratio = 1e-3;
 /// lattices, also one layer below a surface and at a horizon of five spacings, spread by less.
 inline constexpr double part_ratio = 0.05;
 
+/// The same of domains of bonds, which lie ahead of their point and are leaner than parts: those of a lattice, the smallest ones of half a horizon
+/// too, spread by less.
+inline constexpr double domain_ratio = 0.02;
+
 /// Smallest eigenvalue of K over the largest one; 0 where K is zero.
 double eigenvalue_ratio(int d, const double* K);
 
@@ -32,8 +36,9 @@ bool invert_shape(int d, const double* K, double* inverse, double* condition = n
 /// `whole`, in [0, 1]. 0 where either is singular.
 double shape_support(int d, const double* K, const double* whole);
 
-/// A point whose family is left with less support than this is a fragment: it loses its other bonds too. The family of a corner keeps 1/4 in
-/// a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure.
+/// A point whose family is left with less support than this is a fragment: it has no gradient, and loses its other bonds too. The family of a corner
+/// keeps 1/4 in a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure: they lie almost on
+/// a line, and would magnify what they see a thousand times as long as they fade, or for good where they may not fail.
 inline constexpr double least_support = 0.1;
 
 }  // namespace perikit

@@ -183,7 +183,7 @@ void LocalStencil<D>::invert_all(double ratio) {
 }
 
 template <int D>
-double LocalStencil<D>::least_part_ratio(const FamilyArrays& family) const {
+double LocalStencil<D>::least_ratio(const FamilyArrays& family, double beside) const {
   double whole[6] = {};
   for (int a = 0; a < D; ++a)
     for (int b = a; b < D; ++b) {
@@ -193,7 +193,7 @@ double LocalStencil<D>::least_part_ratio(const FamilyArrays& family) const {
                  Pack::load(family.xi[b].data() + k);
       whole[symmetric_index(D, a, b)] = sum(total);
     }
-  return std::max(poor_ratio, part_ratio * eigenvalue_ratio(D, whole));
+  return std::max(poor_ratio, beside * eigenvalue_ratio(D, whole));
 }
 
 template <int D>
@@ -280,13 +280,20 @@ void LocalStencil<D>::make(const StencilRules& rules, const FamilyArrays& family
   const auto use_family = [&](int q) {
     std::copy_n(family.omega.data(), row_, row(q));
     multiply(q, q + 1);
-    invert_one(q, singular_ratio);
+    if (!family.fragment) invert_one(q, singular_ratio);
   };
   weigh(rules, family, row(first));
   if (first == 1) std::copy_n(family.omega.data(), row_, row(0));
   multiply(0, points_);
-  invert_all(by_bond ? poor_ratio : least_part_ratio(family));
+  // The ratio of a family is at most 1: most domains need not ask for it.
+  if (by_bond) invert_all(domain_ratio);
+  if (!by_bond || std::find(regular_.begin() + first, regular_.begin() + points_, 0) != regular_.begin() + points_)
+    invert_all(least_ratio(family, by_bond ? domain_ratio : part_ratio));
   if (first == 1 && !regular_[0]) invert_one(0, singular_ratio);
+  if (family.fragment) {
+    std::ranges::fill(regular_, std::uint8_t{0});
+    std::ranges::fill(inverse_, 0.0);
+  }
   double total = 0;
   for (int q = first; q < points_; ++q) {
     double& share = share_[static_cast<std::size_t>(q)];

@@ -78,8 +78,8 @@ class LocalStencil {
   void invert_one(int q, double ratio);
   void invert_all(double ratio);
   void set_tested(const FamilyArrays& family, double family_volume, int first);
-  /// What the eigenvalues of a part's K must not spread beyond: part_ratio times those of the family, or poor_ratio.
-  double least_part_ratio(const FamilyArrays& family) const;
+  /// What the eigenvalues of the K of a part or domain must not spread beyond: `beside` times those of the family, or poor_ratio.
+  double least_ratio(const FamilyArrays& family, double beside) const;
 
   int bonds_ = 0, points_ = 0, fallbacks_ = 0, dropped_ = 0;
   std::size_t row_ = 0;            ///< padded(bonds)
