@@ -20,7 +20,8 @@ namespace {
 /// lets them drift.
 class Stepper final : private PointMotion {
  public:
-  explicit Stepper(Problem& problem)
+  /// goes_on: the state has the loads of its last step. They act on the surface as it was before bonds failed in that step.
+  Stepper(Problem& problem, bool goes_on)
       : PointMotion(problem.body().stride()),
         problem_(problem),
         state_(problem.state()),
@@ -32,7 +33,7 @@ class Stepper final : private PointMotion {
         uniform_(problem.masses().uniform()),
         loaded_(problem.loads().any()),
         external_(loaded_ ? state_.external_force() : FieldView{}) {
-    if (loaded_) load();
+    if (loaded_ && !goes_on) load();
   }
 
   /// Loads at the present state.
@@ -269,7 +270,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
     planned_ = {};
   }
-  Stepper stepper(problem);
+  Stepper stepper(problem, !fresh);
   const FieldView v = state.velocity();
   Field speeds = problem.constraints().any() ? problem.make_field() : Field();
   Field old_external = stepper.loaded() && problem.loads().depend_on_time() ? problem.make_field() : Field();

@@ -6,6 +6,24 @@
 
 using namespace perikit::test;
 
+namespace {
+
+/// A run that is stopped after this many rows of history and goes on has the last frame and the history of one without a stop.
+void goes_on_alike(const std::string& scene, std::size_t rows) {
+  const Desk desk(scene);
+  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
+  CHECK(stop_after(desk, "out", rows, SIGTERM) == 1);
+  const Result last = desk.perikit("run scene.toml --resume -o out");
+  CHECK_MESSAGE(last.status == 0, last.err);
+  CHECK(contains(last.out, "resumed after step"));
+  for (const std::string file : {"/frames/00000003.h5", "/history.csv"}) {
+    const bool same = desk.text("out" + file) == desk.text("whole" + file);
+    CHECK_MESSAGE(same, file, " differs");
+  }
+}
+
+}  // namespace
+
 TEST_CASE("resume: killed at any moment, again and again, a run ends as without a stop") {
   const Desk desk(long_plate());
   REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
@@ -84,16 +102,91 @@ frames = 3
 history_every = 1
 fields = ["displacement", "velocity", "damage"]
 )toml";
-  const Desk desk(scene);
-  REQUIRE(desk.perikit("run scene.toml --quiet -o whole").status == 0);
-  CHECK(stop_after(desk, "out", 60, SIGTERM) == 1);
-  const Result last = desk.perikit("run scene.toml --resume -o out");
-  CHECK_MESSAGE(last.status == 0, last.err);
-  CHECK(contains(last.out, "resumed after step"));
-  CHECK(desk.text("out/frames/00000003.h5") == desk.text("whole/frames/00000003.h5"));
-  CHECK(lines(desk.text("out/history.csv")).back() == lines(desk.text("whole/history.csv")).back());
-  const bool same = desk.text("out/history.csv") == desk.text("whole/history.csv");
-  CHECK(same);
+  goes_on_alike(scene, 60);
+}
+
+TEST_CASE("resume: points whose bonds have all failed keep what their laws remember") {
+  const std::string scene = R"toml(format = 1
+[body]
+dimension = 2
+plane = "stress"
+[body.lattice]
+spacing = 0.25
+lower = [-3.0, 0.0]
+upper = [-1.0, 2.0]
+[initial]
+velocity = ["1.8*sin(-1.0849*x - 1.4273*y + 2.63)", "1.6*sin(1.3494*x - 1.3491*y + 3.42)"]
+[family]
+horizon_ratio = 2.015
+[kinematics]
+type = "conventional"
+stabilization = "silling"
+[material]
+type = "hypoelastic"
+density = 127.877
+youngs_modulus = 2335.36
+poisson_ratio = 0.3
+[damage]
+type = "critical_stretch"
+stretch = 0.06
+[integrator]
+type = "verlet"
+end_time = 0.8
+safety = 0.5
+[output]
+frames = 3
+history_every = 1
+fields = ["displacement", "damage", "deformation_gradient", "first_piola"]
+)toml";
+  for (const std::string jitter : {"0.0", "0.2"}) {
+    CAPTURE(jitter);
+    goes_on_alike(replaced(scene, "spacing = 0.25", "spacing = 0.25\njitter = " + jitter), 20);
+  }
+}
+
+TEST_CASE("resume: a pressure acts on the surface as it was before bonds failed in the last step") {
+  goes_on_alike(R"toml(format = 1
+[body]
+dimension = 3
+[body.lattice]
+spacing = 3.0
+lower = [-15.0, 0.0, 0.0]
+upper = [-3.0, 15.0, 12.0]
+[sets]
+low = "z < 3.003"
+high = "z > 8.997"
+[family]
+horizon = 6.045
+[kinematics]
+type = "baqp"
+[material]
+type = "linear_elastic"
+youngs_modulus = 2.07e9
+poisson_ratio = 0.3
+density = 9513.0
+[damage]
+type = "max_stress"
+strength = 9.5e7
+no_fail = ["high"]
+[initial]
+velocity = ["43*sin(0.064*x - 0.116*y + 0.239*z + 3.32)", "23*sin(0.174*x - 0.095*y - 0.181*z + 0.999)", "25*sin(-0.033*x + 0.074*y + 0.26*z + 5.19)"]
+[[boundary]]
+set = "low"
+displacement = [0.0, 0.0, 0.0]
+[[load]]
+set = "high"
+pressure = -95.0e6
+face = "+z"
+follower = true
+[integrator]
+type = "verlet"
+end_time = 0.022
+safety = 0.1
+[output]
+frames = 3
+history_every = 1
+)toml",
+                8);
 }
 
 TEST_CASE("resume: another scene is refused with what differs") {

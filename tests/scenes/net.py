@@ -12,6 +12,8 @@ import shutil
 import sys
 import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 
 from coverage import features, wanted
 from generate import Generator, read_wishes
@@ -80,7 +82,7 @@ def try_kept(program, tables, work, folder, name, options):
     add up to a share of the largest. Returns findings."""
     with open(os.path.join(folder, name)) as file:
         text = file.read()
-    trial = Trial(program, tables, os.path.join(work, name), tomllib.loads(text), options.only, options.others)
+    trial = Trial(program, tables, os.path.join(work, name), tomllib.loads(text), options.only, others=0)
     findings = trial.try_scene()
     if trial.status != 0:
         return findings + [("status %d" % trial.status, trial.words[:300])]
@@ -93,6 +95,39 @@ def try_kept(program, tables, work, folder, name, options):
         if trial.imbalance > float(share):
             findings.append(("energy", "off by %.2g of the largest, more than %s" % (trial.imbalance, share)))
     return findings
+
+
+@dataclass
+class Tried:
+    outcome: str
+    refusals: list
+    findings: list = field(default_factory=list)
+    features: list = field(default_factory=list)
+    small: str = ""   # a scene that fails in the same way
+
+
+def try_seed(tables, options, seed, wishes):
+    folder = "%s/%d" % (options.folder, seed)
+    scene, refusals, checked = repaired(options.program, folder, Generator(tables, seed, options.explicit, wishes).scene())
+    if scene is None:
+        shutil.rmtree(folder, ignore_errors=True)
+        return Tried("refused" if checked.status in (0, 2) else "check ends with %d" % checked.status, refusals)
+    trial = Trial(options.program, tables, folder, scene, options.only, None if options.all_others else options.others)
+    findings = trial.try_scene()
+    tried = Tried("status %d" % trial.status, refusals, findings, features(scene))
+    if trial.status == 1:
+        tried.outcome += ": " + without_digits(trial.words.split(": ", 1)[-1])[:110]
+    if findings:
+        kind, words = findings[0]
+        tried.outcome = "FAILED " + kind
+        small = scene if options.no_shrink else smaller(options.program, tables, folder + "_small", scene, kind)
+        write_scene(small, "%s/failing/%d" % (options.folder, seed))
+        with open("%s/failing/%d/finding" % (options.folder, seed), "w") as file:
+            file.write("%s: %s\n" % (kind, words))
+        tried.small = scene_text(small)
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(folder + "_small", ignore_errors=True)
+    return tried
 
 
 def read_seeds(path):
@@ -115,6 +150,7 @@ def main():
     parser.add_argument("--only", help="kinds of findings that begin so: what they do not need is not run")
     parser.add_argument("--others", type=int, default=2, help="how many other runs of a scene (ranks, kills, mirrored ...) are tried")
     parser.add_argument("--all-others", action="store_true")
+    parser.add_argument("--jobs", type=int, default=1, help="scenes at a time")
     parser.add_argument("--no-shrink", action="store_true")
     options = parser.parse_args()
     tables = read_tables(options.program)
@@ -136,42 +172,21 @@ def main():
             print("FAILED  %s: %s: %s" % (name, kind, words), flush=True)
         failed += [name] if findings else []
         kinds["FAILED, kept" if findings else "status 0, kept"] += 1
-    for seed, wishes in cases:
-        if seed in done:
-            continue
-        folder = "%s/%d" % (options.folder, seed)
-        scene = Generator(tables, seed, options.explicit, wishes).scene()
-        scene, refusals, checked = repaired(options.program, folder, scene)
-        for words in refusals:
-            refused[without_digits(words.split(": ", 1)[-1])[:160]] += 1
-        if scene is None:
-            outcome = "refused"
-            if checked.status not in (0, 2):
-                outcome = "check ends with %d" % checked.status
-        else:
-            trial = Trial(options.program, tables, folder, scene, options.only, None if options.all_others else options.others)
-            findings = trial.try_scene()
-            outcome = "status %d" % trial.status
-            if trial.status == 1:
-                outcome += ": " + without_digits(trial.words.split(": ", 1)[-1])[:110]
-            for kind, words in findings:
+    with ThreadPoolExecutor(options.jobs) as pool:
+        cases = [(seed, wishes) for seed, wishes in cases if seed not in done]
+        for (seed, _), tried in zip(cases, pool.map(lambda case: try_seed(tables, options, *case), cases)):
+            for words in tried.refusals:
+                refused[without_digits(words.split(": ", 1)[-1])[:160]] += 1
+            for kind, words in tried.findings:
                 print("FAILED  seed %d: %s: %s" % (seed, kind, words), flush=True)
-            if not findings and not options.only:
-                covered.update(features(scene))
-            if findings:
+            if tried.findings:
                 failed.append(seed)
-                kind, words = findings[0]
-                outcome = "FAILED " + kind
-                small = scene if options.no_shrink else smaller(options.program, tables, folder + "_small", scene, kind)
-                write_scene(small, "%s/failing/%d" % (options.folder, seed))
-                with open("%s/failing/%d/finding" % (options.folder, seed), "w") as file:
-                    file.write("%s: %s\n" % (kind, words))
-                print(scene_text(small), flush=True)
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.rmtree(folder + "_small", ignore_errors=True)
-        kinds[outcome] += 1
-        with open(done_file, "a") as file:
-            file.write("%d,%s\n" % (seed, outcome.replace(",", ";").replace("\n", " ")))
+                print(tried.small, flush=True)
+            else:
+                covered.update(tried.features)
+            kinds[tried.outcome] += 1
+            with open(done_file, "a") as file:
+                file.write("%d,%s\n" % (seed, tried.outcome.replace(",", ";").replace("\n", " ")))
     print("\n%d scenes in %.0f s" % (sum(kinds.values()), time.time() - began))
     for outcome, count in kinds.most_common():
         print("%5d  %s" % (count, outcome))

@@ -19,7 +19,7 @@ from scene_text import write_scene
 
 ROUNDING = 1e-7       # of the largest value of a field: rounding that a run has made larger
 TORN = 1e-5           # where bonds fail
-MOST_STEPS = 300      # on several ranks, which wait for each other on a busy machine
+MOST_STEPS = 150      # on several ranks, which wait for each other on a busy machine
 SMALL = 80           # MB: below that it is the program itself, or the Python that started it
 SOLVED = 1e-4         # equilibria found by different solvers
 

@@ -52,6 +52,8 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
       gradient_lane(p, u_, s.H + l);
       if (pass.work.tangent()) gradient_lane(p, w_, s.dH + l);
       s.weight[l] = position_[p][3] * (1 - families_.damage(p));
+      // A point without bonds shows its own values, and its history is part of the state that a run goes on from.
+      if (pass.work.work() == Work::sample) s.weight[l] = std::max(s.weight[l], 1e-300);
       s.owner[l] = static_cast<std::int32_t>(p);
     }
     s.first_number = static_cast<std::int64_t>(first);
@@ -62,7 +64,6 @@ void CloudPoints<D>::block(std::size_t b, Pass& pass) {
     for (int l = 0; l < lanes; l += static_cast<int>(padding))
       pass.work.screen(static_cast<std::int64_t>(first) + l, l, static_cast<int>(padding), s);
     if (pass.work.work() == Work::sample) {
-      for (int l = 0; l < n; ++l) s.weight[l] = std::max(s.weight[l], 1e-300);  // a lone point shows its own values
       pass.add_samples(n, s);
       continue;
     }

@@ -35,7 +35,11 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
     if (roles_.law_of(index[i]) != s.one_law || pass.work.laminates_near(chunk(index[i]).first)) s.one_law = ChunkRole::mixed;
   for (int i = 0; i < n; ++i) {
     const int lane = i * chunk_points;
-    std::memcpy(s.weight + lane, families_.pattern(chunk(index[i])).weight, sizeof families_.whole.weight);
+    const LatticePattern& pattern = families_.pattern(chunk(index[i]));
+    std::memcpy(s.weight + lane, pattern.weight, sizeof families_.whole.weight);
+    // A point without bonds shows its own values, and its history is part of the state that a run goes on from.
+    for (int l = 0; l < chunk_points && pass.work.work() == Work::sample; ++l)
+      if (s.weight[lane + l] == 0 && (pattern.live >> l & 1)) s.weight[lane + l] = 1e-300;
     if ((!laws_.single() && s.one_law < 0) || pass.alone()) {
       for (int l = 0; l < chunk_points; ++l) {
         s.owner[lane + l] = chunk(index[i]).first + l;
@@ -68,14 +72,7 @@ void LatticePoints<D>::one_by_one(std::size_t b, Pass& pass) {
     }
     if (n == 0 || (n < chunks_at_once && c + 1 < block.chunk_end)) continue;
     if (!evaluate(index, n, s, pass, &energy)) return;
-    if (pass.work.work() == Work::sample) {
-      // The average over one evaluation point is its value, whatever its weight.
-      for (int l = 0; l < n * chunk_points; ++l) {
-        const LatticePattern& pattern = families_.pattern(chunk(index[l / chunk_points]));
-        if (s.weight[l] == 0 && (pattern.live >> (l % chunk_points) & 1)) s.weight[l] = 1e-300;
-      }
-      pass.add_samples(n * chunk_points, s);
-    }
+    if (pass.work.work() == Work::sample) pass.add_samples(n * chunk_points, s);
     n = 0;
   }
   if (pass.energies && block.chunk_begin < block.chunk_end) pass.energies[tiles_.first_group(b)] = energy;
