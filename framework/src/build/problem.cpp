@@ -232,7 +232,6 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
   if (scene.damage) steps.begin("limits of bonds");
-  std::vector<std::string> warnings;
   parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static, warnings));
   of_terms.damage = parts.fracture.damage();
   steps.begin("weights");
