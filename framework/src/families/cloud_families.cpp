@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "families/cloud_rows.hpp"
+#include "families/needle_support.hpp"
 #include "families/shape_tensor.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/simd.hpp"
@@ -152,8 +153,9 @@ void CloudFamilies::renew(std::size_t p) {
   if (!needs_.shapes) return;
   for (const CutBond& bond : cut_bonds(p)) add_shape<D>(bond.omega * position[bond.far][3], position[bond.far] - position[p], uncut);
   invert_shape(D, K, &inverse_[6 * p], &condition_[p]);
-  fragment_[p] = left_[p] < 1 && shape_support(D, K, uncut) < least_support;
-  if (!fragment_[p]) return;
+  const double support = left_[p] < 1 ? shape_support(D, K, uncut) : 1.0;
+  fragment_[p] = support < least_support;
+  if (support >= needle_support) return;
   std::fill_n(&inverse_[6 * p], 6, 0.0);
   condition_[p] = std::numeric_limits<double>::infinity();
 }
@@ -232,7 +234,7 @@ void CloudFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) const 
     sqrt(square).store(out.length.data() + k);
   }
   if (needs_.shapes) std::copy_n(&inverse_[6 * p], 6, out.inverse_shape);
-  out.fragment = is_fragment(p);
+  out.fragment = is_fragment(p) && !std::isfinite(condition_[p]);
 }
 
 void CloudFamilies::load_broken(std::size_t p, BondsOf which, FamilyArrays& out) const {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "families/needle_support.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
@@ -47,15 +48,16 @@ void LatticeFamilies::finish_pattern(LatticePattern& p, const std::vector<std::u
       for (int a = 0; a < d; ++a) moment[a] += (weight(s) - weight(slots.reverse(s))) * slots.offsets[s][static_cast<std::size_t>(a)];
     if (set_up) p.intact_at_set_up[l] = intact_omega;
     p.left[l] = p.intact_at_set_up[l] > 0 ? intact_omega / p.intact_at_set_up[l] : 1.0;
-    const bool fragment = live && needs_.shapes && p.left[l] < 1 && shape_support(d, K, uncut) < least_support;
-    const bool invertible = invert_shape(d, K, inverse, &condition) && !fragment, regular = needs_.shapes ? invertible : intact_omega > 0;
-    if (fragment) {
+    const double support = live && needs_.shapes && p.left[l] < 1 ? shape_support(d, K, uncut) : 1.0;
+    const bool needle = support < needle_support;
+    const bool invertible = invert_shape(d, K, inverse, &condition) && !needle, regular = needs_.shapes ? invertible : intact_omega > 0;
+    if (needle) {
       std::fill_n(inverse, 6, 0.0);
       condition = std::numeric_limits<double>::infinity();
     }
     const auto mark = [l](std::uint8_t& lanes, bool marked) { lanes = static_cast<std::uint8_t>((lanes & ~(1u << l)) | (marked ? 1u << l : 0u)); };
     mark(p.singular, live && !regular);
-    mark(p.fragment, fragment);
+    mark(p.fragment, support < least_support);
     for (int c = 0; c < 6; ++c) p.inverse[c][l] = live ? inverse[c] : 0.0;
     for (int c = 0; c < 3; ++c) p.moment[c][l] = live ? moment[c] : 0.0;
     const double share = live_omega > 0 ? intact_omega / live_omega : 0.0;
@@ -165,7 +167,7 @@ void LatticeFamilies::load(std::size_t p, BondsOf which, FamilyArrays& out) cons
   out.owner = static_cast<std::int32_t>(p);
   for (std::int32_t& far : out.far) far += out.owner;
   inverse_shape(now, lane, out.inverse_shape);
-  out.fragment = is_fragment(p);
+  out.fragment = is_fragment(p) && !std::isfinite(condition(p));
   if (!broken) return;
   out.whole = out.omega;
   out.integrity.assign(out.size, 1.0);

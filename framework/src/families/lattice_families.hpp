@@ -28,7 +28,7 @@ struct LatticePattern {
   std::uint8_t live = 0xff;
   std::uint8_t irregular = 0;                  ///< lanes with bonds that are not whole
   std::uint8_t singular = 0;                   ///< live lanes without a gradient
-  std::uint8_t fragment = 0;                   ///< those of them that failed bonds have left without
+  std::uint8_t fragment = 0;                   ///< lanes that failed bonds have left with less than least_support
 
   bool intact(std::size_t slot, int lane) const noexcept { return mask[slot] >> lane & 1; }
   double b(std::size_t slot, int lane) const noexcept {

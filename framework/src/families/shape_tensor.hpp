@@ -36,9 +36,9 @@ bool invert_shape(int d, const double* K, double* inverse, double* condition = n
 /// `whole`, in [0, 1]. 0 where either is singular.
 double shape_support(int d, const double* K, const double* whole);
 
-/// A point whose family is left with less support than this is a fragment: it has no gradient, and loses its other bonds too. The family of a corner
-/// keeps 1/4 in a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure: they lie almost on
-/// a line, and would magnify what they see a thousand times as long as they fade, or for good where they may not fail.
+/// A point whose family is left with less support than this is a fragment: it loses its other bonds too. The family of a corner keeps 1/4 in
+/// a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure. (needle_support.hpp says which
+/// of them have no gradient while they still have bonds.)
 inline constexpr double least_support = 0.1;
 
 }  // namespace perikit
