@@ -15,6 +15,7 @@
 #include <cmath>
 
 #include "perikit/core/parallel.hpp"
+#include "work_apart.hpp"
 
 namespace perikit {
 
@@ -176,6 +177,8 @@ struct Multigrid::Implementation {
   Eigen::LDLT<Eigen::MatrixXd> coarsest;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_coarsest;  ///< where aggregates stop growing early
   bool dense = true;
+  std::function<bool()> goes_on;
+  bool given_up = false;   // a thread is still at work on it
 
   Matrix finest(const BlockMatrix& K) {
     std::vector<FreeMatrix::Index> first, row;
@@ -216,6 +219,19 @@ struct Multigrid::Implementation {
     return true;
   }
 
+  void make_levels(Matrix K, Modes& modes, Nodes& nodes, int count) {
+    levels.reserve(most_levels);
+    levels.emplace_back(std::move(K));
+    connect(levels.back().A, nodes, count);
+    while (levels.size() < most_levels && levels.back().A.rows() > direct && coarsen(levels.back(), modes, nodes)) continue;
+    const Matrix& last = levels.back().A;
+    dense = last.rows() <= 4 * direct;
+    if (dense)
+      coarsest.compute(Eigen::MatrixXd(last));
+    else
+      sparse_coarsest.compute(Eigen::SparseMatrix<double>(last));
+  }
+
   void cycle(std::size_t l) {
     Level& level = levels[l];
     if (l + 1 == levels.size()) {
@@ -234,9 +250,13 @@ struct Multigrid::Implementation {
 };
 
 Multigrid::Multigrid() : implementation_(std::make_unique<Implementation>()) {}
-Multigrid::~Multigrid() = default;
+Multigrid::~Multigrid() {
+  if (implementation_ && implementation_->given_up) implementation_.release();
+}
 Multigrid::Multigrid(Multigrid&&) noexcept = default;
 Multigrid& Multigrid::operator=(Multigrid&&) noexcept = default;
+
+void Multigrid::watch(std::function<bool()> goes_on) { implementation_->goes_on = std::move(goes_on); }
 
 void Multigrid::make(const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid) {
   Implementation& own = *implementation_;
@@ -256,17 +276,14 @@ void Multigrid::make(const BlockMatrix& K, ConstFieldView free, const std::vecto
       if (own.free.unknown(r, a) >= 0) nodes.of.push_back(count), any = true;
     count += any;
   }
-  own.levels.reserve(most_levels);
-  own.levels.emplace_back(own.finest(K));
-  connect(own.levels.back().A, nodes, count);
-  while (own.levels.size() < most_levels && own.levels.back().A.rows() > direct && own.coarsen(own.levels.back(), modes, nodes))
-    continue;
-  const Matrix& last = own.levels.back().A;
-  own.dense = last.rows() <= 4 * direct;
-  if (own.dense)
-    own.coarsest.compute(Eigen::MatrixXd(last));
-  else
-    own.sparse_coarsest.compute(Eigen::SparseMatrix<double>(last));
+  struct Work {
+    Matrix K;
+    Modes modes;
+    Nodes nodes;
+    int count;
+  };
+  const auto work = std::make_shared<Work>(Work{own.finest(K), std::move(modes), std::move(nodes), count});
+  own.given_up = !work_apart(own.goes_on, [&own, work] { own.make_levels(std::move(work->K), work->modes, work->nodes, work->count); });
 }
 
 void Multigrid::apply(ConstFieldView r, FieldView z) {

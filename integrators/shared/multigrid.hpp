@@ -1,6 +1,7 @@
 #pragma once
 /// Algebraic multigrid for stiffness matrices of nearest neighbours.
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -21,7 +22,10 @@ class Multigrid {
   Multigrid(Multigrid&&) noexcept;
   Multigrid& operator=(Multigrid&&) noexcept;
 
-  /// free: 1 on free components. rigid: d (d + 1)/2 motions of the body as a whole, d components each.
+  /// Asked while levels are made: whether the run goes on.
+  void watch(std::function<bool()> goes_on);
+  /// free: 1 on free components. rigid: d (d + 1)/2 motions of the body as a whole, d components each. Where the run is to end before that is done, it is of
+  /// no use, and nothing may be asked of it any more.
   void make(const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid);
   /// z <- M^-1 r on free components, 0 elsewhere. r and z may be the same field.
   void apply(ConstFieldView r, FieldView z);

@@ -11,6 +11,7 @@ namespace {
 
 class OneRank final : public MultigridCycle {
  public:
+  void watch(std::function<bool()> goes_on) override { multigrid_.watch(std::move(goes_on)); }
   bool make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool) override {
     multigrid_.make(K, free, rigid);
     return false;

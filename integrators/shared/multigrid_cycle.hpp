@@ -1,6 +1,7 @@
 #pragma once
 /// The multigrid cycle of a companion, on however many ranks.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ namespace perikit {
 class MultigridCycle {
  public:
   virtual ~MultigridCycle() = default;
+  /// Asked in the course of `make`, where that may take long: whether the run goes on. Where it does not, what was made is of no use.
+  virtual void watch(std::function<bool()>) {}
   /// K: of the problem; on several ranks its rows at owned points are complete. free: 1 on free components of these. rigid: the d
   /// (d + 1)/2 motions of the body as a whole. alike: nothing but some entries of K have changed since the last time, so that
   /// the way to coarser levels may be that of then. Returns whether it is.

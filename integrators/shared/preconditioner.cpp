@@ -108,15 +108,18 @@ class CompanionCycle final : public Preconditioner {
   void apply(ConstFieldView r, FieldView z) override { cycle_->apply(r, z); }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string&) override {
+  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) override {
     Problem& problem = equilibrium.problem();
     const std::int64_t step = problem.state().step;
+    cycle_->watch([&equilibrium] { return equilibrium.goes_on(); });
     if (!alike_) own_effort_ = first_effort();
     const bool alike = occasion == Occasion::bonds && step == step_ && first_effort() <= 1.05 * own_effort_;
     problem.assemble_companion(u, springs_, most_bulk_);
-    alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u), alike);
+    if (equilibrium.goes_on()) alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u), alike);
     step_ = occasion == Occasion::kept ? -1 : step;
-    return true;
+    if (!equilibrium.stopped()) return true;
+    failure = equilibrium.failure();
+    return false;
   }
   std::int64_t alike_within() const noexcept override { return alike_ ? step_ : -1; }
   double patience() const noexcept override { return 1.3; }  // it is cheap

@@ -8,17 +8,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <fstream>
-#include <future>
 #include <limits>
 #include <memory>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "free_matrix.hpp"
 #include "perikit/core/errors.hpp"
+#include "work_apart.hpp"
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 extern "C" void* blas_memory_alloc(int) __attribute__((weak));
@@ -138,25 +136,11 @@ struct SparseSolver::Implementation {
     umfpack_dl_free_numeric(&numeric);
   }
 
-  /// Does `work`, which asks nobody, on a thread of its own. False where the run is to end before it is done: it is left to itself then, with all that it
-  /// uses, until the program ends.
   template <class Work>
   bool done(Work work) {
-    if (!goes_on) {
-      work();
-      return true;
-    }
-    std::packaged_task<void()> task(std::move(work));
-    const std::future<void> end = task.get_future();
-    std::thread worker(std::move(task));
-    while (end.wait_for(std::chrono::milliseconds(100)) != std::future_status::ready) {
-      if (goes_on()) continue;
-      worker.detach();
-      given_up = true;
-      return false;
-    }
-    worker.join();
-    return true;
+    const bool ended = work_apart(goes_on, std::move(work));
+    given_up = given_up || !ended;
+    return ended;
   }
 
   /// The ordering of the points that CHOLMOD likes best (AMD, or METIS' nested dissection), component by component.
@@ -196,7 +180,10 @@ struct SparseSolver::Implementation {
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_GIVEN;
     common.postorder = 1;
-    cholesky = order.empty() ? nullptr : cholmod_l_analyze_p(&A, as_long(order), nullptr, 0, &common);
+    if (!order.empty()) {
+      const auto kept = std::make_shared<std::vector<FreeMatrix::Index>>(std::move(order));
+      if (!done([this, A, kept]() mutable { cholesky = cholmod_l_analyze_p(&A, as_long(*kept), nullptr, 0, &common); })) return stopped(failure);
+    }
     if (!cholesky)
       failure = fmt::format("CHOLMOD cannot analyse a matrix of {} unknowns: {}", free.unknowns(),
                             common.status == CHOLMOD_OUT_OF_MEMORY ? "not enough memory" : "an internal error");
@@ -243,9 +230,13 @@ struct SparseSolver::Implementation {
     const auto n = static_cast<SuiteSparse_long>(free.unknowns());
     double info[UMFPACK_INFO];
     SuiteSparse_long status = UMFPACK_OK;
-    if (!symbolic) status = umfpack_dl_symbolic(n, n, as_long(first), as_long(row), value.data(), &symbolic, nullptr, info);
+    const auto result = std::make_shared<LuResult>();
+    if (!symbolic) {
+      if (!done([this, n, result] { result->status = umfpack_dl_symbolic(n, n, as_long(first), as_long(row), value.data(), &symbolic, nullptr, result->info); }))
+        return stopped(failure);
+      status = result->status;
+    }
     if (status == UMFPACK_OK) {
-      const auto result = std::make_shared<LuResult>();
       if (!done([this, result] { result->status = umfpack_dl_numeric(as_long(first), as_long(row), value.data(), symbolic, &numeric, nullptr, result->info); }))
         return stopped(failure);
       status = result->status;
