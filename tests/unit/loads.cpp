@@ -200,3 +200,28 @@ TEST_CASE("pressure that varies: force and moments on a cloud under water") {
       for (std::size_t b = 0; b < 3; ++b) CHECK(work[c][b] == doctest::Approx(wanted[c][b]).epsilon(1e-11));
   }
 }
+
+TEST_CASE("traction: a homogeneous stress in a thin body is in equilibrium with it on both faces") {
+  // The plate is four horizons long: faces feel each other.
+  const double E = 1, nu = 0.25, strain = 1e-9, traction = E / (1 - nu * nu) * strain;
+  for (const char* kinematics : with_faces) {
+    const std::string name = kinematics;
+    // Pair laws have no homogeneous stress near a face, and selective kinematics have other shares of it for pressures than for the rest.
+    if (name.find("ordinary") != std::string::npos || name.find("bond_based") != std::string::npos || name.find("selective") != std::string::npos) continue;
+    INFO(name);
+    const auto simulation = plate("x > -1", 0.0, fmt::format("traction = [{:.17g}, 0]\nface = \"+x\"", traction), kinematics,
+                                  fmt::format("[[load]]\nset = \"all\"\ntraction = [{:.17g}, 0]\nface = \"-x\"\n", -traction));
+    BodyProblem& problem = simulation->problem();
+    const Body& body = problem.body();
+    Field u = body.make_field(2), force = body.make_field(2);
+    for (const std::int32_t p : body.internal()) {
+      const Point x = body.position(static_cast<std::size_t>(p));
+      u.component(0)[p] = strain * x[0];
+      u.component(1)[p] = -nu / (1 - nu) * strain * x[1];
+    }
+    REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
+    problem.loads().evaluate(0.0, problem.state().external_force());
+    for (const std::int32_t p : body.internal())
+      for (int c = 0; c < 2; ++c) CHECK(std::abs(force.component(c)[p] + problem.state().external_force().component(c)[p]) < 1e-6 * traction);
+  }
+}
