@@ -117,7 +117,7 @@ def main():
             cases += [wishes_for(feature, tables, turn)]
         take([case for case in cases if case], 1000 * (turn + 1))
     with open(options.seeds, "w") as file:
-        file.write("# Scenes of the test command, chosen by choose.py: seeds and what was wished for.\n")
+        file.write("# Scenes of the test command, chosen by choose.py (seeds and what was wished for)\n")
         file.writelines("%d %s\n" % (seed, wish_words(wishes)) for seed, wishes in sorted(chosen, key=lambda row: row[0]))
         file.write("\n# No scene has:\n")
         for feature in sorted(all_of_it - found):
