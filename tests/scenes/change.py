@@ -115,6 +115,12 @@ def changed_scene(scene, change, tables):
     section = {1: "area", 2: "thickness"}.get(scene["body"]["dimension"])
     if section:   # 1 unless given, in any unit
         out["body"].setdefault(section, 1.0)
+    lattice = out["body"].get("lattice")
+    if lattice:   # points lie from the lower corner on: a corner that becomes the lower one must be theirs, too, and so must planes that are not given
+        cells = [round((high - low) / lattice["spacing"]) for low, high in zip(lattice["lower"], lattice["upper"])]
+        lattice["upper"] = [low + n * lattice["spacing"] for low, n in zip(lattice["lower"], cells)]
+        for plane in out.get("symmetry", []):
+            plane.setdefault("at", lattice["lower"][AXES.index(plane["axis"])])
     for name, content in out.items():
         if name in tables.sections:
             for item in content if isinstance(content, list) else [content]:
