@@ -11,6 +11,8 @@ constexpr double shortest = 4, longest = 32;   // steps from look to look
 /// Eigenvalues rise at most about as the fourth power of a stretch (tension of a Saint Venant-Kirchhoff solid: the third; compression of laws
 /// with a logarithm of J: the third). Half of what may be left then serves what happens between two looks.
 constexpr double least_power = 1, largest_power = 8;
+/// Ritz values with such a bound have converged: they are off by much less.
+constexpr double exact = 1.03;
 /// An estimate after less tells nothing.
 constexpr double least_margin = 0.01;
 
@@ -21,14 +23,15 @@ double StretchWatch::change(StretchRange range) const {
 }
 
 void StretchWatch::estimated(StretchRange range, std::int64_t step, EigenvalueBounds eigenvalue, double tolerated) {
-  // What the last change did to the eigenvalue, the next one does about once more. Bounds may lie 10 % above it, Ritz values a few per cent below.
-  const bool known = eigenvalue_ > 0 && eigenvalue.ritz > 0;
+  // What the last change did to the eigenvalue, the next one does about once more.
+  const double found = eigenvalue.bound <= exact * eigenvalue.ritz ? eigenvalue.ritz : 0;
+  const bool known = eigenvalue_ > 0 && found > 0;
   const double changed = known ? change(range) : 0;
-  if (changed >= least_margin) power_ = std::clamp(2 * std::log(eigenvalue.ritz / eigenvalue_) / changed + 1, least_power, largest_power);
+  if (changed >= least_margin) power_ = std::clamp(2 * std::log(found / eigenvalue_) / changed + 1, least_power, largest_power);
   if (power_ == 0) power_ = largest_power;
   least_ = range.least;
   largest_ = range.largest;
-  eigenvalue_ = eigenvalue.ritz;
+  eigenvalue_ = found;
   margin_ = eigenvalue.bound > 0 ? std::max(least_margin, std::log(std::max(1.0, tolerated / eigenvalue.bound)) / power_) : least_margin;
   before_ = 0;
   last_ = static_cast<double>(step);

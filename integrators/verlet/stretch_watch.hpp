@@ -27,7 +27,7 @@ class StretchWatch {
   double change(StretchRange range) const;
 
   double &least_, &largest_;   ///< stretches at the last estimate
-  double& eigenvalue_;         ///< what it found, a Ritz value
+  double& eigenvalue_;         ///< what it found; 0: a bound alone
   double& power_;              ///< of the stretch, with which eigenvalues are expected to rise; 0: nothing is known
   double& margin_;             ///< of the change
   double& before_;             ///< change at the last look
