@@ -8,6 +8,10 @@ function(perikit_compile_options target)
     target_compile_definitions(${target} PRIVATE PERIKIT_NATIVE)
   else()
     target_compile_options(${target} PRIVATE -march=${PERIKIT_LEVEL})
+    # Rows of four doubles are vectors of the compiler. Without AVX it tells that code with AVX would pass them otherwise: parts and library are of one level.
+    if(PERIKIT_LEVEL STREQUAL "x86-64-v2")
+      target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
+    endif()
   endif()
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     # A level is tuned for no processor: so it is tested. The loader of a machine that has not this level refuses what is linked here.
