@@ -37,7 +37,7 @@ class FreeColours {
   std::vector<std::vector<std::uint64_t>> taken_;  ///< 64 colours at a time, by unit
 };
 
-/// Marks of points, or of groups of them, by internal index: marks whole blocks of so many where one of them is marked.
+/// Marks of points, a byte each, by internal index: marks whole blocks of so many where one of them is marked.
 void fill_blocks(std::size_t block, std::vector<std::uint8_t>& marked);
 
 /// Gives the blocks of a part of a cloud the colours that they have in the whole body. The colour of a block follows from those

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "families/cloud_rows.hpp"
-#include "families/needle_support.hpp"
 #include "families/shape_tensor.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/simd.hpp"

@@ -25,7 +25,7 @@ class GradualFailure {
   /// Bonds that the criterion found begin to let go. Returns what becomes in a step of this length [s] of all that are at it.
   std::vector<BondChange> let_go(std::span<const BondChange> found, double time_step);
   /// The bonds of fragments begin to go, all by the same factor in each step, out of the gradients of their neighbours. Their own gradients
-  /// stay what they are, but for needles, which have none (needle_support.hpp).
+  /// stay what they are, but for needles, which have none (needle_support).
   void fade(std::span<const BondId> bonds);
   /// A bond of the last `let_go` has not been lowered but has this integrity still. A whole one has to be found again.
   void hold(BondId bond, double integrity);

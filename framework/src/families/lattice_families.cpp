@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "families/needle_support.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {

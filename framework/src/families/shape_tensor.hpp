@@ -37,8 +37,11 @@ bool invert_shape(int d, const double* K, double* inverse, double* condition = n
 double shape_support(int d, const double* K, const double* whole);
 
 /// A point whose family is left with less support than this is a fragment: it loses its other bonds too. The family of a corner keeps 1/4 in
-/// a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure. (needle_support.hpp says which
-/// of them have no gradient while they still have bonds.)
+/// a plane and 1/8 in space; with less there is no continuum around the point whose gradient its few bonds could measure.
 inline constexpr double least_support = 0.1;
+/// A fragment that failed bonds have left with less of its uncut shape tensor than this (shape_support) has no gradient: its bonds lie almost on a line,
+/// and would magnify what they see ten to a thousand times, as long as they fade or for good where they may not fail. With more it keeps its gradient
+/// while they fade: in nearly incompressible bodies what jumps costs more than it held.
+inline constexpr double needle_support = 0.01;
 
 }  // namespace perikit
