@@ -40,6 +40,7 @@ DAMAGE = {
     "gradual": '[damage]\ntype = "critical_stretch"\nstretch = 0.02\ngradual = true\n',
     "critical_energy": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\n',
     "critical_energy, equal, gradual": '[damage]\ntype = "critical_energy"\nenergy_release_rate = 0.005\nlimit = "equal"\ngradual = true\n',
+    "max_stress, gradual, second law": '[damage]\ntype = "max_stress"\nstrength = 0.02\ngradual = true\nsecond_law = true\n',
     "max_stress": '[damage]\ntype = "max_stress"\nstrength = 0.05\n',
     "smooth_degradation": '[damage]\ntype = "smooth_degradation"\nstretch_min = 0.01\nstretch = 0.05\n',
 }
@@ -105,6 +106,7 @@ def beyond(everything):
     """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
     if not everything:
         yield "silling, critical_energy, lattice", torn(KINEMATICS["silling"], DAMAGE["critical_energy"], False)
+        yield "baqp, order 2, max_stress, gradual, second law", torn(KINEMATICS["baqp, order 2"], DAMAGE["max_stress, gradual, second law"], False)
         yield "baqp, max_stress, cloud", torn(KINEMATICS["baqp"], DAMAGE["max_stress"], True)
         yield "silling, order 2, lattice", scene(KINEMATICS["silling, order 2"], 2)
         yield "baqp, face and symmetry, cloud", BEYOND["face and symmetry"](scene(KINEMATICS["baqp"], 2, True))

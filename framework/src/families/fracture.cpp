@@ -5,6 +5,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <map>
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -68,8 +69,10 @@ std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes
     if (!share) return;
     std::vector<BondChange> mine;
     for (std::size_t k = 0; k < bonds.size(); ++k) mine.push_back({bonds[k], values[k]});
+    std::map<BondId, double> known;   // bonds that let go gradually come in an order of this rank's own
+    for (const BondChange& value : shared_.of_all(mine)) known.emplace(value.bond, value.integrity);
     values.clear();
-    for (const BondChange& value : shared_.of_all(mine)) values.push_back(value.integrity);
+    for (const BondChange& change : changes) values.push_back(known.at(change.bond));
   };
   of_all(moments);
   of_all(excesses);
