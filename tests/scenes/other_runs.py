@@ -84,6 +84,31 @@ def too_few_points(done):
 # -- kills ------------------------------------------------------------------------------------------------------------------------------------
 
 
+def of_session(session):
+    """Processes of a session: mpirun gives each rank a group of its own."""
+    found = []
+    for name in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            if os.getsid(int(name)) == session:
+                found.append(int(name))
+        except ProcessLookupError:
+            pass
+    return found
+
+
+def kill_session(process):
+    """Kills the ranks and mpirun at once; ranks that outlive it for a moment would still hold the folder."""
+    if process.poll() is None:
+        for pid in of_session(process.pid):
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+    process.wait()
+    while of_session(process.pid):
+        time.sleep(0.01)
+
+
 def killed(trial, out, done, other_ranks):
     """A run with checkpoints that is killed at a random moment and goes on, there or on another number of ranks, has the bits of one without a stop."""
     if other_ranks and len(history(out)["time"]) > MOST_STEPS:
@@ -99,9 +124,7 @@ def killed(trial, out, done, other_ranks):
     while process.poll() is None and not os.path.exists(folder + "/checkpoint.h5") and time.time() < until:
         time.sleep(0.002)
     time.sleep(r.uniform(0, 0.05))
-    if process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    kill_session(process)
     other = call(trial.command(folder, [setting], 1, ranks[1], ["--resume"]))
     if too_few_points(other):
         return ""
