@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <limits>
 #include <sstream>
 #include <system_error>
 
@@ -19,6 +20,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -110,7 +112,7 @@ void run(const Options& options) {
     if (const std::string warning = crowded(thread_count()); !warning.empty()) recorder.log(warning);
   recorder.log(simulation.explanation(*registry));
   for (const RefusedLibrary& refused : registry->refused())
-    recorder.log(fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason));
+    recorder.log(named("libraries", fmt::format("warning: refused {}: {}", refused.file.string(), refused.reason)));
   try {
     simulation.run(recorder);
     recorder.finish();
@@ -133,6 +135,21 @@ void run(const Options& options) {
   }
 }
 
+/// The time of a force evaluation on this machine, with all arrays in place and every point in motion, none left out.
+std::string time_of_forces(Simulation& simulation) {
+  BodyProblem& problem = simulation.problem();
+  Field force = problem.make_field(), u = problem.make_field();
+  for (const std::int32_t p : problem.body().owned())
+    for (int a = 0; a < problem.dimension(); ++a) u.component(a)[p] = 1e-9 * problem.body().spacing() * static_cast<double>((p + a) % 7 - 3);
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const auto start = std::chrono::steady_clock::now();
+    if (!problem.evaluate_forces(u, force, nullptr).ok()) return {};
+    least = std::min(least, seconds_since(start));
+  }
+  return fmt::format("time          about {:.3g} ms a force evaluation, with {} thread{}\n", 1e3 * least, thread_count(), thread_count() > 1 ? "s" : "");
+}
+
 void check(const Options& options) {
   const NothingToKeep nothing;
   const auto registry = open_registry(options);
@@ -150,9 +167,10 @@ void check(const Options& options) {
     {  // whose memory the parts of ranks need
       const PeakMemory peak;
       Simulation simulation(scene, *registry);
-      summary = simulation.summary();  // which may still refuse
+      summary = simulation.overview() + simulation.summary();  // which may still refuse
       if (options.explain) summary += simulation.explanation(*registry);
       try_step(simulation);
+      summary += time_of_forces(simulation);
       const double bytes = peak.bytes();
       if (const double solver = simulation.refuse_memory(); bytes > 0)
         summary += fmt::format("process       about {:.3g} MB at most{}\n", (bytes + solver) / 1e6,

@@ -12,6 +12,7 @@
 #include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/serial_communicator.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/fields/point_fields.hpp"
 #include "perikit/run/simulation.hpp"
 
@@ -95,10 +96,10 @@ int cores_of_rank() {
 std::string crowded(int threads) {
   const int cores = cores_of_rank();
   if (threads <= cores) return {};
-  return fmt::format(
+  return named("threads", fmt::format(
       "warning: each rank has {} threads on {} core{}; allowed: --threads {}, or mpirun --map-by slot:PE={}, or --bind-to none "
       "where cores are free",
-      threads, cores, cores == 1 ? "" : "s", cores, threads);
+      threads, cores, cores == 1 ? "" : "s", cores, threads));
 }
 
 void try_step(Simulation& simulation) {

@@ -9,6 +9,7 @@
 #include "../shared/solver_memory.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/memory.hpp"
+#include "perikit/core/warnings.hpp"
 
 namespace perikit {
 
@@ -42,7 +43,7 @@ bool FactorisedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, do
   if (const double condition = tangent_.factors().reciprocal_condition(); condition < nearly_singular) {
     note += fmt::format("  tangent nearly singular ({:.1g})", condition);
     if (!std::exchange(warned_, true))
-      equilibrium.note("warning: newton: the tangent is nearly singular: some part of the body is hardly held, and where it goes is rounding");
+      equilibrium.note(named("singular", "warning: newton: the tangent is nearly singular: some part of the body is hardly held, and where it goes is rounding"));
   }
   return true;
 }

@@ -9,6 +9,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/sdk/stable_step.hpp"
 #include "stretch_watch.hpp"
 
@@ -267,7 +268,7 @@ void Verlet::run(Problem& problem, Observer& observer) {
     softest = planned_.eigenvalue;
     if (watched) watch.estimated(problem.stretches(state.displacement()), 0, {planned_.eigenvalue, planned_.eigenvalue}, most());
     observer.log(fmt::format("verlet: {:.0f} steps of {:.6g} s", counter, dt));
-    if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log("warning: verlet: " + doubt);
+    if (const std::string doubt = bond_based_doubt(problem); !doubt.empty()) observer.log(named("time_step", "warning: verlet: " + doubt));
     planned_ = {};
   }
   Stepper stepper(problem, !fresh);

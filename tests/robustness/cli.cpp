@@ -149,13 +149,13 @@ TEST_CASE("cli: check prints a scene that is the same when read again") {
   desk.write("resolved.toml", first.out);
   const Result again = desk.perikit("check resolved.toml");
   CHECK(again.status == 0);
-  // But for the memory of the process, which is measured.
-  const auto without_memory = [](std::string text) {
-    const std::size_t line = text.find("# process "), end = text.find('\n', line);
+  // But for time and memory, the last two lines, which are measured.
+  const auto without_measures = [](std::string text) {
+    const std::size_t line = text.find("# time "), end = text.find('\n', text.find("# process "));
     REQUIRE(end != std::string::npos);
     return text.erase(line, end - line);
   };
-  CHECK(without_memory(again.out) == without_memory(first.out));
+  CHECK(without_measures(again.out) == without_measures(first.out));
   CHECK(desk.perikit("run scene.toml --quiet -o a --set integrator.end_time=0.5").status == 0);
   CHECK(desk.perikit("run resolved.toml --quiet -o b").status == 0);
   CHECK_MESSAGE(desk.text("a/history.csv") == desk.text("b/history.csv"), "the resolved scene runs differently");

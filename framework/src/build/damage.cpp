@@ -13,6 +13,7 @@
 #include "build/crossing_bonds.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/problem/ghosts.hpp"
 
 namespace perikit {
@@ -154,12 +155,12 @@ void warn_of_short_zone(const BodyFrame& frame, const ParameterValues& values, d
                                          std::max(1.1, wanted), bonds);
   const std::string place = values.position("").line > 0 ? fmt::format("{} (line {})", values.path(), values.position("").line) : values.path();
   if (softening == 1)
-    warnings.push_back(fmt::format(
-        "{} breaks bonds at once, and in a quasi-static run what their neighbours spring back is lost: cracks take 1.2 to 3 times energy_release_rate; {}", place, remedy));
+    warnings.push_back(named("crack_cost", fmt::format(
+        "{} breaks bonds at once, and in a quasi-static run what their neighbours spring back is lost: cracks take 1.2 to 3 times energy_release_rate; {}", place, remedy)));
   else
-    warnings.push_back(fmt::format("{} lets bonds weaken in a zone that is short beside the spacing (softening = {:.3g}): in a quasi-static run cracks take more than "
+    warnings.push_back(named("crack_cost", fmt::format("{} lets bonds weaken in a zone that is short beside the spacing (softening = {:.3g}): in a quasi-static run cracks take more than "
                                    "energy_release_rate, by 10 % and more; {}",
-                                   place, softening, remedy));
+                                   place, softening, remedy)));
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "families/families.hpp"
 #include "perikit/build/body.hpp"
 #include "perikit/core/rank_values.hpp"
+#include "perikit/core/warnings.hpp"
 #include "spaces/consistency.hpp"
 
 namespace perikit {
@@ -163,9 +164,9 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
       throw InputError(scene.consistent_position, "family.consistent",
                        fmt::format("found true {}; allowed: {}", reason->found, reason->allowed));
     warnings.push_back(
-        fmt::format("points that lie at random {}: a constant stress is not in equilibrium, and the body is too soft, however "
+        named("balance", fmt::format("points that lie at random {}: a constant stress is not in equilibrium, and the body is too soft, however "
                     "fine it is; consistent clouds need {}",
-                    reason->found, reason->allowed));
+                    reason->found, reason->allowed)));
     return nullptr;
   }
   auto consistency = std::make_shared<CloudConsistency>();

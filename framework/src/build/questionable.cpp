@@ -9,6 +9,7 @@
 #include "build/conditions.hpp"
 #include "families/normalised_influence.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/warnings.hpp"
 
 namespace perikit {
 
@@ -40,7 +41,7 @@ void find_idle_cracks(const Scene& scene, const Families& families, std::vector<
   const std::vector<Crack>& cracks = families.body().cracks();
   for (std::size_t k = 0; k < std::min(cracks.size(), scene.cracks.size()); ++k)
     if (!cuts_any(cracks[k], families))
-      found.push_back(fmt::format("crack.{}{} cuts no bond of the body", k, line(scene.cracks[k].position)));
+      found.push_back(named("crack", fmt::format("crack.{}{} cuts no bond of the body", k, line(scene.cracks[k].position))));
 }
 
 /// Loads act on held components, too: there the constraint takes them up.
@@ -56,8 +57,8 @@ void find_held_loads(const Scene& scene, const Body& body, const Constraints& co
           std::ranges::count_if(points, [&](std::int32_t p) { return free.component(static_cast<int>(c))[p] == 0; });
       const bool some = load.type == LoadDescription::Type::force;  // of a total, a part is lost
       if (held == 0 || (!some && held < std::ssize(points))) continue;
-      found.push_back(fmt::format("load.{}{} acts in {} on {} of {} points that are held in {}, where it moves nothing", k,
-                                  line(load.position), "xyz"[c], held, points.size(), "xyz"[c]));
+      found.push_back(named("held_load", fmt::format("load.{}{} acts in {} on {} of {} points that are held in {}, where it moves nothing", k,
+                                  line(load.position), "xyz"[c], held, points.size(), "xyz"[c])));
     }
   }
 }
@@ -79,9 +80,9 @@ void find_jumps(const Scene& scene, const Body& body, bool quasi_static, State& 
         const Point x = body.position(static_cast<std::size_t>(p));
         const double there = start.component(static_cast<int>(c))[p], wanted = value(x, 0);
         if (std::abs(there - wanted) <= 1e-9 * std::max(std::abs(there), std::abs(wanted))) continue;
-        found.push_back(fmt::format(
+        found.push_back(named("first_step", fmt::format(
             "boundary.{}{} gives the point at {} a {} of {:.6g} in {} at t = 0, where the body starts with {:.6g}", k,
-            line(boundary.position), place(x), boundary.velocity ? "velocity" : "displacement", wanted, "xyz"[c], there));
+            line(boundary.position), place(x), boundary.velocity ? "velocity" : "displacement", wanted, "xyz"[c], there)));
         told = true;
         break;
       }
@@ -97,9 +98,9 @@ void find_no_neighbours(const Scene& scene, const Families& families, std::vecto
   families.influence()->evaluate({&r, 1}, {&omega, 1});
   if (omega >= 0.01) return;   // of its largest value
   found.push_back(
-      fmt::format("influence \"{}\" is {:.2g} of its largest value at the nearest neighbours, {:.4g} of the horizon away: "
+      named("influence", fmt::format("influence \"{}\" is {:.2g} of its largest value at the nearest neighbours, {:.4g} of the horizon away: "
                   "families are almost empty; a larger horizon helps",
-                  scene.influence->type, omega, r));
+                  scene.influence->type, omega, r)));
 }
 
 }  // namespace

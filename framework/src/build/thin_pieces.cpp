@@ -11,6 +11,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/exact_sum.hpp"
 #include "perikit/core/rank_values.hpp"
+#include "perikit/core/warnings.hpp"
 
 namespace perikit {
 
@@ -158,9 +159,9 @@ void refuse_thin_pieces(const Scene& scene, const Families& families, Ghosts* gh
   const ThinPoint first = *std::ranges::min_element(firsts, {}, &ThinPoint::number);
   const double share = volume_of(body, mine) / volume_of(body, body.owned());
   if (share <= share_of_chips) {
-    warnings.push_back(fmt::format("{} points in pieces that are one point thick, {:.2g} of the volume of the body, the first one at ({:.6g}, {:.6g}, {:.6g}): no "
+    warnings.push_back(named("thin", fmt::format("{} points in pieces that are one point thick, {:.2g} of the volume of the body, the first one at ({:.6g}, {:.6g}, {:.6g}): no "
                                    "bond joins them to the rest, and what they store depends on the kinematics, not on the material; `inside` may leave them out",
-                                   count.all, share, first.x[0], first.x[1], first.x[2]));
+                                   count.all, share, first.x[0], first.x[1], first.x[2])));
     return;
   }
   const bool whole = count.all == static_cast<std::int64_t>(body.points_of_all_ranks());

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/merged_rows.hpp"
+#include "perikit/core/warnings.hpp"
 #include "problem/snapshot.hpp"
 
 namespace perikit {
@@ -43,16 +44,15 @@ std::string FractureRecord::summary(const BondChecks& checks, double dissipated)
         100.0 * static_cast<double>(checks.checked) / static_cast<double>(checks.groups));
   }
   if (gains_ > 0) {
-    text +=
-        fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J\n",
-                    gains_, gained_, dissipated + gained_);
+    text += named("second_law", fmt::format("warning       {} updates of bonds raised the strain energy, by {:.6g} J in all; the others took {:.6g} J",
+                                            gains_, gained_, dissipated + gained_)) + "\n";
   }
   if (held_ > 0)
     text +=
         fmt::format("bonds held    {} times a bond beyond its limit stayed, as its failure would have created energy\n", held_);
   if (inside_out_ > 0) {
-    text += fmt::format("warning       {} times points were turned inside out where bonds failed: the energy and the impulse of these bonds are lost\n",
-                        inside_out_);
+    text += named("inside_out", fmt::format("warning       {} times points were turned inside out where bonds failed: the energy and the impulse of these bonds are lost",
+                                            inside_out_)) + "\n";
   }
   return text;
 }

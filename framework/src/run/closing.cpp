@@ -7,6 +7,7 @@
 #include "core/numbered_rows.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/run/simulation.hpp"
 #include "run/small_strains.hpp"
 
@@ -62,6 +63,7 @@ std::string RunRecorder::closing(double set_up, double plan) const {
   std::vector<std::string> warnings = warnings_;
   if (const std::string warning = energy_warning(); !warning.empty()) warnings.push_back(warning);
   if (const std::string warning = simulation_.small_strains().closing(); !warning.empty()) warnings.push_back(warning);
+  warnings = without_silenced(std::move(warnings), simulation_.scene().silence);
   text += fmt::format("\nwarnings      {}\n",
                       warnings.empty() ? "none" : fmt::format("{}\n  {}", warnings.size(), fmt::join(warnings, "\n  ")));
   text += fmt::format("results       {} frames in {}", frames(), folder_.string());

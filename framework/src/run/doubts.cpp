@@ -9,6 +9,7 @@
 
 #include "perikit/body/lattice.hpp"
 #include "perikit/core/communicator.hpp"
+#include "perikit/core/warnings.hpp"
 
 namespace perikit {
 
@@ -75,8 +76,17 @@ void find_cut_cells(const Scene& scene, const Body& body, std::vector<std::strin
     for (std::size_t a = 0; a < d; ++a) upper += fmt::format("{}{:.6g}", a > 0 ? ", " : "", lattice.lower[a] + got[a]);
     remedy = fmt::format("no spacing nearby fits, upper = [{}] does", upper);
   }
-  lines.push_back(fmt::format("the box of [body.lattice] is {} spacings, which are not whole numbers: the body is {} m, not {} m; {}",
-                              sizes(cells), sizes(got), sizes(asked), remedy));
+  lines.push_back(named("box", fmt::format("the box of [body.lattice] is {} spacings, which are not whole numbers: the body is {} m, not {} m; {}",
+                              sizes(cells), sizes(got), sizes(asked), remedy)));
+}
+
+/// Families within two spacings are the nearest neighbours and hardly more.
+void find_small_horizon(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  const double ratio = body.horizon() / body.spacing();
+  if (ratio >= (body.dimension() == 1 ? 1.0 : 2.0) * (1 - 1e-9)) return;
+  lines.push_back(named("horizon", fmt::format("{} is {:.4g} spacings: families are the nearest neighbours and hardly more, and directions of the lattice and zero-energy modes show; "
+                                               "2 to 4 is usual",
+                                               scene.horizon > 0 ? "family.horizon" : "family.horizon_ratio", ratio)));
 }
 
 }  // namespace
@@ -86,9 +96,11 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
   const Body& body = problem.body();
   if (scene.random_points() && !scene.consistent.value_or(true) && problem.terms().has_gradients())
     lines.push_back(
-        "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
-        "the body is too soft by 1 to 12 %, however fine it is");
+        named("balance", "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
+                         "the body is too soft by 1 to 12 %, however fine it is"));
   find_cut_cells(scene, body, lines);
+  find_small_horizon(scene, body, lines);
+  find_doubts_of_model(scene, problem, lines);
   double farthest = 0;
   for (const std::int32_t p : body.internal())
     for (const double x : body.position(static_cast<std::size_t>(p))) farthest = std::max(farthest, std::abs(x));
@@ -96,9 +108,9 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
   const double rounding = std::numeric_limits<double>::epsilon() * farthest / body.spacing();
   if (scene.random_points() && rounding > 1e-8)
     lines.push_back(
-        fmt::format("points {:.3g} m away from the origin: the position of a point rounds to {:.2g} of the spacing; allowed: points "
+        named("origin", fmt::format("points {:.3g} m away from the origin: the position of a point rounds to {:.2g} of the spacing; allowed: points "
                     "near the origin",
-                    farthest, rounding));
+                    farthest, rounding)));
   for (int a = 0; a < body.dimension(); ++a) {
     const auto c = static_cast<std::size_t>(a);
     double low = body.position(static_cast<std::size_t>(body.internal()[0]))[c],
@@ -112,8 +124,8 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
     const double extent = high - low + body.spacing();
     if (extent >= body.horizon()) continue;
     lines.push_back(
-        fmt::format("the body is {:.6g} m thick along {}, less than the horizon, {:.6g} m: no point has half of a family across",
-                    extent, "xyz"[a], body.horizon()));
+        named("thin", fmt::format("the body is {:.6g} m thick along {}, less than the horizon, {:.6g} m: no point has half of a family across",
+                    extent, "xyz"[a], body.horizon())));
   }
   return lines;
 }

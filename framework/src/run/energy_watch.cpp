@@ -8,6 +8,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/problem/motion.hpp"
 #include "perikit/run/simulation.hpp"
 
@@ -115,19 +116,19 @@ std::string RunRecorder::energy_warning() const {
   BodyProblem& problem = simulation_.problem();
   if (!problem.terms().conservative() || balance.share() <= warned_share) return {};
   if (simulation_.quasi_static() && balance.share() > warned_share_of_work && balance.off > rounding_work(problem)) {
-    return fmt::format(
+    return named("energy", fmt::format(
         "warning: strain energy and the work of loads and boundaries were apart by up to {:.3g} J, {:.2g} of the largest energy of the "
         "run (more than {}): load steps are too few to follow the path, the body has jumped from one equilibrium to another, or a part "
         "of it is hardly held",
-        balance.off, balance.share(), warned_share_of_work);
+        balance.off, balance.share(), warned_share_of_work));
   }
   const double steps = static_cast<double>(std::max<std::int64_t>(1, problem.state().step));
   if (!simulation_.dynamic() || balance.off <= rounding_energy(problem, problem.state().time / steps)) return {};
-  return fmt::format(
+  return named("energy", fmt::format(
       "warning: the energies were off by up to {:.3g} J, {:.2g} of the largest energy of the run (more than {}): steps that are "
       "shorter resolve "
       "the motion better",
-      balance.off, balance.share(), warned_share);
+      balance.off, balance.share(), warned_share));
 }
 
 }  // namespace perikit

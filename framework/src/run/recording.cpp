@@ -18,6 +18,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/messages.hpp"
 #include "perikit/core/rank_values.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/run/simulation.hpp"
 #include "problem/snapshot.hpp"
 #include "run/checkpoint.hpp"
@@ -196,11 +197,15 @@ RunRecorder::~RunRecorder() {
 
 void RunRecorder::log(std::string_view message) {
   if (!first_) return;
+  const std::vector<std::string>& silence = simulation_.scene().silence;
   std::istringstream lines{std::string(message)};
-  for (std::string line; std::getline(lines, line);)
-    if (line.starts_with("warning")) warnings_.push_back(line);
-  log_text_ += message;
-  if (log_text_.empty() || log_text_.back() != '\n') log_text_ += '\n';
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("warning")) {
+      if (std::ranges::find(silence, warning_name(line)) != silence.end()) continue;
+      warnings_.push_back(line);
+    }
+    log_text_ += line + '\n';
+  }
   write_file_atomically(folder_ / "run.log", log_text_);
 }
 
@@ -273,8 +278,8 @@ void RunRecorder::step_done(const StepReport& report) {
   done_.frames += frame;
   while (done_.next_time < std::ssize(frame_times_) && reached(report.time, frame_times_[static_cast<std::size_t>(done_.next_time)])) ++done_.next_time;
   if (report.step == 0 && report.end_time > 0 && !frame_times_.empty() && !reached(report.end_time, frame_times_.back())) {
-    log(fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
-                    report.end_time));
+    log(named("output_times", fmt::format("warning: [output] times: {} lies after the end of the run, {}: no frame", frame_times_.back(),
+                    report.end_time)));
   }
   if (stopping_ || checkpoint_due(report.step, report.time)) keep_checkpoint(report);
   if (simulation_.quasi_static()) last_step_ = {report, simulation_.problem().snapshot(), row || stopping_, frame || stopping_};
@@ -365,8 +370,8 @@ void RunRecorder::write_frame(const StepReport& report) {
       });
     }
     if (strange < none && strange_fields_.insert(name).second)
-      log(fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, strange,
-                      name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : ""));
+      log(named("not_finite", fmt::format("warning: frame {}: {} is not finite at point {} (in input order){}", frames(), name, strange,
+                      name == "shape_tensor_condition" ? ", whose family is too poor for a gradient" : "")));
     fields_.forget(name);
   }
   fields_.renew();
@@ -381,8 +386,8 @@ void RunRecorder::look_for_crossed_faces(const StepReport& report) {
   const std::string crossed = simulation_.problem().crossed_faces();
   if (crossed.empty()) return;
   faces_crossed_ = true;
-  log(fmt::format("warning: {} {:.6g}: {}; what comes after is right only where faces that meet carry nothing", simulation_.dynamic() ? "time" : "load",
-                  report.time, crossed));
+  log(named("contact", fmt::format("warning: {} {:.6g}: {}; what comes after is right only where faces that meet carry nothing", simulation_.dynamic() ? "time" : "load",
+                  report.time, crossed)));
 }
 
 void RunRecorder::write_history(const StepReport& report, bool counts) {

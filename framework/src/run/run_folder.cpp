@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "output/sealed_file.hpp"
+#include "perikit/core/warnings.hpp"
 #include "run/checkpoint.hpp"
 
 namespace perikit {
@@ -30,10 +31,10 @@ std::string earlier_run(const std::filesystem::path& folder) {
     try {
       const Checkpoint checkpoint = read_checkpoint(folder);
       if (!ended(checkpoint.output, checkpoint.step, checkpoint.time)) {
-        return fmt::format(
+        return named("replaced_run", fmt::format(
             "warning: replaces a run in {} that was stopped and kept a checkpoint at step {}, time {:.6g} s: --resume would have "
             "gone on with it",
-            folder.string(), checkpoint.step, checkpoint.time);
+            folder.string(), checkpoint.step, checkpoint.time));
       }
     } catch (const InputError&) {  // nothing that could be gone on with
     }

@@ -10,6 +10,7 @@
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/memory.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/warnings.hpp"
 #include "run/doubts.hpp"
 #include "run/earlier_results.hpp"
 #include "run/small_strains.hpp"
@@ -158,16 +159,20 @@ std::string Simulation::summary() {
                         problem_->partition() ? problem_->partition()->images() : body.points() - body.points_of_all_ranks());
   std::int64_t singular = static_cast<std::int64_t>(report.singular_families);
   communicator().sum({&singular, 1});
-  std::vector<std::string> lines;
+  std::vector<std::string> lines, warnings;
   if (singular > 0)
-    lines.push_back(
-        fmt::format("warning       {} points have {}", singular,
-                    problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds"));
+    warnings.push_back(named("lone_points", fmt::format("{} points, {:.2g} % of all, have {}; a larger horizon, or points that lie closer", singular,
+                                                        100.0 * static_cast<double>(singular) / static_cast<double>(body.points_of_all_ranks()),
+                                                        problem_->terms().has_gradients() ? "a family too poor for a gradient; they carry no strain of their own" : "no bonds")));
+  for (const std::vector<std::string>& more : {scene_.warnings, problem_->warnings(), doubts(scene_, *problem_), report.warnings})
+    warnings.insert(warnings.end(), more.begin(), more.end());
+  if (!loose_.empty())
+    warnings.push_back(named("loose_pieces", fmt::format("nothing but weak springs ({:g} of a point's stiffness) holds {}", scene_.weak_springs, loose_)));
+  if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from))
+    warnings.push_back(named("first_step", "the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path"));
   for (const std::string& note : problem_->notes()) lines.push_back(fmt::format("side          {}", note));
-  for (const std::string& warning : problem_->warnings()) lines.push_back(fmt::format("warning       {}", warning));
   for (const auto& [label, note] : report.notes) lines.push_back(fmt::format("{:<13} {}", label, note));
-  for (const std::string& warning : doubts(scene_, *problem_)) lines.push_back(fmt::format("warning       {}", warning));
-  for (const std::string& warning : report.warnings) lines.push_back(fmt::format("warning       {}", warning));
+  for (const std::string& warning : without_silenced(std::move(warnings), scene_.silence)) lines.push_back(fmt::format("warning       {}", warning));
   if (problem_->partition()) {
     text += ranks_summary(*problem_);
     // Counts of bonds and of evaluation points are of each rank, with its ghosts.
@@ -180,15 +185,11 @@ std::string Simulation::summary() {
   if (report.broken_bonds > 0) text += fmt::format("cut bonds     {} by pre-cracks\n", report.broken_bonds);
   for (const std::string& line : lines) text += line + "\n";
   if (!carried_.empty()) text += fmt::format("carried       {}\n", carried_);
-  if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from)) {
-    text += "warning       the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path\n";
-  }
   if (report.fallbacks > 0) text += fmt::format("fallbacks     {} evaluation points fall back to the whole family, or to a lower order\n", report.fallbacks);
   if (report.dropped_parts > 0) text += fmt::format("dropped parts {} parts of families are too poor for a gradient; the other parts share their weight\n", report.dropped_parts);
   text += fmt::format("evaluations   {} a force evaluation\n", report.evaluation_points);
   const double bytes = static_cast<double>(problem_->bytes());
   text += fmt::format("memory        {:.3g} MB ({:.0f} bytes a point)\n", bytes / 1e6, bytes / static_cast<double>(body.owned().size()));
-  if (!loose_.empty()) text += fmt::format("warning       nothing but weak springs ({:g} of a point's stiffness) holds {}\n", scene_.weak_springs, loose_);
   return text + plan();
 }
 

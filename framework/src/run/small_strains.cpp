@@ -8,6 +8,7 @@
 
 #include "build/materials.hpp"
 #include "perikit/core/rank_values.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/model/stabilization.hpp"
 
 namespace perikit {
@@ -87,14 +88,14 @@ std::string SmallStrains::look(PointFields& fields, double time) {
   if (!(of_all > small)) return {};
   if (of_all > worst_) worst_ = of_all, worst_time_ = time;
   if (++beyond_ > 1) return {};
-  const std::string mine = fmt::format("warning: time {:.6g}: a strain of {:.3g} and a rotation of {:.3g} rad at ({:.6g}, {:.6g}, {:.6g}), with {}", time, there.strain, there.rotation, place[0],
-                                       place[1], place[2], with());
+  const std::string mine = named("small_strains", fmt::format("warning: time {:.6g}: a strain of {:.3g} and a rotation of {:.3g} rad at ({:.6g}, {:.6g}, {:.6g}), with {}", time, there.strain, there.rotation, place[0],
+                                       place[1], place[2], with()));
   return first_message(worst == of_all ? mine : "");
 }
 
 std::string SmallStrains::closing() const {
   if (beyond_ == 0) return {};
-  return fmt::format("warning: strains or rotations were not small in {} of {} frames, at most {:.3g} at time {:.6g} (more than {}), with {}", beyond_, frames_, worst_, worst_time_, small, with());
+  return named("small_strains", fmt::format("warning: strains or rotations were not small in {} of {} frames, at most {:.3g} at time {:.6g} (more than {}), with {}", beyond_, frames_, worst_, worst_time_, small, with()));
 }
 
 }  // namespace perikit

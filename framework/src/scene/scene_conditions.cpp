@@ -256,6 +256,7 @@ void SceneReader::read_run(const toml::table& root) {
   if (values.has("threads")) scene_.threads = static_cast<int>(values.integer("threads"));
   if (values.has("weak_springs")) scene_.weak_springs = values.number("weak_springs");
   scene_.weak_springs_position = values.position("weak_springs");
+  if (values.has("silence")) scene_.silence = values.texts("silence");
   if (!values.has("seed")) return;
   scene_.seed = values.integer("seed");
   if (scene_.body.lattice && !lattice_seed_) scene_.body.lattice->seed = scene_.seed;

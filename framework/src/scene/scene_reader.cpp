@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "perikit/core/warnings.hpp"
 #include "perikit/model/formulation.hpp"
 #include "scene/expression_names.hpp"
 #include "scene/sections.hpp"
@@ -60,6 +61,29 @@ void SceneReader::read(toml::table& root) {
   read_loads(root);
   read_output(root);
   read_run(root);
+  find_unused_constants(root);
+}
+
+/// Names in all texts below a node, those of keys left out.
+void SceneReader::names_below(const toml::node& node, std::set<std::string>& names) {
+  if (const auto* text = node.as_string())
+    for (std::string& name : names_of_expression(text->get())) names.insert(std::move(name));
+  if (const auto* array = node.as_array())
+    for (const toml::node& element : *array) names_below(element, names);
+  if (const auto* table = node.as_table())
+    for (const auto& [key, value] : *table) names_below(value, names);
+}
+
+/// A constant that nothing uses was often meant to be used where its value stands.
+void SceneReader::find_unused_constants(const toml::table& root) {
+  std::set<std::string> names;
+  names_below(root, names);
+  for (const auto& [name, value] : scene_.constants) {
+    if (names.contains(name)) continue;
+    const toml::node* node = root["constants"][name].node();
+    const int line = node ? reader_.position(*node).line : 0;
+    scene_.warnings.push_back(named("unused_constant", fmt::format("constants.{}{} is not used in the scene", name, line > 0 ? fmt::format(" (line {})", line) : "")));
+  }
 }
 
 Scene SceneReader::take() {

@@ -1,6 +1,8 @@
 #pragma once
 /// Turns a parsed scene into checked values, section by section.
 
+#include <set>
+
 #include "perikit/scene/scene.hpp"
 #include "scene/resolved.hpp"
 #include "scene/toml_reader.hpp"
@@ -42,6 +44,8 @@ class SceneReader {
   void read_output(const toml::table& root);
   void read_history(const toml::table& output);
   void read_run(const toml::table& root);
+  static void names_below(const toml::node& node, std::set<std::string>& names);
+  void find_unused_constants(const toml::table& root);
 
   /// The table `key` of `parent`; null (after an error if it is no table, or missing though required) where there is none.
   const toml::table* section(const toml::table& parent, const std::string& key, const std::string& path, bool required = false);

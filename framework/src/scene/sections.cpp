@@ -1,5 +1,6 @@
 #include "scene/sections.hpp"
 
+#include "perikit/core/warnings.hpp"
 #include "perikit/fields/point_field.hpp"
 #include "perikit/scene/scene.hpp"
 
@@ -234,6 +235,12 @@ ParameterTable history_parameters() {
   return table;
 }
 
+std::vector<std::string> warning_names() {
+  std::vector<std::string> names;
+  for (const WarningKind& kind : warning_kinds) names.emplace_back(kind.name);
+  return names;
+}
+
 ParameterTable run_parameters() {
   ParameterTable table;
   table.boolean("skip", "Leave out work whose result is known: checks of bonds that cannot have failed, parts of the body that no wave has reached. "
@@ -243,6 +250,9 @@ ParameterTable run_parameters() {
   table.integer("threads", "Number of threads; without it as many as the machine has.").at_least(1).at_most(4096);
   table.number("weak_springs", "-", "Quasi-static runs: pieces of the body that nothing holds hang on springs of this share of a point's stiffness, where they are. "
                                     "Without it such a piece is refused.").positive().at_most(1.0);
+  table.add(ParameterType::texts, "silence", "-", "Kinds of warnings that are not told: the name in brackets at the end of a warning (refusals.md has all).")
+      .by_default("[]")
+      .choices = warning_names();
   table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;
 }

@@ -7,6 +7,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/warnings.hpp"
 #include "sdk/alternating_volumes.hpp"
 
 namespace perikit {
@@ -74,7 +75,7 @@ class LoadSteps {
       return;
     }
     if (observer_.cancelled()) return;
-    if (const std::string warning = warn_of_alternating_volumes(problem_, u_); !warning.empty()) observer_.log("warning: " + warning);
+    if (const std::string warning = warn_of_alternating_volumes(problem_, u_); !warning.empty()) observer_.log(named("volumes", "warning: " + warning));
   }
 
  private:
@@ -104,15 +105,15 @@ class LoadSteps {
   void warn_of_jumps() {
     if (const double gap = equilibrium_.missing(u_, driving_); gap > 1e-12 * problem_.body().spacing())
       observer_.log(
-          fmt::format("warning: prescribed displacements are up to {:.3g} m away from the initial ones at load parameter 0; the "
+          named("first_step", fmt::format("warning: prescribed displacements are up to {:.3g} m away from the initial ones at load parameter 0; the "
                       "first step makes up for it",
-                      gap));
+                      gap)));
     if (!equilibrium_.converged())
       observer_.log(
-          fmt::format("warning: the body is out of balance by {:.3g} N at load parameter 0, by its initial displacement or by "
+          named("first_step", fmt::format("warning: the body is out of balance by {:.3g} N at load parameter 0, by its initial displacement or by "
                       "loads that do not begin at 0; "
                       "the first step starts from there",
-                      equilibrium_.residual_norm()));
+                      equilibrium_.residual_norm())));
   }
 
   std::string hint_of_volumes() {
@@ -252,11 +253,11 @@ class LoadSteps {
   void watch_stability() {
     if (told_unstable() != 0 || !solver_.unstable(equilibrium_, u_, position() >= planned())) return;
     told_unstable() = 1;
-    equilibrium_.note(fmt::format(
+    equilibrium_.note(named("unstable", fmt::format(
         "warning: {}: the equilibrium at load parameter {:.6g} is not stable: there is a motion by which the body would leave it on its own, as past buckling or a "
         "limit point. Results from here on may be those of an unstable branch; more steps, a small force or imperfection that chooses a side, or "
         "dynamic_relaxation, which moves on to stable equilibria, find another one",
-        integrator_, state_.time));
+        integrator_, state_.time)));
   }
 
   /// With [damage] a step consists of several equilibria: what is needed to return to where it began.

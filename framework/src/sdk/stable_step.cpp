@@ -7,6 +7,7 @@
 
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/warnings.hpp"
 #include "perikit/model/family_point.hpp"
 
 namespace perikit {
@@ -61,7 +62,7 @@ void check_time_step(Problem& problem, const ParameterValues& values, Observer* 
         "time_step",
         fmt::format("found {}; allowed: at most that, no time_step, which takes 0.9 of it, or allow_unstable = true", found));
   }
-  if (observer) observer->log(fmt::format("warning: {}.time_step is {}: allowed by allow_unstable", values.path(), found));
+  if (observer) observer->log(named("time_step", fmt::format("warning: {}.time_step is {}: allowed by allow_unstable", values.path(), found)));
 }
 
 double bond_based_time_step(const Body& body, const Laws& laws) {

@@ -9,6 +9,7 @@
 #include "families/cloud_families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/dimension.hpp"
+#include "perikit/core/warnings.hpp"
 #include "spaces/balance_solver.hpp"
 #include "spaces/closed_points.hpp"
 #include "spaces/shift.hpp"
@@ -253,10 +254,10 @@ void describe(const char* label, const Balanced& result, const std::string& what
       fmt::format("unbalanced force of a constant stress, over stress times area: {:.2g} before, {:.2g} after {} iterations; {}",
                   result.before, result.after, result.iterations, what));
   if (result.after <= acceptable_residual) return;
-  report.warnings.push_back(fmt::format(
+  report.warnings.push_back(named("balance", fmt::format(
       "the cloud is not consistent: a constant stress leaves {:.2g} of stress times area unbalanced at ({:.6g}, {:.6g}, {:.6g}); "
       "allowed: a larger horizon, or points that lie more evenly",
-      result.after, result.worst[0], result.worst[1], result.worst[2]));
+      result.after, result.worst[0], result.worst[1], result.worst[2])));
 }
 
 }  // namespace
@@ -342,12 +343,12 @@ void CloudConsistency::report(ModelReport& report) const {
              report);
   if (unbalanced > 0)
     report.warnings.push_back(
-        fmt::format("{} of {} points inside of the cloud have too few evaluation points around them to balance a constant stress; "
+        named("balance", fmt::format("{} of {} points inside of the cloud have too few evaluation points around them to balance a constant stress; "
                     "allowed: more parts, a larger horizon, or points that lie more evenly",
-                    unbalanced, whole));
+                    unbalanced, whole)));
   if (whole + at_surfaces == 0)
-    report.warnings.emplace_back(
-        "the cloud cannot be made consistent: every point has bonds to two sides of the body or more; allowed: more points across");
+    report.warnings.push_back(
+        named("balance", "the cloud cannot be made consistent: every point has bonds to two sides of the body or more; allowed: more points across"));
 }
 
 }  // namespace perikit

@@ -7,6 +7,7 @@
 
 #include "families/bond_finder.hpp"
 #include "perikit/core/dimension.hpp"
+#include "perikit/core/warnings.hpp"
 #include "terms/family_point.hpp"
 #include "terms/pair_assembly.hpp"
 #include "terms/surface_correction.hpp"
@@ -83,8 +84,9 @@ PairPoint PairForces<D>::point(std::size_t p) const {
 template <int D>
 void PairForces<D>::warn(const PairPoint& x, const MaterialRecord& record) {
   if (std::find(warned_.begin(), warned_.end(), &record) != warned_.end()) return;
-  const std::string warning = law_.warning(x);
-  if (warning.empty()) return;
+  const std::string told = law_.warning(x);
+  if (told.empty()) return;
+  const std::string warning = warning_name(told).empty() ? named("pair_law", told) : told;
   warned_.push_back(&record);
   if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
 }

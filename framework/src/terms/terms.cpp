@@ -14,6 +14,7 @@
 #include "families/shared_bonds.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "perikit/core/warnings.hpp"
 #include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
 #include "terms/failure_energy.hpp"
@@ -49,10 +50,10 @@ void warn_of_cost(const TermParts& parts, ModelReport& report) {
   const DamageTraits asked = asked_of(parts);
   if (!asked.energy || asked.released || f.pairs) return;
   const char* const unknown = BondRelease::unknown(f, parts.families->body().dimension(), parts.stabilization != nullptr);
-  report.warnings.push_back(fmt::format("a criterion by the energy that bonds hold, with gradients: a bond takes more than it holds, and cracks cost 1.4 to 5 "
+  report.warnings.push_back(named("crack_cost", fmt::format("a criterion by the energy that bonds hold, with gradients: a bond takes more than it holds, and cracks cost 1.4 to 5 "
                                         "times Gc and more; {}; what they cost is measured in fracture.md, \"What a crack costs\"",
                                         unknown ? fmt::format("what bonds set free is not known {}", unknown)
-                                                : "by the energy that bonds set free (energy = \"released\") they cost Gc"));
+                                                : "by the energy that bonds set free (energy = \"released\") they cost Gc")));
 }
 
 /// Where bonds that fail would create energy: framework/docs/fracture.md, "Bonds that stay".
@@ -61,15 +62,15 @@ void warn_of_energy(const TermParts& parts, ModelReport& report) {
   const char* const what = creates_energy(parts.formulation, stabilized, parts.families->body().dimension());
   if (!what) return;
   if (!parts.damage->second_law)
-    report.warnings.push_back(fmt::format(
+    report.warnings.push_back(named("second_law", fmt::format(
         "{}: updates of bonds that fail create energy, unless damage.second_law is true; how much is measured in fracture.md, "
         "\"Every kinematics and kernel\"",
-        what));
+        what)));
   else if (parts.formulation.point && !stabilized)
-    report.warnings.push_back(fmt::format(
+    report.warnings.push_back(named("second_law", fmt::format(
         "{}: most bonds beyond their limit stay, as their failure would raise the energy of zero-energy modes; cracks need a "
         "stabilization (fracture.md, \"Bonds that stay\")",
-        what));
+        what)));
 }
 
 }  // namespace
@@ -452,9 +453,12 @@ ModelReport Terms::report() const {
     report.skips.push_back({"bond vectors", "recomputed from positions", megabytes(bond_bytes)});
   }
   if (d < 3 && has_gradients()) report.skips.push_back({"components outside the space", fmt::format("{}D kernels", d), fmt::format("{} of 9 gradient components", 9 - d * d)});
+  if (parts_.formulation.point && !parts_.stabilization)
+    report.warnings.push_back(named("zero_energy", "one gradient per point without a stabilization: motions that alternate from point to point have no energy, and waves, loads and cracks bring them; "
+                                                   "stabilization = \"silling\", or in statics \"wan\""));
   if (!conservative())
-    report.warnings.emplace_back(
-        "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only");
+    report.warnings.push_back(
+        named("forces", "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only"));
   if (parts_.damage) {
     warn_of_energy(parts_, report);
     warn_of_cost(parts_, report);

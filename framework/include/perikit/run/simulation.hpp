@@ -44,6 +44,8 @@ class Simulation {
   void run(Observer& observer);
   /// Points, bonds, memory and the integrator's plan, one per line - what `perikit check` prints.
   std::string summary();
+  /// The body, its sets, materials, boundaries and loads, and what was decided where the scene is silent, one per line. Of one rank.
+  std::string overview();
   /// What was left out, why, and what it saves - what `--explain` prints.
   std::string explanation(const Registry& registry) const;
 

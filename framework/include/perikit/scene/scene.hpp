@@ -163,6 +163,8 @@ struct Scene {
   SourcePosition weak_springs_position;
   std::optional<int> threads;
   std::int64_t seed = 1;
+  std::vector<std::string> silence;          ///< [run]: kinds of warnings that are not told
+  std::vector<std::string> warnings;         ///< of what the scene itself says
 
   /// Whether points lie at random: [body.points], or a lattice with jitter.
   bool random_points() const noexcept { return body.points_file || (body.lattice && body.lattice->jitter > 0); }
