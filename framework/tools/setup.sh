@@ -3,7 +3,7 @@
 set -euo pipefail
 
 packages=(cmake g++ ninja-build libeigen3-dev libboost-dev libtomlplusplus-dev libsundials-dev libhdf5-dev libfmt-dev doctest-dev
-          libopenmpi-dev openmpi-bin libpetsc-real-dev pkgconf libsuitesparse-dev libmuparser-dev libcli11-dev gnuplot-nox libopenblas-dev hdf5-tools voro++-dev python3 python3-h5py dpkg-dev)
+          libopenmpi-dev openmpi-bin libpetsc-real-dev pkgconf libsuitesparse-dev libmuparser-dev libcli11-dev gnuplot-nox libopenblas-dev hdf5-tools voro++-dev python3 python3-h5py python3-venv python3-wheel dpkg-dev)
 
 ask=true
 case "${1:-}" in

@@ -1,7 +1,9 @@
 """The Python module: arrays have the shapes and values that the scene implies, and errors are those of the program."""
 
+import os
 import pathlib
 import tempfile
+import tomllib
 
 import numpy
 
@@ -97,6 +99,25 @@ with tempfile.TemporaryDirectory() as name:
     assert len(fine) == 1 and study["pull_error"][fine[0]] < 0.2
     assert study.results(fine[0]).scene["constants"]["n"] == 4
 
+    # A dictionary is a scene, too: the same bits as its file, and a scene as it was run is one. Its names of files count from the working directory.
+    os.chdir(folder)
+    scene = tomllib.loads(SCENE)
+    scene["constants"]["n"] = numpy.int64(6)
+    scene["integrator"]["steps"] = 3
+    scene["title"] = 'a "quoted" \\ title\nof two lines'
+    again = perikit.run(scene, "out_dictionary", threads=1)
+    assert numpy.array_equal(again.field("cauchy"), results.field("cauchy")) and again.scene["title"] == scene["title"]
+    once_more = perikit.run(again.scene, "out_scene", threads=1)
+    assert numpy.array_equal(once_more.field("cauchy"), results.field("cauchy"))
+    rows = [f"{x},{y},0.0,{v}" for (x, y, _), v in zip(results.position, results.volume)]
+    pathlib.Path("points.csv").write_text("x,y,z,volume\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    points_scene = {**scene, "body": {"dimension": 2, "plane": "stress", "points": {"file": pathlib.Path("points.csv")}}}
+    assert "points" in perikit.check(points_scene) and "points.csv" in perikit.check(points_scene)
+    assert not list(folder.glob("scene_*.toml"))
+    refused(lambda: perikit.run(scene), TypeError, "output")
+    refused(lambda: perikit.check({**scene, "title": None}), TypeError, "None")
+    refused(lambda: perikit.check({**scene, "famly": scene["family"]}), perikit.SceneRefused, "famly", "family")
+
     assert "points" in perikit.check(folder / "bar.toml")
     refused(lambda: perikit.run(folder / "bar.toml", folder / "bad", {"material.poisson_ratio": 0.7}), perikit.SceneRefused, "poisson_ratio", "0.7")
     refused(lambda: perikit.run(folder / "bar.toml", folder / "bad", {"integrator.max_iterations": 1, "integrator.cut_backs": 0, "material.type": "hencky", "load.0.traction": [600.0, 0]}),
@@ -104,3 +125,9 @@ with tempfile.TemporaryDirectory() as name:
     refused(lambda: perikit.Results(folder / "nowhere"), FileNotFoundError, "nowhere")
     refused(lambda: results.field("velocity"), KeyError, "velocity", "von_mises")
     refused(lambda: results.field("cauchy", 77), IndexError, "77")
+    refused(lambda: results.field("cauchy", -77), IndexError, "-77")
+    refused(lambda: results.history["pul"], KeyError, "pul", "history.csv", "strain_energy", "pull")
+    refused(lambda: results.sets["tip"], KeyError, "tip", "end")
+    refused(lambda: results.table()["cauchy"], KeyError, "cauchy_xx")
+    refused(lambda: study["error"], KeyError, "error", "pull_error")
+    refused(lambda: study.where(kinematics="baqp"), KeyError, "kinematics", "kinematics.type")

@@ -1,10 +1,13 @@
 """Runs the program."""
 
+import contextlib
 import os
 import pathlib
 import shutil
 import subprocess
+import tempfile
 
+from . import scene as toml
 from .results import Results
 from .study import Study
 
@@ -21,23 +24,8 @@ def program():
     """Path of the program: PERIKIT, or `perikit` on the search path. Raises FileNotFoundError."""
     found = os.environ.get("PERIKIT") or shutil.which("perikit")
     if not found:
-        raise FileNotFoundError("no program 'perikit' on the search path; the variable PERIKIT may name it")
+        raise FileNotFoundError("no program 'perikit' on the search path; the variable PERIKIT may name it, e.g. build/release/bin/perikit of the repository")
     return found
-
-
-def toml(value):
-    """A Python value as TOML, for --set."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if hasattr(value, "tolist"):  # arrays and scalars of numpy
-        return toml(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(toml(item) for item in value) + "]"
-    return repr(value)
 
 
 def call(*words):
@@ -51,30 +39,46 @@ def call(*words):
 
 
 def settings(overrides):
-    return [word for key, value in (overrides or {}).items() for word in ("--set", f"{key}={toml(value)}")]
+    return [word for key, value in (overrides or {}).items() for word in ("--set", f"{key}={toml.value(value)}")]
+
+
+@contextlib.contextmanager
+def scene_file(scene):
+    """The file of a scene. Of a dictionary: one in the working directory, from which its names of files count, that is removed afterwards."""
+    if not isinstance(scene, dict):
+        yield scene
+        return
+    with tempfile.NamedTemporaryFile("w", dir=".", prefix="scene_", suffix=".toml", encoding="utf-8") as file:
+        file.write(toml.text(scene))
+        file.flush()
+        yield os.path.relpath(file.name)
 
 
 def check(scene, overrides=None):
-    """What `perikit check` prints: the resolved scene, sizes, memory, time step. Raises SceneRefused."""
-    return call("check", scene, *settings(overrides))
+    """What `perikit check` prints of a scene file or a dictionary: the resolved scene, sizes, memory, time step. Raises SceneRefused."""
+    with scene_file(scene) as file:
+        return call("check", file, *settings(overrides))
 
 
 def run(scene, output=None, overrides=None, threads=None, options=()):
-    """Runs a scene file and opens its results.
+    """Runs a scene, a file or a dictionary, and opens its results.
 
-    output: folder of the results; default: out/<name of the scene>.
+    output: folder of the results; default: out/<name of the scene>. A dictionary has no name and needs one.
     overrides: values by key of the scene, {"constants.n": 8, "kinematics": {"type": "baqp"}}.
     options: further words of the command line, ("--resume",).
     Raises SceneRefused, RunFailed.
     """
+    if output is None and isinstance(scene, dict):
+        raise TypeError("perikit.run of a dictionary needs `output`, the folder of the results")
     output = pathlib.Path(output) if output else pathlib.Path("out") / pathlib.Path(scene).stem
-    words = ["run", scene, "-o", output, "--quiet", *settings(overrides), *options]
-    call(*words, *(["--threads", threads] if threads else []))
+    with scene_file(scene) as file:
+        words = ["run", file, "-o", output, "--quiet", *settings(overrides), *options]
+        call(*words, *(["--threads", threads] if threads else []))
     return Results(output)
 
 
 def study(file, output=None, overrides=None, jobs=1):
-    """Runs a study and opens its table. Raises SceneRefused, RunFailed (where no run came to its end)."""
+    """Runs a study and opens its table. Raises SceneRefused and RunFailed; after the latter Study(output) opens what there is."""
     output = pathlib.Path(output) if output else pathlib.Path("out") / pathlib.Path(file).stem
     call("study", file, "-o", output, "--quiet", "--jobs", jobs, *settings(overrides))
     return Study(output)

@@ -6,7 +6,7 @@ import tomllib
 import h5py
 import numpy
 
-from .tables import read_columns
+from .tables import Named, read_columns
 
 
 class Results:
@@ -49,7 +49,7 @@ class Results:
     def sets(self):
         """Indices of the points of each named set, by name."""
         with h5py.File(self.folder / "reference.h5") as file:
-            return {name[4:]: file[name][()] for name in file if name.startswith("set_")}
+            return Named("set", self.folder, {name[4:]: file[name][()] for name in file if name.startswith("set_")})
 
     @property
     def frames(self):
@@ -57,32 +57,33 @@ class Results:
         return sorted(int(path.stem) for path in (self.folder / "frames").glob("*.h5") if path.stem.isdigit())
 
     def _frame(self, frame):
+        """The file of a frame and its index, counted from the last where it is negative."""
         frames = self.frames
-        if frame < 0:
-            frame = frames[frame]
-        if frame not in frames:
-            raise IndexError(f"no frame {frame} in {self.folder}; there are {frames[0]} ... {frames[-1]}")
-        return h5py.File(self.folder / "frames" / f"{frame:08d}.h5")
+        index = frames[frame] if -len(frames) <= frame < 0 else frame
+        if index not in frames:
+            raise IndexError(f"no frame {frame} in {self.folder}; there are {frames[0]} ... {frames[-1]}" if frames else f"no frames in {self.folder}")
+        return h5py.File(self.folder / "frames" / f"{index:08d}.h5"), index
 
     @property
     def times(self):
         """Time [s], or load parameter, of each frame."""
         times = []
         for frame in self.frames:
-            with self._frame(frame) as file:
+            with self._frame(frame)[0] as file:
                 times.append(float(file.attrs["time"]))
         return numpy.array(times)
 
     def fields(self, frame=-1):
         """Names of the point fields that a frame holds."""
-        with self._frame(frame) as file:
+        with self._frame(frame)[0] as file:
             return sorted(file)
 
     def field(self, name, frame=-1):
         """A point field of a frame (negative: from the last): scalars (points,), vectors (points, 3), tensors (points, 3, 3)."""
-        with self._frame(frame) as file:
+        file, index = self._frame(frame)
+        with file:
             if name not in file:
-                raise KeyError(f"no field '{name}' in frame {frame} of {self.folder}; there are: {', '.join(sorted(file))}")
+                raise KeyError(f"no field '{name}' in frame {index} of {self.folder}; there are: {', '.join(sorted(file))}")
             values = file[name][()]
         return values.reshape(-1, 3, 3) if values.ndim == 2 and values.shape[1] == 9 else values
 
@@ -93,7 +94,7 @@ class Results:
     def table(self, frame=-1):
         """A frame as columns by name, one row a point: x, y, z, volume and every field, a column for each component (displacement_x, cauchy_xy)."""
         position = self.position
-        columns = {axis: position[:, k] for k, axis in enumerate("xyz")}
+        columns = Named("column", f"frame {frame} of {self.folder}", {axis: position[:, k] for k, axis in enumerate("xyz")})
         columns["volume"] = self.volume
         for name in self.fields(frame):
             values = self.field(name, frame)

@@ -1,8 +1,20 @@
-"""CSV files of perikit as numpy columns."""
+"""Columns with names, and the CSV files of perikit as such."""
 
 import csv
 
 import numpy
+
+
+class Named(dict):
+    """A dictionary of arrays that answers a name it does not have with those that it has."""
+
+    def __init__(self, kind, place, items=()):
+        """kind: what an entry is, "column"; place: where it was looked for, "out/bar/history.csv"."""
+        super().__init__(items)
+        self.kind, self.place = kind, place
+
+    def __missing__(self, name):
+        raise KeyError(f"no {self.kind} '{name}' in {self.place}; there are: {', '.join(self) or 'none'}")
 
 
 def column(texts):
@@ -18,4 +30,4 @@ def read_columns(path):
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
     header, rows = rows[0], rows[1:]
-    return {name: column([row[k] for row in rows]) for k, name in enumerate(header)}
+    return Named("column", path, {name: column([row[k] for row in rows]) for k, name in enumerate(header)})

@@ -40,8 +40,8 @@ def scene_cell(row):
 
 
 def settings(row):
-    from perikit.program import toml
-    return [(key, toml(value).replace("|", "\\|")) for key, value in row.get("set", {}).items()]
+    from perikit import scene
+    return [(key, scene.value(value).replace("|", "\\|")) for key, value in row.get("set", {}).items()]
 
 
 def row_of(rows, what):

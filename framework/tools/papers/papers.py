@@ -66,7 +66,7 @@ def scene_file(row):
 def words(row):
     """The words of the command line that make the row's run."""
     kind = "run" if "scene" in row else "study"
-    sets = [word for key, value in row.get("set", {}).items() for word in ("--set", f"{key}={perikit.program.toml(value)}")]
+    sets = [word for key, value in row.get("set", {}).items() for word in ("--set", f"{key}={perikit.scene.value(value)}")]
     return [kind, str(scene_file(row).relative_to(ROOT)) + ".toml", *sets]
 
 
