@@ -1,7 +1,9 @@
-"""Runs a lesson as a reader would: lesson.py LESSON.md ROOT BUILD FOLDER.
+"""Runs a page of the documentation as a reader would: page.py ROOT BUILD FOLDER PAGE.md...
 
-Blocks marked sh and python are run one after the other in FOLDER, which is emptied first and sees configs/ and the program. A block marked text
-shows what the block before it prints: each of its lines must be a line of that output. Numbers may differ by 1 %, and `...` is anything.
+Blocks marked sh and python are run one after the other in FOLDER, which is emptied first and sees configs/, framework/ and the program. A block marked
+text shows what the block before it prints: each of its lines must be a line of that output. Numbers may differ by 1 %, and `...` is anything. A block
+marked toml is a scene that `perikit check` takes, or a part of one whose keys are those of the reference page; one marked cpp stands in some source. A
+comment `<!-- not run: REASON -->` before a block leaves it out. Links to files and headings must lead somewhere.
 """
 
 import os
@@ -11,12 +13,18 @@ import shutil
 import subprocess
 import sys
 
+import environment
+import links
+import vocabulary
+
 TOLERANCE = 1e-2
+COMMANDS = r"(perikit|framework/tools/\S+|build/\S+|cmake|ctest|ninja|mpirun|sudo|export|pip|python3?)( |$)"
 
 
 def blocks(text):
-    """Language and text of each fenced block."""
-    return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    """Language, text and, where it is not run, the reason, of each fenced block."""
+    found = re.findall(r"(?:^<!-- not run: ([^\n]*?) -->\n)?^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return [(language, block, reason) for reason, language, block in found]
 
 
 def number(word):
@@ -40,29 +48,78 @@ def same_line(expected, found):
     return len(a) == len(b) and all(map(same_word, a, b))
 
 
-def main(lesson, root, build, folder):
+class Page:
+    def __init__(self, path, root, build, folder):
+        self.path, self.root, self.build, self.folder = path, root, build, folder
+        self.python = environment.interpreter(build / "tutorial" / "python", root / "framework" / "python")
+        if self.python is None:
+            print(f"not from an installed module: {environment.what_is_missing()}")
+        self.output, self.ran = [], 0
+
+    def fail(self, message):
+        sys.exit(f"{self.path}: {message}")
+
+    def run(self, command, text):
+        variables = environment.without_python_path() | {"PATH": f"{self.build / 'bin'}:{os.environ['PATH']}", "OMP_WAIT_POLICY": "passive"}
+        variables.pop("PERIKIT_PLUGIN_PATH", None)
+        if self.python is None:
+            variables["PYTHONPATH"] = str(self.root / "framework" / "python")
+        result = subprocess.run(command, cwd=self.folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.output = result.stdout.splitlines()
+        print(result.stdout)
+        if result.returncode != 0:
+            self.fail(f"status {result.returncode} of\n{text}")
+        self.ran += 1
+
+    def block(self, language, text):
+        if language == "sh":
+            self.run(["bash", "-euo", "pipefail", "-c", text], text)
+        elif language == "python":
+            self.run([str(self.python or sys.executable), "-c", text], text)
+        elif language == "text":
+            for line in filter(str.strip, text.splitlines()):
+                if not any(same_line(line, found) for found in self.output):
+                    self.fail(f"shows\n  {line}\nwhich is no line of\n" + "\n".join(self.output))
+        elif language == "toml" and re.search(r"^format = 1$", text, re.MULTILINE):
+            (self.folder / "scene.toml").write_text(text, encoding="utf-8")
+            self.run(["perikit", "check", "scene.toml"], text)
+        elif language == "toml":
+            if fault := vocabulary.fault(text, self.root / "framework" / "docs" / "reference.md"):
+                self.fail(f"{fault} in\n{text}")
+        elif language == "cpp":
+            if not vocabulary.in_sources(text, self.root):
+                self.fail(f"no source has\n{text}")
+        elif language == "":   # formulas
+            self.no_command(text)
+        else:
+            self.fail(f"a block marked '{language}'; known: sh, python, text, toml, cpp, none for formulas, and `<!-- not run: REASON -->` before a block")
+
+    def no_command(self, text):
+        if command := re.search(rf"^{COMMANDS}.*$", text, re.MULTILINE):
+            self.fail(f"a command in no block that could be run:\n{command.group()}")
+
+    def follow(self):
+        text = self.path.read_text(encoding="utf-8")
+        for language, block, reason in blocks(text):
+            if not reason:
+                self.block(language, block)
+        outside = re.sub(r"^```\w*\n.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+        self.no_command("\n".join(line[4:] for line in outside.splitlines() if line.startswith("    ")))
+        if fault := links.fault(self.path, outside):
+            self.fail(fault)
+
+
+def main(root, build, folder, *pages):
     root, build, folder = (pathlib.Path(path).resolve() for path in (root, build, folder))
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "configs").symlink_to(root / "configs")
-    environment = os.environ | {"PATH": f"{build / 'bin'}:{os.environ['PATH']}", "PYTHONPATH": str(root / "framework" / "python"), "OMP_WAIT_POLICY": "passive"}
-    environment.pop("PERIKIT_PLUGIN_PATH", None)
-    output, ran = [], 0
-    for language, text in blocks(pathlib.Path(lesson).read_text(encoding="utf-8")):
-        if language == "text":
-            for line in filter(str.strip, text.splitlines()):
-                if not any(same_line(line, found) for found in output):
-                    sys.exit(f"{lesson} shows\n  {line}\nwhich is no line of\n" + "\n".join(output))
-        elif language in ("sh", "python"):
-            command = ["bash", "-euo", "pipefail", "-c", text] if language == "sh" else [sys.executable, "-c", text]
-            result = subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            output = result.stdout.splitlines()
-            print("\n".join(output))
-            if result.returncode != 0:
-                sys.exit(f"{lesson}: status {result.returncode} of\n{text}")
-            ran += 1
-    if ran == 0:
-        sys.exit(f"{lesson} has nothing to run")
+    for name in ("configs", "framework"):
+        (folder / name).symlink_to(root / name)
+    for path in map(pathlib.Path, pages):
+        page = Page(path.resolve(), root, build, folder)
+        page.follow()
+        if page.ran == 0 and "tutorial" in path.parts and path.stem != "README":
+            page.fail("has nothing to run")
 
 
 main(*sys.argv[1:])
