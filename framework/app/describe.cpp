@@ -60,7 +60,8 @@ std::string describe_sections(const std::vector<std::pair<std::string, Parameter
   std::vector<std::string> known;
   for (const auto& [name, table] : sections) {
     known.push_back(name.empty() ? "top" : name);
-    if (section.empty() || section == known.back()) out += fmt::format("[{}]\n{}\n", name.empty() ? "top level" : name, parameter_lines(table));
+    if (section.empty() || section == known.back())
+      out += fmt::format("[{}]\n{}{}\n", name.empty() ? "top level" : name, section_note(name), parameter_lines(table));
   }
   if (out.empty())
     throw InputError(fmt::format("found the unknown section '{}'; allowed: {}{}", section, fmt::join(known, ", "),
@@ -103,6 +104,19 @@ std::string list_parts(Registry& registry, const std::string& kind) {
     }
   }
   return out;
+}
+
+std::string section_note(const std::string& section) {
+  if (section == "constants") {
+    return "Each key is a name of your own, its value a number, or an expression of numbers and other constants. Wherever a scene takes a number or an expression, it takes these names.\n\n"
+           "```toml\n[constants]\nL = 0.2\nn = 40\ndx = \"L/n\"\n```\n\n";
+  }
+  if (section == "sets") {
+    return "Each key is a name of your own for a set of points, which boundaries, loads, regions and the history use. Its value says which points these are, in one of three forms: "
+           "an expression in x, y, z that is true at them; the one point nearest to a place; a list of indices. `all` is the set of all points.\n\n"
+           "```toml\n[sets]\nleft = \"x < 0.01 && y > 0\"\ntip = { nearest = [0.2, 0] }\nmarks = { points = [3, 12, 40] }\n```\n\n";
+  }
+  return {};
 }
 
 std::string describe_part(Registry& registry, const std::string& part) {

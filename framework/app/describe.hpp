@@ -12,6 +12,9 @@ inline constexpr const char* study_values_note =
     "A study runs one scene for lists of values of some of its keys: `[values]` holds these keys, e.g. `family.horizon_ratio = [2.015, 3.015]`. "
     "`perikit study` writes table.csv, table.md and, with [plot], plot.png and plot.svg.";
 
+/// What the tables do not say of a section whose keys are names of the user's own: [constants], [sets]. Markdown; empty for other sections.
+std::string section_note(const std::string& section);
+
 /// Everything that the part's tables say. `part`: KIND/NAME; or "scene", "scene/SECTION", "study", "study/SECTION" for the keys of these files.
 std::string describe_part(Registry& registry, const std::string& part);
 

@@ -48,9 +48,13 @@ std::string part_of(Kind kind, const PartDescription& d) {
 
 std::string reference_page(Registry& registry) {
   std::string out = "# Reference\n\nWritten by `perikit describe --markdown` from the tables that the program reads its input with.\n\n"
-                    "Wherever a number or an integer is allowed, so is a string with an expression of numbers and `[constants]`: `spacing = \"L/n\"`, `\"1/4\"`.\n\n## The scene\n\n";
+                    "Wherever a number or an integer is allowed, so is a string with an expression of numbers and `[constants]`: `spacing = \"L/n\"`, `\"1/4\"` "
+                    "([all about expressions](expressions.md)).\n\n## The scene\n\n";
   for (const auto& [section, table] : scene_sections()) {
-    out += fmt::format("### {}\n\n{}\n", section.empty() ? "Top level" : fmt::format("[{}]", section), table_of(table));
+    const std::string note = section_note(section);
+    out += fmt::format("### {}\n\n{}", section.empty() ? "Top level" : fmt::format("[{}]", section), note);
+    if (table.parameters().empty() && !note.empty()) continue;   // names of the user's own alone
+    out += table_of(table) + "\n";
   }
   out += fmt::format("## A study\n\n{}\n\n", study_values_note);
   for (const auto& [section, table] : study_sections()) {

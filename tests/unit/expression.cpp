@@ -3,7 +3,11 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <fstream>
+#include <regex>
+#include <sstream>
 
+#include "scene/expression_names.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -106,4 +110,24 @@ TEST_CASE("values that are not finite name key and point") {
   CHECK(contains(message, "is inf at x = (0, 1, 2), t = 3"));
   CHECK(contains(message_of([] { (void)at("sqrt(-1)"); }), "nan"));
   CHECK(contains(message_of([] { (void)at("log(-x)"); }), "nan"));
+}
+
+TEST_CASE("the page on expressions names every word, and its examples have the values that it says") {
+  std::ifstream file(std::string(PERIKIT_SOURCE_FOLDER) + "/framework/docs/expressions.md");
+  const std::string page((std::istreambuf_iterator<char>(file)), {});
+  for (const std::string& word : expression_words()) {
+    const bool named = page.find("`" + word + "`") != std::string::npos || page.find("`" + word + "(") != std::string::npos;
+    CHECK_MESSAGE(named, word);
+  }
+  std::size_t examples = 0;
+  std::istringstream lines(page.substr(page.find("## Examples")));
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch row;
+    if (!std::regex_match(line, row, std::regex(R"(\| `(.+)` \| (\S+) \| .*)"))) continue;
+    const std::string text = std::regex_replace(row[1].str(), std::regex(R"(\\\|)"), "|");   // a bar in a Markdown table
+    const Expression example(text, {{"L", 10.0}, {"dx", 0.5}}, true, {}, "");
+    CHECK_MESSAGE(example({2, 3, 5}, 0.5) == doctest::Approx(std::stod(row[2].str())).epsilon(1e-12), text);
+    ++examples;
+  }
+  CHECK(examples == 14);
 }

@@ -278,11 +278,11 @@ const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
     const ParameterTable model = model_parameters();
     for (const Parameter& part : model.parameters()) top.add(part.type, part.name, part.unit, part.text) = part;
     return std::vector<std::pair<std::string, ParameterTable>>{{"", top},
+                                                               {"sets", set_parameters()},
                                                                {"constants", {}},
                                                                {"body", body_parameters(0)},
                                                                {"body.lattice", lattice_parameters()},
                                                                {"body.points", points_parameters()},
-                                                               {"sets", set_parameters()},
                                                                {"family", family_parameters()},
                                                                {"kinematics", common_part_parameters(Kind::kinematics)},
                                                                {"region", region_parameters()},

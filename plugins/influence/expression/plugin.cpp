@@ -20,6 +20,9 @@ class Formula final : public InfluenceFunction {
     const std::string& text = values.text("formula");
     parser_.ClearConst();
     parser_.DefineConst("pi", std::numbers::pi);
+    parser_.DefineFun("floor", +[](double v) { return std::floor(v); });
+    parser_.DefineFun("ceil", +[](double v) { return std::ceil(v); });
+    parser_.DefineFun("pow", +[](double a, double b) { return std::pow(a, b); });
     parser_.DefineVar("r", &r_);
     try {
       parser_.SetExpr(text);
@@ -67,7 +70,7 @@ PartDescription description() {
                        .parameters = {},
                        .examples = {"formula = \"exp(-9*r^2)\"", "formula = \"(1 - r)^2\""},
                        .equations = "omega = formula(r), r = |xi|/delta in (0, 1]",
-                       .source = "muParser's syntax: + - * / ^, comparisons, && ||, ?:, exp, sqrt, cos, ...; pi",
+                       .source = "the operators and functions of all expressions, framework/docs/expressions.md; pi, no [constants]",
                        .limits = "must be finite and >= 0 on (0, 1] (checked at 1000 values of r); set-up of a large cloud is slower "
                                  "than with a built-in function"};
   part.parameters.string("formula", "the influence as an expression in r = |xi|/horizon").require();
