@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Clouds against closed forms: the tables of framework/docs/clouds.md.
+"""Clouds against closed forms: the tables of framework/docs/orders.md.
 
   clouds.py PROGRAM FOLDER           every table, into FOLDER/clouds.md: some minutes
   clouds.py PROGRAM FOLDER --small   a few coarse bodies; fails where an error is larger than it should be
