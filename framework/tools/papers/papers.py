@@ -44,17 +44,16 @@ import sys
 import time
 import tomllib
 
-import numpy
-
 sys.dont_write_bytecode = True
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 sys.path[:0] = [str(HERE), str(ROOT / "framework/python")]
 
+import perikit  # noqa: E402  (first: it says which packages this Python lacks)
 import measures  # noqa: E402
+import numpy  # noqa: E402
 import page  # noqa: E402
-import perikit  # noqa: E402
 
 PAPERS = ("partmann", "hashim", "chowdhury", "scabbia", "hu")
 
