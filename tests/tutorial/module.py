@@ -94,6 +94,7 @@ with tempfile.TemporaryDirectory() as name:
     assert perikit.Results(folder / "out" / "results.h5").folder == folder / "out"
 
     study = perikit.study(folder / "study.toml", folder / "study")
+    assert len(perikit.study(folder / "study.toml", folder / "study", jobs=2, options=["--resume"])) == 4
     assert len(study) == 4 and list(study["status"]) == ["done"] * 4
     fine = study.where(constants__n=4, kinematics__type="baqp")
     assert len(fine) == 1 and study["pull_error"][fine[0]] < 0.2

@@ -77,8 +77,12 @@ def run(scene, output=None, overrides=None, threads=None, options=()):
     return Results(output)
 
 
-def study(file, output=None, overrides=None, jobs=1):
-    """Runs a study and opens its table. Raises SceneRefused and RunFailed; after the latter Study(output) opens what there is."""
+def study(file, output=None, overrides=None, jobs=1, options=()):
+    """Runs a study and opens its table.
+
+    output, overrides, options: as in `run`; jobs: runs side by side.
+    Raises SceneRefused and RunFailed; after the latter Study(output) opens what there is.
+    """
     output = pathlib.Path(output) if output else pathlib.Path("out") / pathlib.Path(file).stem
-    call("study", file, "-o", output, "--quiet", "--jobs", jobs, *settings(overrides))
+    call("study", file, "-o", output, "--quiet", "--jobs", jobs, *settings(overrides), *options)
     return Study(output)
