@@ -89,6 +89,17 @@ TEST_CASE("a pressure all around holds a uniform stress in equilibrium, point by
       }
 }
 
+TEST_CASE("a pressure all around holds a uniform one in equilibrium under selective kinematics, whose mean stress acts by the gradients of points") {
+  const double stretch = 1.1, P = stress(block, stretch);
+  for (const char* base : {"baqp", "projection", "bond_associated", "sub_horizon", "non_spherical", "bond_augmented"})
+    for (const bool follower : {false, true}) {
+      const auto simulation = under_pressure(block, fmt::format("selective\"\nbase = \"{}", base),
+                                             fmt::format("[[load]]\nset = \"all\"\npressure = 1.0\nfollower = {}\n[integrator]\ntype = \"evaluate\"\n", follower));
+      const double left = imbalance(*simulation, stretch, follower ? -P / (stretch * stretch) : -P);
+      CHECK_MESSAGE(left < 1e-11, base, ", follower ", follower, ": ", left);
+    }
+}
+
 TEST_CASE("pressure: exact totals, on one side and on a hole") {
   for (const char* kinematics : {"baqp", "bond_based"}) {
     const auto total = [&](const BodyText& body, const std::string& load, int component) {

@@ -40,7 +40,11 @@ FaceShares in_order(const Shares& shares, SurfaceSamples samples) {
 struct Face {
   int axis;
   double outward;  ///< 1: upper face, -1: lower
-  explicit Face(const LoadDescription& load) : axis(load.face[1] - 'x'), outward(load.face[0] == '+' ? 1.0 : -1.0) {}
+  UnitStress unit;
+  explicit Face(const LoadDescription& load)
+      : axis(load.face[1] - 'x'),
+        outward(load.face[0] == '+' ? 1.0 : -1.0),
+        unit(load.type == LoadDescription::Type::pressure ? UnitStress::all_around : UnitStress::along_axis) {}
 };
 
 /// An end of a column of cells along the axis of a face: a point with none before it, or none behind it.
@@ -147,7 +151,7 @@ class Columns {
 FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
   const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
-  const Field areas = exact ? face_areas(parts, face.axis) : Field();
+  const Field areas = exact ? face_areas(parts, face.axis, face.unit) : Field();
   const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));  // that a face is felt in
   const double area = body.uniform_volume() / body.spacing();
   if (exact && images) images->append_images(points);   // what the evaluation points of the set have of the face beyond its edges
@@ -261,7 +265,7 @@ class Layer {
 /// is of the set, and images of these points with what the evaluation points have of the face beyond its edges.
 Shares by_kinematics(const std::vector<std::int32_t>& points, const Face& face, const Layer& layer, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
-  const Field areas = face_areas(parts, face.axis);
+  const Field areas = face_areas(parts, face.axis, face.unit);
   std::vector<std::uint8_t> in_set(body.stride(), 0);
   for (const std::int32_t p : points) in_set[static_cast<std::size_t>(p)] = 1;
   std::vector<SurfacePoint> outer;

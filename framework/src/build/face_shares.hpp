@@ -23,9 +23,13 @@ struct FaceShares {
 /// carry whose forces are complete, with all ranks, which must all call it. Throws InputError where no point of the set lies on the face.
 FaceShares face_shares(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
 
+/// A stress of 1 along the normal of a face, or along all axes: a pressure. Selective kinematics have areas of their own for the mean stress, whose
+/// gradients are those of points; for all others both are the same.
+enum class UnitStress { along_axis, all_around };
+
 /// The area [m^2] that each point has of faces across `axis` in the eyes of the kinematics: its force along the axis where a
-/// stress of 1 along the axis is the same everywhere, positive at the upper face and negative at the lower one. Loads in
+/// unit stress is the same everywhere, positive at the upper face and negative at the lower one. Loads in
 /// proportion to it hold a homogeneous stress in equilibrium, point by point.
-Field face_areas(TermParts parts, int axis);
+Field face_areas(TermParts parts, int axis, UnitStress unit);
 
 }  // namespace perikit

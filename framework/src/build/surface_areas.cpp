@@ -59,7 +59,7 @@ std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts
   if (!parts.formulation.pairs) {
     std::vector<Point> areas(body.stride(), Point{});
     for (int axis = 0; axis < body.dimension(); ++axis) {
-      const Field of_axis = face_areas(parts, axis);
+      const Field of_axis = face_areas(parts, axis, UnitStress::all_around);
       for (const std::int32_t p : body.internal()) areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = of_axis.data()[p];
     }
     return areas;
