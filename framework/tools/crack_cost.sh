@@ -3,12 +3,7 @@
 # set free: the double cantilever beam under eight kinematics, three more at twice the spacing; and by a stretch and a strength, at two spacings. Three Markdown tables are
 # printed: those of framework/docs/fracture.md, "What a crack costs". About an hour and a half on one core; part of `ninja fracture`.
 #   crack_cost.sh PERIKIT OUT
-# Runs that are done are kept.
-set -euo pipefail
-perikit=$(realpath "$1")
-out=$(realpath -m "$2")
-cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-mkdir -p "$out"
+. "$(dirname "${BASH_SOURCE[0]}")/table_cells.sh"
 
 # Folder, name in the table, setting, opening of each end [m] by energies set free and held: cracks that cost more are opened farther.
 # Of pair laws both energies are the same.
@@ -19,8 +14,8 @@ all=(
   projection '`projection`' projection 1.8e-3 1.8e-3
   bond_augmented '`bond_augmented`' bond_augmented 1.8e-3 1.8e-3
   bond_associated '`bond_associated`' bond_associated 1.8e-3 3e-3
-  silling '`conventional` with `silling`, 1' '{type="conventional",stabilization={type="silling",coefficient=1.0}}' 2e-3 4e-3
-  wan '`conventional` with `wan`' '{type="conventional",stabilization="wan"}' 2e-3 4e-3
+  silling '`conventional` with `silling`, 1' "$silling" 2e-3 4e-3
+  wan '`conventional` with `wan`' "$wan" 2e-3 4e-3
 )
 # At twice the spacing, and plane strain for the selective map, which needs it.
 coarse=(
@@ -35,17 +30,15 @@ coarse=(
 others=(
   bond_based '`bond_based`' bond_based false
   baqp '`baqp`' baqp true
-  wan '`conventional` with `wan`' '{type="conventional",stabilization="wan"}' true
+  wan '`conventional` with `wan`' "$wan" true
   bond_associated '`bond_associated`' bond_associated true
 )
 
 # One cell: energy per area, G, load over LEFM's.   cell FOLDER SETTING...
 cell() {
-  local folder=$out/$1 settings=()
-  for setting in "${@:2}"; do settings+=(--set "$setting"); done
-  [ -s "$folder.txt" ] || { rm -rf "$folder"; framework/tools/double_cantilever.sh "$perikit" "$folder" "${settings[@]}" > "$folder.part" || echo 'the run ends early' > "$folder.part"
-    mv "$folder.part" "$folder.txt"; }
-  awk 'NF == 6 && $1 + 0 > 0 { printf " %.2f, %.2f, %.2f |", $1, $2, $4; next } { printf " %s |", $0 }' "$folder.txt"
+  [ -s "$out/$1.txt" ] || rm -rf "${out:?}/$1"
+  run_cell "$1" double_cantilever.sh '' "${@:2}"
+  awk 'NF == 6 && $1 + 0 > 0 { printf " %.2f, %.2f, %.2f |", $1, $2, $4; next } { printf " %s |", $0 }' "$out/$1.txt"
 }
 # by_energy FOLDER KINEMATICS OPENING SOFTENING ENERGY
 by_energy() {

@@ -2,12 +2,7 @@
 # The strip of configs/fracture/strip.toml over sizes of the step, kinematics, what the crack is given, and bonds that weaken. Three Markdown tables are printed: that of
 # framework/docs/fracture.md, "Size of the step", and those of the strip in "What a crack costs". Minutes; part of `ninja fracture`.
 #   strip_table.sh PERIKIT OUT
-# Runs that are done are kept.
-set -euo pipefail
-perikit=$(realpath "$1")
-out=$(realpath -m "$2")
-cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-mkdir -p "$out"
+. "$(dirname "${BASH_SOURCE[0]}")/table_cells.sh"
 
 # Folder, name in the tables, setting.
 all=(
@@ -16,19 +11,16 @@ all=(
   baqp '`baqp`' baqp
   projection '`projection`' projection
   bond_associated '`bond_associated`' bond_associated
-  silling '`conventional` with `silling`, 1' '{type="conventional",stabilization={type="silling",coefficient=1.0}}'
-  wan '`conventional` with `wan`' '{type="conventional",stabilization="wan"}'
+  silling '`conventional` with `silling`, 1' "$silling"
+  wan '`conventional` with `wan`' "$wan"
 )
 stretch='damage={type="critical_stretch",energy_release_rate="Gc",consistent=true,no_fail=["grips","end"]}'
 
 # One cell: energy per area, speed and, where asked for, the balance.   cell FOLDER COLUMNS SETTING...
 cell() {
-  local folder=$out/$1 columns=$2 settings=()
-  for setting in "${@:3}"; do settings+=(--set "$setting"); done
-  [ -s "$folder.txt" ] || { framework/tools/strip.sh "$perikit" "$folder" --force "${settings[@]}" > "$folder.part" || echo 'the run ends early' > "$folder.part"
-    mv "$folder.part" "$folder.txt"; }
-  awk -v columns="$columns" 'NF == 3 && $1 + 0 > 0 { printf " %.2f, %.0f m/s", $1, $2; if (columns == 3) { sub("%", " %", $3); printf ", %s", $3 }; printf " |"; next }
-    { sub("the crack did not pass the gates", "not through"); printf " %s |", $0 }' "$folder.txt"
+  run_cell "$1" strip.sh --force "${@:3}"
+  awk -v columns="$2" 'NF == 3 && $1 + 0 > 0 { printf " %.2f, %.0f m/s", $1, $2; if (columns == 3) { sub("%", " %", $3); printf ", %s", $3 }; printf " |"; next }
+    { sub("the crack did not pass the gates", "not through"); printf " %s |", $0 }' "$out/$1.txt"
 }
 by_step() {  # FOLDER NAME SETTING...
   printf '| %s |' "$2"
