@@ -73,13 +73,16 @@ class Trial:
         if checked and (checked.status == 0) != (done.status != 2):
             self.found("check", "check ends with %d, run with %d: %s" % (checked.status, done.status, checked.first_line or done.first_line))
         if done.status == 1:
-            self.judge_failure(done)
+            self.judge_failure(out, done)
         if done.status != 2:
             self.look_at_values(out)
             self.compare(out, done)
         return self.findings
 
-    def judge_failure(self, done):
+    def judge_failure(self, out, done):
+        with open(out + "/run.log") as file:
+            if "allowed by allow_unstable" in file.read():   # a step that is too long for the body, as the scene asked for
+                return
         reasons = {"energies do not add up": "energy guard", "error:.*(bug|internal)": "internal"}
         for pattern, kind in reasons.items():
             if re.search(pattern, done.words):

@@ -18,3 +18,11 @@ TEST_CASE("the nearest name is a likely slip, or nothing") {
   CHECK(nearest("steel", names).empty());
   CHECK(did_you_mean("hency", names) == "; did you mean 'hencky'?");
 }
+
+TEST_CASE("errors: words of other programs are answered with what there is") {
+  const std::vector<std::string> known = {"body", "load"};
+  CHECK(did_you_mean("gravity", known) == "; gravity is a load: [[load]] set = \"all\", body_force = [...] per volume");
+  for (const char* word : {"elastic_plastic", "temperature", "mesh", "table"}) CHECK(!did_you_mean(word, known).empty());
+  CHECK(did_you_mean("lod", known) == "; did you mean 'load'?");
+  CHECK(did_you_mean("interstellar", known).empty());
+}

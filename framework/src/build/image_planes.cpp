@@ -154,10 +154,12 @@ class PlaneBuilder {
     if (!lattice_) return at;
     const double cells = (at - lattice_->lower[static_cast<std::size_t>(axis)]) / spacing_;
     if (std::abs(cells - std::round(cells)) < 1e-6) return at;
+    double plane = at + (std::round(cells) - cells) * spacing_;
+    if (std::abs(plane) < 1e-9 * spacing_) plane = 0;   // but for rounding
     throw InputError(position, key,
                      fmt::format("found {:.6g}, which does not lie half-way between points of the lattice; allowed: its lower corner and "
                                  "multiples of the spacing from there, {:.6g} for one",
-                                 at, at + (std::round(cells) - cells) * spacing_));
+                                 at, plane));
   }
 
   /// Whether one of the points of a set, on whatever rank, lies at a side.

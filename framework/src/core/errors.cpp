@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 namespace perikit {
@@ -57,7 +58,27 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
   return best;
 }
 
+namespace {
+
+/// Words of other programs, and what there is for them.
+std::string instead_of(std::string_view word) {
+  constexpr const char* history = "laws that remember, such as plastic ones, are written with `perikit new material NAME --history`";
+  constexpr const char* functions = "a value that changes is an expression of t, such as \"t < 1 ? 2*t : 2\"";
+  static const std::map<std::string_view, const char*> known = {
+      {"elastic_plastic", history}, {"plastic", history}, {"j2", history}, {"johnson_cook", history}, {"viscoelastic", history}, {"plasticity", history},
+      {"amplitude", functions}, {"curve", functions}, {"table", functions},
+      {"gravity", "gravity is a load: [[load]] set = \"all\", body_force = [...] per volume"},
+      {"mesh", "the nodes of a mesh are points: [body.points] file = \"points.csv\", with a volume for each, or volume = \"voronoi\""},
+      {"temperature", "there is no temperature yet"}, {"thermal", "there is no temperature yet"},
+  };
+  const auto found = known.find(word);
+  return found == known.end() ? "" : fmt::format("; {}", found->second);
+}
+
+}  // namespace
+
 std::string did_you_mean(std::string_view name, std::span<const std::string> candidates) {
+  if (const std::string instead = instead_of(name); !instead.empty()) return instead;
   const std::string best = nearest(name, candidates);
   return best.empty() ? "" : fmt::format("; did you mean '{}'?", best);
 }

@@ -21,11 +21,11 @@ double peak_bytes() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// What was left out because no wave had arrived, in words; empty where nothing was.
-std::string quiet_summary(const QuietCounts& counts) {
+/// What was left out because it was at rest, in words; empty where nothing was.
+std::string quiet_summary(const QuietCounts& counts, bool dynamic) {
   if (counts.quiet == 0) return {};
-  return fmt::format("quiet blocks  {} of {} blocks of points left out of force evaluations ({:.2f} %): no wave had reached them\n", counts.quiet, counts.blocks,
-                     100.0 * static_cast<double>(counts.quiet) / static_cast<double>(counts.blocks));
+  return fmt::format("quiet blocks  {} of {} blocks of points left out of force evaluations ({:.2f} %): {}\n", counts.quiet, counts.blocks,
+                     100.0 * static_cast<double>(counts.quiet) / static_cast<double>(counts.blocks), dynamic ? "no wave had reached them" : "nothing had moved there yet");
 }
 
 }  // namespace
@@ -38,7 +38,7 @@ std::string RunRecorder::closing(double set_up, double plan) const {
   BodyProblem& problem = simulation_.problem();
   const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(), steps_time = std::max(0.0, spent - output_seconds_);
   const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.body().points_of_all_ranks());
-  std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts());
+  std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts(), simulation_.dynamic());
   text += fmt::format("time          {:.2f} s set-up, {:.2f} s plan, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, plan, steps_time,
                                  output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());

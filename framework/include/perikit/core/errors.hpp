@@ -43,7 +43,7 @@ class InputErrors : public InputError {
 /// The candidate nearest to `name` by edit distance; empty when none is near enough to be a likely slip of the pen.
 std::string nearest(std::string_view name, std::span<const std::string> candidates);
 
-/// "; did you mean 'X'?" or "" - for the end of a message about an unknown name.
+/// "; did you mean 'X'?", or what there is for a word of other programs, or "" - for the end of a message about an unknown name.
 std::string did_you_mean(std::string_view name, std::span<const std::string> candidates);
 
 }  // namespace perikit
