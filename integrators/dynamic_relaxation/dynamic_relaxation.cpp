@@ -31,14 +31,15 @@ Relaxation::Relaxation(Problem& problem, const RelaxationOptions& options)
     : options_(options), eigenvector_(problem.state().declare("relaxation_eigenvector")), r_(problem.make_field()),
       last_r_(problem.make_field()), v_(problem.make_field()) {}
 
-double Relaxation::find_mass(Problem& problem, ConstFieldView u, ConstFieldView free) {
+double Relaxation::find_mass(Equilibrium& equilibrium) {
   // Central differences of step 1 are stable while omega_max^2 = lambda_max/m <= 4.
-  return safety * largest_eigenvalue(problem, u, free, eigenvector_, norm(eigenvector_) > 0) / 4;
+  return safety / 4 *
+         largest_eigenvalue(equilibrium.problem(), equilibrium.displacement(), equilibrium.free(), eigenvector_, norm(eigenvector_) > 0,
+                            [&] { return equilibrium.goes_on(); });
 }
 
 Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
   Solution solution;
-  Problem& problem = equilibrium.problem();
   const FieldView u = equilibrium.displacement();
   if (!predict_by_tangent(equilibrium, extrapolated)) {
     solution.failure = equilibrium.failure();
@@ -48,7 +49,7 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
   const auto start = [&] {
     fill(0.0, v_);
     last_kinetic = 0;
-    mass = find_mass(problem, u, equilibrium.free());
+    mass = find_mass(equilibrium);
   };
   bool at_rest = true;   // v holds no motion yet
   for (;; ++solution.iterations) {
@@ -69,7 +70,7 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       at_rest = true;
       smallest = residual;
       if (!(mass > 0)) {
-        solution.failure = "the stiffness of the free points is zero or cannot be found";
+        solution.failure = equilibrium.stopped() ? equilibrium.failure() : "the stiffness of the free points is zero or cannot be found";
         return solution;
       }
     }

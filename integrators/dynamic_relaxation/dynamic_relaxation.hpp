@@ -18,7 +18,7 @@ class Relaxation final : public EquilibriumSolver {
 
  private:
   /// Mass on every component for which steps of length 1 are stable at u [N/m]; 0 where there is none.
-  double find_mass(Problem& problem, ConstFieldView u, ConstFieldView free);
+  double find_mass(Equilibrium& equilibrium);
 
   RelaxationOptions options_;
   FieldView eigenvector_;  ///< of the last estimate; kept with the problem

@@ -241,9 +241,9 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   if (!evaluate()) return solution;
   if (fixed_point()) {
     if (eigenvector_.size() == 0) eigenvector_ = problem.make_field();
-    mass_ = largest_eigenvalue(problem, u, equilibrium.free(), eigenvector_, false);
+    mass_ = largest_eigenvalue(problem, u, equilibrium.free(), eigenvector_, false, [&] { return equilibrium.goes_on(); });
     if (!(mass_ > 0)) {
-      solution.failure = "the stiffness of the free points is zero or cannot be found";
+      solution.failure = equilibrium.stopped() ? equilibrium.failure() : "the stiffness of the free points is zero or cannot be found";
       return solution;
     }
   }

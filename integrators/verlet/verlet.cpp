@@ -246,6 +246,9 @@ void Verlet::run(Problem& problem, Observer& observer) {
   double& last_dt = plan[3];
   double& counter = plan[4];   // steps of the plan
   double& softest = plan[5];   // the least eigenvalue of the body so far
+  // An estimate that a signal ended is made up for when the run goes on: whether one is due, whether after a stretch, and the eigenvalue around failed bonds.
+  const std::span<double> asked = state.declare_numbers("verlet_estimate", 3);
+  double &due = asked[0], &stretched = asked[1], &failed = asked[2];
   StretchWatch watch(state.declare_numbers("verlet_stretches", StretchWatch::numbers));
   const bool estimated = options_.time_step <= 0;
   const auto make_plan = [&](double step) {
@@ -302,6 +305,21 @@ void Verlet::run(Problem& problem, Observer& observer) {
     stepper.prescribed_speed(state.time, speeds);
   }
   stepper.start_speed();
+  const auto estimate = [&] {
+    // That after a stretch tells how eigenvalues rise with stretches, too.
+    EigenvalueBounds found = eigenvalue_bounds(problem, state.displacement(), stretched > 0 ? 0 : most(), [&] { return !observer.interrupted(); });
+    if (found.given_up) return;
+    due = 0;
+    found.bound = std::max(found.bound, failed);
+    const double eigenvalue = found.bound;
+    softest = std::min(softest, eigenvalue);
+    if (eigenvalue > most()) {
+      make_plan(beside_resonance(std::min(dt, step_of(problem, share, eigenvalue)), softest));
+      observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
+    }
+    watch.estimated(problem.stretches(state.displacement()), state.step, found, most());
+  };
+  if (due > 0) estimate();
   while (state.step < static_cast<std::int64_t>(first + counter) && !observer.cancelled()) {
     const double t = state.time;
     // Half of the last step and half of the next: equal steps make it a whole one.
@@ -329,20 +347,10 @@ void Verlet::run(Problem& problem, Observer& observer) {
     const bool last = state.step == static_cast<std::int64_t>(first + counter);
     // The largest eigenvalue rises at once where bonds fail, soon where the body is stretched or compressed fast, and slowly else.
     if (watched && !last) {
-      const double failed = fewer ? eigenvalue_around_failed_bonds(problem, most()) : 0;
-      const bool stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
-      if (failed > 0 || stretched || state.step % options_.check_every == 0) {
-        // That after a stretch tells how eigenvalues rise with stretches, too.
-        EigenvalueBounds found = eigenvalue_bounds(problem, state.displacement(), stretched ? 0 : most());
-        found.bound = std::max(found.bound, failed);
-        const double eigenvalue = found.bound;
-        softest = std::min(softest, eigenvalue);
-        if (eigenvalue > most()) {
-          make_plan(beside_resonance(std::min(dt, step_of(problem, share, eigenvalue)), softest));
-          observer.log(fmt::format("verlet: step {}: the stable step became smaller; {:.0f} more steps of {:.6g} s", state.step, counter, dt));
-        }
-        watch.estimated(problem.stretches(state.displacement()), state.step, found, most());
-      }
+      failed = fewer ? eigenvalue_around_failed_bonds(problem, most()) : 0;
+      stretched = watch.due(state.step) && watch.look(problem.stretches(state.displacement()), state.step);
+      due = failed > 0 || stretched > 0 || state.step % options_.check_every == 0;
+      if (due > 0) estimate();
     }
     observer.step_done(report());
   }

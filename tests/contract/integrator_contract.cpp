@@ -67,6 +67,21 @@ double stable_step(const BodyOptions& body, const std::string& of = kinematics) 
   return 2 / std::sqrt(largest_eigenvalue(simulation->problem(), simulation->problem().state().displacement()));
 }
 
+/// Ends the run when it is asked for the `at`-th time whether it is to end within a step; 0: never.
+class Signalled final : public Observer {
+ public:
+  explicit Signalled(std::int64_t at = 0) : at_(at) {}
+  bool wants_sample(std::int64_t, double) override { return false; }
+  void step_done(const StepReport&) override {}
+  void log(std::string_view) override {}
+  bool cancelled() const noexcept override { return at_ > 0 && asked >= at_; }
+  bool interrupted() const noexcept override { return ++asked == at_; }
+  mutable std::int64_t asked = 0;
+
+ private:
+  std::int64_t at_;
+};
+
 }  // namespace
 
 TEST_CASE("integrator: displacements and energy converge with the square of the time step") {
@@ -284,6 +299,31 @@ TEST_CASE("integrator: a run that continues from a saved state is bitwise the ru
         CHECK_THROWS_AS(build_run(body_of(1), integrator)->problem().restore(saved), InputError);
       }
     }
+}
+
+TEST_CASE("integrator: a run that a signal ends within an estimate of its step goes on as without") {
+  BodyOptions body = body_of(2);
+  body.conditions = waves(2) + driven(2, 0.1);
+  const std::string end = fmt::format("{:.17g}", 650 * stable_step(body));
+  for (const Example& integrator : integrators(is_dynamic, {{"end_time", end}})) {
+    if (integrator.table.find("time_step") != std::string::npos) continue;
+    INFO(integrator.part, " ", integrator.table);
+    const auto whole = build_run(body, integrator);
+    Signalled never;
+    whole->run(never);
+    for (const std::int64_t at : {std::int64_t{1}, never.asked / 2, never.asked}) {
+      if (at == 0) continue;   // its steps take no time
+      const auto first = build_run(body, integrator), second = build_run(body, integrator);
+      Signalled stopped(at);
+      first->run(stopped);
+      CHECK(stopped.asked == at);
+      REQUIRE(first->problem().state().step < whole->problem().state().step);
+      second->problem().restore(first->problem().snapshot());
+      Signalled rest;
+      second->run(rest);
+      CHECK_MESSAGE(state(*second) == state(*whole), "the run differs by ", difference(state(*second), state(*whole)));
+    }
+  }
 }
 
 TEST_CASE("integrator: bitwise the same for one and two threads") {

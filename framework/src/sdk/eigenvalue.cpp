@@ -32,11 +32,16 @@ RitzValue largest_ritz_value(const std::vector<double>& alpha, const std::vector
 
 }  // namespace
 
-EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm, double enough) {
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm, double enough, const GoesOn& goes_on) {
   const std::size_t n = scale.size();
   const int d = problem.dimension();
   Field last = problem.make_field(), w = problem.make_field(), Kw = problem.make_field();
   FieldView q = vector, before = last;
+  Field start;   // of an estimate that may be given up
+  if (goes_on && warm) {
+    start = problem.make_field();
+    copy(vector, start);
+  }
   if (!warm) {
     fill_with_noise(scale, 1, problem.body().places(), vector);
   } else {
@@ -53,6 +58,11 @@ EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFiel
   const int most = 80;
   EigenvalueBounds found;
   for (int k = 0; k < most; ++k) {
+    if (goes_on && !goes_on()) {
+      if (warm) copy(start, vector);
+      else fill(0.0, vector);
+      return {.given_up = true};
+    }
     for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
     if (!problem.tangent_action(u, w, Kw).ok()) return {};
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
@@ -73,8 +83,8 @@ EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFiel
   return found;
 }
 
-double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm) {
-  return eigenvalue_bounds(problem, u, scale, vector, warm).bound;
+double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView scale, FieldView vector, bool warm, const GoesOn& goes_on) {
+  return eigenvalue_bounds(problem, u, scale, vector, warm, 0, goes_on).bound;
 }
 
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale, double enough) {

@@ -28,9 +28,9 @@ Field root_of_masses(Problem& problem) {
 
 }  // namespace
 
-EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough) {
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough, const GoesOn& goes_on) {
   const FieldView eigenvector = problem.state().declare("eigenvector");
-  return eigenvalue_bounds(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0, enough);
+  return eigenvalue_bounds(problem, u, root_of_masses(problem), eigenvector, norm(eigenvector) > 0, enough, goes_on);
 }
 
 double largest_eigenvalue(Problem& problem, ConstFieldView u) { return eigenvalue_bounds(problem, u, 0).bound; }

@@ -13,7 +13,7 @@ namespace perikit {
 /// Central differences are stable up to steps of 2 over its root.
 double largest_eigenvalue(Problem& problem, ConstFieldView u);
 /// Likewise. Later calls end early where the bound is found to lie below `enough`.
-EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough);
+EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, double enough, const GoesOn& goes_on = {});
 
 /// That of a part of the body alone: not above that of the body. Where it is found to lie below `enough`, any bound below that. Nothing is kept.
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, double enough);
