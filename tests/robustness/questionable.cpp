@@ -300,3 +300,15 @@ TEST_CASE("questionable: what a pair law, a criterion, a force state and [output
   const Result run = desk.perikit("run scene.toml -o out");
   CHECK_MESSAGE(contains(run.out, "warning: [output] times: 2 lies after the end of the run, 1: no frame [output_times]"), run.out);
 }
+
+TEST_CASE("questionable: criteria of stress between materials of unlike stiffness") {
+  const auto with = [](const std::string& stiffer, const std::string& more) {
+    return replaced(plate, "[output]",
+                    "[[region]]\nset = \"right\"\nmaterial = { type = \"neo_hookean\", density = 1.0, shear_modulus = " + stiffer + ", bulk_modulus = 2.0 }\n[damage]\ntype = \"max_stress\"\nstrength = 1.0\n" +
+                        more + "\n[output]");
+  };
+  warned(with("80.0", ""), "", "damage \"max_stress\" looks at stresses of bonds between materials of 1 : 35.4 in stiffness, which are off there");
+  silent(with("1.6", ""));
+  silent(with("80.0", "no_fail = [\"right\"]"));
+  silent(replaced(replaced(with("80.0", ""), "max_stress", "critical_stretch"), "strength", "stretch"));
+}

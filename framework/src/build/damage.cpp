@@ -163,6 +163,31 @@ void warn_of_short_zone(const BodyFrame& frame, const ParameterValues& values, d
                                    place, softening, remedy)));
 }
 
+/// Evaluation points that see two materials have stresses of their own: a laminate leaves out a part of its stencil, which the stiffer side takes for strain, and a
+/// stabilization carries a part of the force. Measured: plugins/damage/max_stress/README.md.
+void warn_of_interface_stresses(const Scene& scene, const Families& families, const Laws& laws, const BodyDamage& damage, std::vector<std::string>& warnings) {
+  if (!damage.law->traits().stress || laws.records().size() == 1) return;
+  constexpr double least = 3;   // below it bars fail at 0.9 of the strength and more
+  const auto stiffness = [&](std::size_t p) { return laws.moduli(p).lambda + 2 * laws.moduli(p).mu; };
+  double ratio = 1;
+  FamilyArrays family;
+  for (const std::int32_t index : families.body().owned()) {
+    const auto p = static_cast<std::size_t>(index);
+    const double own = stiffness(p);
+    families.load(p, BondsOf::uncut, family);
+    for (const std::int32_t far : family.far) {
+      const auto q = static_cast<std::size_t>(far);
+      if (damage.limits(p, q).onset < infinite && own > 0 && stiffness(q) > 0) ratio = std::max(ratio, std::max(own / stiffness(q), stiffness(q) / own));
+    }
+  }
+  ratio = communicator().largest(ratio);
+  if (ratio < least) return;
+  warnings.push_back(named("interface_stress", fmt::format(
+      "damage \"{}\" looks at stresses of bonds between materials of 1 : {:.3g} in stiffness, which are off there: bars in tension across such an interface fail at 0.7 to 0.8 of their strength "
+      "at 1 : 10 and at a third of it at 1 : 100; a set of the points within two horizons of it under no_fail, or a criterion by stretch or energy, does not depend on them",
+      scene.damage->type, ratio)));
+}
+
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
@@ -226,6 +251,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   for (Field* field : limits_of_points)
     if (images && field->size() > 0) images->copy_from_sources(*field);
   if (equal) damage->failure = Field();
+  warn_of_interface_stresses(scene, *parts.families, laws, *damage, warnings);
   return damage;
 }
 

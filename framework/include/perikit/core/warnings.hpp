@@ -29,6 +29,7 @@ inline constexpr std::array warning_kinds = {
     WarningKind{"horizon", "a horizon below two spacings"},
     WarningKind{"influence", "an influence function that leaves out the nearest neighbours"},
     WarningKind{"inside_out", "points that failing bonds turned inside out"},
+    WarningKind{"interface_stress", "criteria by stress where unlike materials meet"},
     WarningKind{"libraries", "libraries of parts that were refused"},
     WarningKind{"locking", "nearly incompressible bodies without selective"},
     WarningKind{"lone_points", "points whose families are too poor for a gradient, or that have no bonds"},
