@@ -1,6 +1,10 @@
 # perikit_compile_options(target): the flags that framework and plugins share (they must agree on the SIMD width).
 function(perikit_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
+  # The same bits at every level and every optimisation (docs/decisions/0025-same-bits.md): products and sums are fused where the source says so
+  # (perikit/core/simd.hpp), not where the compiler likes to, and Eigen sums in the order of scalars, whatever the width of a register is.
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
+  target_compile_definitions(${target} PRIVATE EIGEN_DONT_VECTORIZE)
   # Parts are described with designated initializers, which leave out what has a default.
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wno-missing-field-initializers -fno-math-errno -fno-trapping-math)
   if(PERIKIT_NATIVE)

@@ -5,7 +5,9 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 using namespace perikit;
@@ -101,3 +103,50 @@ TEST_CASE("packs: roots and signs") {
   CHECK(lanes_of(min(packed(from(-1)), Pack(0.0)))[0] == -1.0);
   CHECK(lanes_of(max(packed(from(-1)), Pack(0.0)))[0] == 0.0);
 }
+
+TEST_CASE("packs: sums over eight lanes have one order, whatever the width of a pack is") {
+  const std::array<double, 16> a = {1e16, 1, -1e16, 1, 3, 1e-3, 7, -2, 1, 1e16, 1, -1e16, 1e-3, 5, -7, 2};
+  EightSums sums;
+  for (int l = 0; l < 16; l += pack_width) sums.at(l) += Pack::load(a.data() + l);
+  double total = 0;
+  for (std::size_t l = 0; l < 8; ++l) total += a[l] + a[l + 8];
+  CHECK(sums.total() == total);
+}
+
+#if defined(__FMA__) || defined(__aarch64__)
+TEST_CASE("packs: a product is not rounded before it is added, wherever it stands") {
+  const double a = 1 + 0x1p-30, b = 1 - 0x1p-30, c = 3 + 0x1p-40, d = 1.0 / 3;   // a b = 1 - 2^-60, which rounds to 1
+  const Pack A(a), B(b), C(c), D(d);
+  const auto first = [](Pack x) { return x[0]; };
+  CHECK(first(A * B - Pack(1.0)) == -0x1p-60);
+  CHECK(first(Pack(1.0) - A * B) == 0x1p-60);
+  CHECK(first(Pack(-1.0) + A * B) == -0x1p-60);
+  CHECK(first(A * B + C * D) == std::fma(a, b, c * d));
+  CHECK(first(A * B - C * D) == std::fma(a, b, -(c * d)));
+  CHECK(first(-(A * B) + Pack(1.0)) == 0x1p-60);
+  Pack sum(-1.0);
+  sum += A * B;
+  CHECK(sum[0] == -0x1p-60);
+  CHECK((Pack(A * B) - Pack(1.0))[0] == 0.0);
+}
+
+// In scalars, operation by operation: what every level with fused operations computes.
+TEST_CASE("packs: reciprocals and roots are the same numbers at every level") {
+  const auto guess = [](std::uint64_t constant, double x, int shift) {
+    return std::bit_cast<double>(constant - (std::bit_cast<std::uint64_t>(x) >> shift));
+  };
+  double x = 1.2345e-200;
+  for (int n = 0; n < 2000; ++n, x *= 1.6180339887) {
+    double r = guess(0x7fde663822fc16e6, x, 0);
+    r *= std::fma(-x, r, 2.0013);
+    r *= std::fma(-x, r, 2.0000008455);
+    const double e = std::fma(-x, r, 1.0);
+    CHECK(reciprocal(Pack(x))[0] == std::fma(r, std::fma(e, e, e), r));
+    double q = guess(0x5fe4075000000000, x, 1);
+    const double t = (x * q) * q;
+    q *= std::fma(t, std::fma(t, 0.65922143, -1.7546571), 2.0998561);
+    const double f = std::fma(-(x * q), q, 1.0);
+    CHECK(reciprocal_root(Pack(x))[0] == std::fma(q * f, std::fma(f, std::fma(0.3125, f, 0.375), 0.5), q));
+  }
+}
+#endif

@@ -57,6 +57,6 @@ TEST_CASE("extension and direction of bonds, shortened, turned over and stretche
       const double size = std::abs(kept), direction = 1e-15 * (1 + 4 / (size * size));
       REQUIRE(bond.has_length());
       CHECK(found.e[0] == doctest::Approx((size - 1) * bond.length).epsilon(1e-14 * (1 + 1 / size)));
-      for (int c = 0; c < 3; ++c) CHECK(std::abs(found.n[c][0] - std::copysign(bond.xi[c] / bond.length, kept * bond.xi[c])) <= direction);
+      for (int c = 0; c < 3; ++c) CHECK(std::abs((found.y[c] * found.inverse_length)[0] - std::copysign(bond.xi[c] / bond.length, kept * bond.xi[c])) <= direction);
     }
 }

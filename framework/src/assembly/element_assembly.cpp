@@ -36,9 +36,9 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   const auto gradient = [&](int q, int c, int e) {
     const double* g = element.row(q, e);
     const double* du = m.u.data() + static_cast<std::size_t>(c) * element.width;
-    Pack total(0.0);
-    for (std::size_t k = 0; k < element.width; k += pack_width) total += Pack::load(g + k) * Pack::load(du + k);
-    return sum(total);
+    EightSums sums;
+    for (std::size_t k = 0; k < element.width; k += pack_width) sums.at(static_cast<int>(k)) += Pack::load(g + k) * Pack::load(du + k);
+    return sums.total();
   };
   const int owners = shape_.formulation.selective() ? 1 : 0;
   double Hbar[D * D] = {};

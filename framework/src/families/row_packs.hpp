@@ -174,10 +174,9 @@ class RowColumns {
     PERIKIT_UNROLL for (int l = 0; l < pack_width; ++l)
       if (l < n) rows[stride * static_cast<std::size_t>(at[l])] += by_row.row(l);
   }
-  /// Sum of the rows.
-  [[gnu::always_inline]] Row sum() const noexcept {
+  /// r plus the rows, one after the other.
+  [[gnu::always_inline]] Row sum_after(Row r) const noexcept {
     const RowColumns by_row(*this, transposed);
-    Row r{};
     PERIKIT_UNROLL for (int l = 0; l < pack_width; ++l) r += by_row.row(l);
     return r;
   }
@@ -201,6 +200,22 @@ class RowColumns {
   }
 
   Pack column_[4];
+};
+
+/// Sums over rows, eight at a time whatever the width of a pack is (EightSums).
+class EightRows {
+ public:
+  /// The part that lanes l ... of an array go to, l a multiple of pack_width.
+  RowColumns& at(int l) noexcept { return part_[l % 8 / pack_width]; }
+  /// ((row 0 + row 1) + row 2) + ...
+  [[gnu::always_inline]] Row sum() const noexcept {
+    Row r{};
+    for (const RowColumns& part : part_) r = part.sum_after(r);
+    return r;
+  }
+
+ private:
+  RowColumns part_[8 / pack_width];
 };
 
 }  // namespace perikit

@@ -74,13 +74,15 @@ namespace {
 
 /// sum of W psi, in four sums, which do not wait for each other.
 double weighted_energy(int n, const double* weight, const double* psi) noexcept {
-  Pack sums[4];
-  const auto add = [&](int l, Pack& to) { to += Pack::load(weight + l) * Pack::load(psi + l); };
+  EightSums sums[4];
+  const auto add = [&](int eight, EightSums& to) {
+    for (int l = eight; l < eight + 8; l += pack_width) to.at(l) += Pack::load(weight + l) * Pack::load(psi + l);
+  };
   int l = 0;
-  for (; l + 4 * pack_width <= n; l += 4 * pack_width)
-    for (int k = 0; k < 4; ++k) add(l + k * pack_width, sums[k]);
-  for (; l + pack_width <= n; l += pack_width) add(l, sums[0]);
-  double total = sum((sums[0] + sums[1]) + (sums[2] + sums[3]));
+  for (; l + 32 <= n; l += 32)
+    for (int k = 0; k < 4; ++k) add(l + 8 * k, sums[k]);
+  for (; l + 8 <= n; l += 8) add(l, sums[0]);
+  double total = ((sums[0] + sums[1]) + (sums[2] + sums[3])).total();
   for (; l < n; ++l) total += weight[l] * psi[l];
   return total;
 }

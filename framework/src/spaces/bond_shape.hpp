@@ -103,10 +103,13 @@ template <int D, bool per_slot, bool both, bool weighs>
 void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks, int slots, std::int64_t p, const BondVectors& v,
                           double far_share, const double* P, const double* W, FieldView force, FieldView stress) noexcept {
   const Pack near(both ? 1 - far_share : 1.0), other(far_share);
-  for (int l = 0; l < static_cast<int>(padding); l += pack_width) {
-    // Every loop over components is unrolled whole: sums of the owners stay in registers.
-    Pack own_t[D], own_S[D * D];
-    for (int k = 0; k < slots; ++k) {
+  constexpr int packs = static_cast<int>(padding) / pack_width;
+  // Bond by bond for all eight points, so that what a far end gets comes in the same order whatever the width of a pack is. Every loop over
+  // components is unrolled whole: sums of the owners stay in registers.
+  Pack own_t[packs][D], own_S[packs][D * D];
+  for (int k = 0; k < slots; ++k) {
+    PERIKIT_UNROLL for (int i = 0; i < packs; ++i) {
+      const int l = i * pack_width;
       const std::uint8_t mask = pack_mask(masks[k], l);
       if (mask == 0) continue;
       const std::int64_t far = p + shifts[k] + l;
@@ -123,8 +126,8 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
           if constexpr (weighs) row[e] = Pack::load(W + lane) * row[e];
         }
         t[c] = bond_shape_row_adjoint<D>(row, xi, g);
-        own_t[c] += t[c];
-        PERIKIT_UNROLL for (int e = 0; e < D; ++e) own_S[c * D + e] += near * (S[c * D + e] = row[e]);
+        own_t[i][c] += t[c];
+        PERIKIT_UNROLL for (int e = 0; e < D; ++e) own_S[i][c * D + e] += near * (S[c * D + e] = row[e]);
       }
       const auto scatter = [&](auto&& add) {
         PERIKIT_UNROLL for (int c = 0; c < D; ++c) add(force.component(c) + far, -t[c]);
@@ -135,8 +138,11 @@ void lattice_bond_adjoint(const std::int64_t* shifts, const std::uint8_t* masks,
       if (mask == pack_mask(0xff, 0)) scatter([](double* to, Pack value) { (Pack::load(to) + value).store(to); });
       else scatter([&](double* to, Pack value) { subtract_at(to, mask, -value); });
     }
-    PERIKIT_UNROLL for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + p + l) + own_t[c]).store(force.component(c) + p + l);
-    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + p + l) + own_S[c]).store(stress.component(c) + p + l);
+  }
+  PERIKIT_UNROLL for (int i = 0; i < packs; ++i) {
+    const std::int64_t own = p + i * pack_width;
+    PERIKIT_UNROLL for (int c = 0; c < D; ++c) (Pack::load(force.component(c) + own) + own_t[i][c]).store(force.component(c) + own);
+    PERIKIT_UNROLL for (int c = 0; c < D * D; ++c) (Pack::load(stress.component(c) + own) + own_S[i][c]).store(stress.component(c) + own);
   }
 }
 

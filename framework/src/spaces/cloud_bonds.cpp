@@ -280,7 +280,7 @@ template <int D>
 void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept {
   Row *const force = force_.data(), *const flux = flux_.data();
   const double far_share = far_share_;
-  RowColumns own, own_stress[D];
+  EightRows own, own_stress[D];
   for (int l = 0; l < n; l += pack_width) {
     Pack xi[D], g[D];
     RowColumns t, stress[D];  // t: on the far ends
@@ -293,10 +293,10 @@ void CloudBonds<D>::scatter(std::size_t p, int n, const BatchScratch& s, bool bo
       Pack P[D];
       PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = weight * Pack::load(s.P + (c * D + e) * batch_points + l);
       const Pack owners = bond_shape_row_adjoint<D>(P, xi, g);
-      own[c] += owners;
+      own.at(l)[c] += owners;
       t[c] = -owners;
       PERIKIT_UNROLL for (int e = 0; e < D; ++e) {
-        own_stress[e][c] += P[e];
+        own_stress[e].at(l)[c] += P[e];
         stress[e][c] = Pack(far_share) * P[e];
       }
     }

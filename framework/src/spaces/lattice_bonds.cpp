@@ -128,10 +128,11 @@ void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
       Pack own = Pack::load(to + l);
       for (int k = 0; k < slots; ++k) own += Pack::load(from + k * chunk_points + l);
       own.store(to + l);
-      for (int k = 0; k < slots && both_ends; ++k) {
-        const std::size_t at = slot + static_cast<std::size_t>(k);
+    }
+    for (int k = 0; k < slots && both_ends; ++k) {
+      const std::size_t at = slot + static_cast<std::size_t>(k);
+      for (int l = 0; l < chunk_points; l += pack_width)
         add_to_cells(to + families_.slots.shifts[at] + l, Pack::load(from + (slots + k) * chunk_points + l), pack_mask(pattern.mask[at], l));
-      }
     }
   }
 }

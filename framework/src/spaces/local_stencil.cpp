@@ -187,11 +187,11 @@ double LocalStencil<D>::least_ratio(const FamilyArrays& family, double beside) c
   double whole[6] = {};
   for (int a = 0; a < D; ++a)
     for (int b = a; b < D; ++b) {
-      Pack total(0.0);
+      EightSums sums;
       for (std::size_t k = 0; k < row_; k += pack_width)
-        total += Pack::load(family.omega.data() + k) * Pack::load(lever_.data() + static_cast<std::size_t>(a) * row_ + k) *
+        sums.at(static_cast<int>(k)) += Pack::load(family.omega.data() + k) * Pack::load(lever_.data() + static_cast<std::size_t>(a) * row_ + k) *
                  Pack::load(family.xi[b].data() + k);
-      whole[symmetric_index(D, a, b)] = sum(total);
+      whole[symmetric_index(D, a, b)] = sums.total();
     }
   return std::max(poor_ratio, beside * eigenvalue_ratio(D, whole));
 }

@@ -88,17 +88,18 @@ void scatter_coefficients(const MirrorBasis& basis, const LanePoints& points, co
             orbit.size, [&](int i) { return Pack::load(that + (orbit.position[i] * D + c) * 8 + l); },
             [&](int i, Pack v) { v.store(t + (orbit.element[i] * D + c) * 8 + l); });
   // Bonds are sorted along the rows of the lattice: a sum is not read again while part of it is still on its way to memory.
+  // Bond by bond for all eight points, so that what a far end gets comes in the same order whatever the width of a pack is.
   const int bonds = basis.first[8];
-  for (int l = 0; l < 8; l += pack_width) {
-    Pack sum[D];
-    for (int k = 0; k < bonds; ++k)
-      for (int c = 0; c < D; ++c) {
+  EightSums sum[D];
+  for (int k = 0; k < bonds; ++k)
+    for (int c = 0; c < D; ++c)
+      for (int l = 0; l < 8; l += pack_width) {
         const Pack v = Pack::load(t + (k * D + c) * 8 + l);
-        sum[c] += v;
+        sum[c].at(l) += v;
         points.subtract(out.component(c), points.shift[k], l, v);
       }
-    for (int c = 0; c < D; ++c) points.subtract(out.component(c), 0, l, -sum[c]);
-  }
+  for (int c = 0; c < D; ++c)
+    for (int l = 0; l < 8; l += pack_width) points.subtract(out.component(c), 0, l, -sum[c].at(l));
 }
 
 /// Evaluation points of one orbit from their coefficients m to H, at lanes (slot + element of the orbit) * 8 + point.

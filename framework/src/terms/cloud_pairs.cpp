@@ -186,9 +186,9 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     if (moduli_.empty())
       for (double& c : s.modulus) c = fields_.uniform;
   }
-  RowColumns own;
-  Pack own_sum(0.0), stored(0.0);
-  bool finite = true;
+  EightRows own;
+  EightSums own_sum, stored;
+  PackMask finite = Pack(0.0) == Pack(0.0);
   const Pack onset(nearest_.least_onset);
   Pack excess(-std::numeric_limits<double>::max());
   if (p + 1 < points_) expect_bonds(families_, half ? upper_[p + 1] : end, lists_.first[p + 2]);
@@ -205,10 +205,10 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       }
       const Pack length = Pack::load(g.length + l);
       const Stretch<D> bond(xi, length, du);
-      finite = finite && all(bond.has_length(length));
+      finite &= bond.has_length(length);
       if (work == PairWork::force && fails) excess = max(excess, bond.e - onset * length);
       bond.e.store(s.e + l);
-      for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + l);
+      for (int c = 0; c < D; ++c) bond.y[c].store(s.y[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
       if constexpr (rate) bond.along(dw).store(s.de + l);
       if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t + l);
@@ -217,7 +217,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       double* const out = pass.out.data;
       for (int l = 0; l < n; l += pack_width) {
         const Pack t = crosses ? Pack::load(g.own_strain + l) * Pack::load(g.t + l) : Pack::load(g.t + l);
-        own_sum += t * Pack::load(g.far_volume + l);
+        own_sum.at(l) += t * Pack::load(g.far_volume + l);
       }
       for (int l = 0; l < n && half; ++l) out[neighbour[l]] += (crosses ? g.far_strain[l] : 1.0) * g.t[l] * (weakens ? g.integrity[l] * volume : volume);
       continue;
@@ -233,7 +233,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }
     }
-    for (int l = 0; l < n && energies; l += pack_width) stored += keep(first_lanes(n - l), Pack::load(s.energy + l) * Pack::load(g.far_volume + l));
+    for (int l = 0; l < n && energies; l += pack_width) stored.at(l) += keep(first_lanes(n - l), Pack::load(s.energy + l) * Pack::load(g.far_volume + l));
     if constexpr (work == PairWork::energy) continue;
     for (int l = 0; l < n; l += pack_width) {
       const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
@@ -241,21 +241,19 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (dilatation) T += weight * Pack::load(g.q + l);
       RowColumns t;
       if constexpr (work == PairWork::force) {
-        T *= volumes;
-        for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + l);
+        T = T * volumes * Pack::load(s.inverse_length + l);
+        for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.y[c] + l);
       } else {
-        // d(T n) = dT n + T (dw - n de)/|y|
-        const Pack de = Pack::load(s.de + l), turn = T * Pack::load(s.inverse_length + l);
+        // d(T n) = dT n + T (dw - n de)/|y|, n = y/|y|
+        const Pack de = Pack::load(s.de + l), inverse_length = Pack::load(s.inverse_length + l), turn = T * volumes * inverse_length;
         Pack dT = Pack::load(s.stiffness + l) * de;
         if (dilatation) dT += weight * Pack::load(g.dq + l);
-        for (int c = 0; c < D; ++c) {
-          const Pack n_c = Pack::load(s.n[c] + l);
-          t[c] = -volumes * (dT * n_c + turn * (Pack::load(g.dw[c] + l) - n_c * de));
-        }
+        const Pack stretch = (dT * volumes - turn * de) * inverse_length;
+        for (int c = 0; c < D; ++c) t[c] = -(stretch * Pack::load(s.y[c] + l) + turn * Pack::load(g.dw[c] + l));
       }
       const std::uint8_t real = first_lanes(n - l);
       for (int c = 0; c < D; ++c) {
-        own[c] += keep(real, t[c]);
+        own.at(l)[c] += keep(real, t[c]);
         t[c] = -t[c];
       }
       if (half) t.add_to(force, g.far + l, n - l);
@@ -268,11 +266,11 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     excess.store(lanes);
     nearest_.excess[p] = *std::max_element(lanes, lanes + pack_width);
   }
-  if constexpr (sums) pass.out.data[p] += sum(own_sum);
-  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * sum(stored);
+  if constexpr (sums) pass.out.data[p] += own_sum.total();
+  else if constexpr (work == PairWork::energy) pass.out.data[p] = 0.5 * stored.total();
   else force_[p] += own.sum();
-  total += (half ? 1.0 : 0.5) * volume * sum(stored);
-  return finite;
+  total += (half ? 1.0 : 0.5) * volume * stored.total();
+  return all(finite);
 }
 
 template <int D>

@@ -34,6 +34,7 @@ class LatticePairs final : public PairLoop {
       const auto& xi = families_.slots.xi[s];
       length_.insert(length_.end(), chunk_points, std::sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]));
       omega_.insert(omega_.end(), chunk_points, families_.slots.omega[s]);
+      shortest_.push_back(Stretch<D>::shortest * length_.back());
     }
     std::vector<std::uint16_t> all(families_.slots.size());
     std::iota(all.begin(), all.end(), std::uint16_t{0});
@@ -130,6 +131,7 @@ class LatticePairs final : public PairLoop {
   double squared_volume_;
   std::vector<std::uint8_t> needed_[2];   ///< by chunk, for forces and for dilatations; empty: all are
   AlignedVector<double> length_, omega_;  ///< by slot, one value a lane
+  std::vector<double> shortest_;          ///< by slot: the extension below which a bond has no length
   std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
 
@@ -219,7 +221,8 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   const bool dilatation = any ? dilatation_ : extras == Extras::dilatation;
   const bool crosses = any && dilatation && fields_.crosses(static_cast<std::size_t>(p));
   const bool weakened = any && !pattern.integrity.empty();  // a b between 0 and 1 weighs all that its bond does
-  const double volume = families_.volume, squared_volume = squared_volume_, *const lengths = length_.data(), *const omegas = omega_.data();
+  const double volume = families_.volume, squared_volume = squared_volume_, *const lengths = length_.data(), *const omegas = omega_.data(),
+               *const shortest = shortest_.data();
   const auto* const xis = families_.slots.xi.data();
   const auto* const shifts = families_.slots.shifts.data();
   const auto* const masks = &pattern.mask[0];
@@ -245,17 +248,18 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   for (PackMask& f : finite) f = Pack(0.0) == Pack(0.0);
   for (std::size_t slot = 0; slot < slots; slot += slots_at_once) {
     const int count = static_cast<int>(std::min<std::size_t>(slots_at_once, slots - slot));
-    // Bonds: extension and direction, kept for the second half of the work.
-    for (int v = 0; v < packs; ++v) {
-      const int l = v * pack_width;
-      Pack own_u[D], own_w[D], sum(0.0);
+    // Bonds: extension and direction, kept for the second half of the work. Bond by bond for all eight points, so that what a far end gets comes in
+    // the same order whatever the width of a pack is.
+    Pack own_u[packs][D], own_w[packs][D], sum[packs];
+    for (int v = 0; v < packs; ++v)
       for (int c = 0; c < D; ++c) {
-        own_u[c] = Pack::load(u[c] + l);
-        if constexpr (rate) own_w[c] = Pack::load(w[c] + l);
+        own_u[v][c] = Pack::load(u[c] + v * pack_width);
+        if constexpr (rate) own_w[v][c] = Pack::load(w[c] + v * pack_width);
       }
-      PackMask good = finite[v];
-      for (int k = 0; k < count; ++k) {
-        const std::size_t at = slot + static_cast<std::size_t>(k);
+    for (int k = 0; k < count; ++k) {
+      const std::size_t at = slot + static_cast<std::size_t>(k);
+      for (int v = 0; v < packs; ++v) {
+        const int l = v * pack_width;
         const std::int64_t far = shifts[at] + l;
         const std::uint8_t mask = masks[at], bits = static_cast<std::uint8_t>(mask >> l);
         const int lane = k * chunk_points + l;
@@ -270,96 +274,97 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         Pack xi[D], du[D], dw[D];
         for (int c = 0; c < D; ++c) {
           xi[c] = Pack(xis[at][static_cast<std::size_t>(c)]);
-          du[c] = difference(u[c], own_u[c]);
-          if constexpr (rate) dw[c] = difference(w[c], own_w[c]);
+          du[c] = difference(u[c], own_u[v][c]);
+          if constexpr (rate) dw[c] = difference(w[c], own_w[v][c]);
         }
         const double length = lengths[at * chunk_points];
         const Stretch<D> bond(xi, Pack(length), du);
-        good &= bond.has_length(Pack(length));
+        finite[v] &= bond.e > Pack(shortest[at]);
         if constexpr (sums) {
-          // multiply_add: fused with its sum in no copy of the loop.
-          Pack term = multiply_add(Pack(omegas[at * chunk_points] * length * volume), rate ? bond.along(dw) : bond.e, Pack(0.0));
+          Pack term = Pack(omegas[at * chunk_points] * length * volume) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           if (crosses) {
             const auto [of_own, of_far] = own_strains(p + l, p + far, bits);
-            sum += of_own * term;
+            sum[v] += of_own * term;
             if constexpr (half) add_far(out[0] + far, mask, bits, of_far * term);
             continue;
           }
-          sum += term;
+          sum[v] += term;
           if constexpr (half) add_far(out[0] + far, mask, bits, term);
         } else {
           bond.e.store(s.e + lane);
-          for (int c = 0; c < D; ++c) bond.n[c].store(s.n[c] + lane);
-          if constexpr (rate) {
-            bond.along(dw).store(s.de + lane);
-            bond.inverse_length.store(s.inverse_length + lane);
-          }
+          for (int c = 0; c < D; ++c) bond.y[c].store(s.y[c] + lane);
+          bond.inverse_length.store(s.inverse_length + lane);
+          if constexpr (rate) bond.along(dw).store(s.de + lane);
         }
       }
-      finite[v] = good;
-      if constexpr (sums) own[0][v] += sum;
     }
-    if constexpr (sums) continue;
+    if constexpr (sums) {
+      for (int v = 0; v < packs; ++v) own[0][v] += sum[v];
+      continue;
+    }
     if (!uniform) moduli(pattern, p, slot, count, s.modulus);
     law_.bond_law({count * chunk_points, lengths + slot * chunk_points, omegas + slot * chunk_points, s.e, s.modulus, energies ? s.energy : nullptr,
                    work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
     if (screened) screen(pass, pattern, p, slot, count, s);
+    Pack sum_of[packs][D], sum_stored[packs], own_q[packs], own_dq[packs];
     for (int v = 0; v < packs; ++v) {
-      const int l = v * pack_width;
-      Pack sum[D], own_w[D], sum_stored(0.0);
-      for (int c = 0; c < D; ++c) {
-        sum[c] = Pack(0.0);
-        if constexpr (rate) own_w[c] = Pack::load(w[c] + l);
-      }
-      const Pack own_q = dilatation ? Pack::load(q + l) : Pack(0.0), own_dq = dilatation && rate ? Pack::load(dq + l) : Pack(0.0);
-      for (int k = 0; k < count; ++k) {
-        const std::size_t at = slot + static_cast<std::size_t>(k);
+      if (dilatation) own_q[v] = Pack::load(q + v * pack_width);
+      if (dilatation && rate) own_dq[v] = Pack::load(dq + v * pack_width);
+    }
+    for (int k = 0; k < count; ++k) {
+      const std::size_t at = slot + static_cast<std::size_t>(k);
+      for (int v = 0; v < packs; ++v) {
+        const int l = v * pack_width;
         const std::int64_t far = shifts[at] + l;
         const std::uint8_t mask = masks[at], bits = static_cast<std::uint8_t>(mask >> l);
         const int lane = k * chunk_points + l;
         if (mask == 0) continue;
         const Pack b = weakened ? Pack::load(pattern.b_of(at) + l) : Pack(1.0);
-        if (energies) sum_stored += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
+        if (energies) sum_stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
         if constexpr (work == PairWork::energy) continue;
         Pack t[D], T = Pack::load(s.force + lane);
         const Pack weight(omegas[at * chunk_points] * lengths[at * chunk_points]);
         std::array<Pack, 2> strain;
         if (crosses) strain = own_strains(p + l, p + far, bits);
         const auto of_ends = [&](Pack own_value, Pack far_value) { return crosses ? strain[0] * own_value + strain[1] * far_value : own_value + far_value; };
-        if (dilatation) T = multiply_add(weight, of_ends(own_q, Pack::load(q + far)), T);
+        if (dilatation) T = multiply_add(weight, of_ends(own_q[v], Pack::load(q + far)), T);
         if constexpr (work == PairWork::force) {
-          T = T * Pack(squared_volume);
-          for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.n[c] + lane);
+          T = T * Pack(squared_volume) * Pack::load(s.inverse_length + lane);
+          for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.y[c] + lane);
         } else {
-          // d(T n) = dT n + T (dw - n de)/|y|
+          // d(T n) = dT n + T (dw - n de)/|y|, n = y/|y|
           const Pack de = Pack::load(s.de + lane);
           Pack dT = Pack::load(s.stiffness + lane) * de;
-          if (dilatation) dT += weight * of_ends(own_dq, Pack::load(dq + far));
-          const Pack turn = T * Pack::load(s.inverse_length + lane);
-          for (int c = 0; c < D; ++c) {
-            const Pack dw = keep(bits, Pack::load(w[c] + far) - own_w[c]), n = Pack::load(s.n[c] + lane);
-            t[c] = Pack(-squared_volume) * (dT * n + turn * (dw - n * de));
-          }
+          if (dilatation) dT += weight * of_ends(own_dq[v], Pack::load(dq + far));
+          const Pack inverse_length = Pack::load(s.inverse_length + lane), turn = T * Pack(-squared_volume) * inverse_length;
+          const Pack stretch = (dT * Pack(-squared_volume) - turn * de) * inverse_length;
+          for (int c = 0; c < D; ++c) t[c] = stretch * Pack::load(s.y[c] + lane) + turn * keep(bits, Pack::load(w[c] + far) - own_w[v][c]);
         }
         for (int c = 0; c < D; ++c) {
           if (weakened) t[c] *= b;
           if (mask != 0xff) t[c] = keep(bits, t[c]);
-          sum[c] += t[c];
+          sum_of[v][c] += t[c];
           if constexpr (half) add_far(out[c] + far, mask, bits, -t[c]);
         }
       }
-      if (energies) stored[v] += sum_stored;
-      if constexpr (work != PairWork::energy)
-        for (int c = 0; c < D; ++c) own[c][v] += sum[c];
     }
+    for (int v = 0; v < packs; ++v) {
+      if (energies) stored[v] += sum_stored[v];
+      if constexpr (work != PairWork::energy)
+        for (int c = 0; c < D; ++c) own[c][v] += sum_of[v][c];
+    }
+  }
+  if (work != PairWork::energy && energies) {
+    EightSums sums;
+    for (int v = 0; v < packs; ++v) sums.at(v * pack_width) = stored[v];
+    total += (half ? 1.0 : 0.5) * squared_volume * sums.total();
   }
   int bad = -1;
   for (int l = chunk_points - 1; l >= 0; --l)
     if (!finite[l / pack_width][l % pack_width]) bad = l;
   for (int v = 0; v < packs; ++v) {
     if constexpr (work == PairWork::energy) own[0][v] = Pack(0.5 * volume) * stored[v];
-    else if (energies) total += (half ? 1.0 : 0.5) * squared_volume * sum(stored[v]);
     for (int c = 0; c < results; ++c) {
       double* target = out[c] + v * pack_width;
       (Pack::load(target) + own[c][v]).store(target);

@@ -47,7 +47,7 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
     finite = finite && all(bond.has_length(length));
     bond.e.store(m.extension.data() + l);
     bond.inverse_length.store(m.inverse_length.data() + l);
-    for (int c = 0; c < D; ++c) bond.n[c].store(m.direction[c].data() + l);
+    for (int c = 0; c < D; ++c) (bond.y[c] * bond.inverse_length).store(m.direction[c].data() + l);
   }
   return finite;
 }

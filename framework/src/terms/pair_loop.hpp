@@ -168,8 +168,8 @@ std::unique_ptr<PairLoop> make_cloud_pairs(const PairLoopParts& parts);
 struct PairScratch {
   alignas(64) double e[batch_points];
   alignas(64) double de[batch_points];
-  alignas(64) double n[3][batch_points];          ///< deformed direction
-  alignas(64) double inverse_length[batch_points];///< of the deformed bond
+  alignas(64) double y[3][batch_points];          ///< deformed bond
+  alignas(64) double inverse_length[batch_points];///< of it
   alignas(64) double modulus[batch_points];
   alignas(64) double energy[batch_points];
   alignas(64) double force[batch_points];

@@ -34,6 +34,7 @@ namespace detail {
 typedef double Lanes __attribute__((vector_size(8 * pack_width)));
 typedef double UnalignedLanes __attribute__((vector_size(8 * pack_width), aligned(8), may_alias));
 typedef std::int64_t Bits __attribute__((vector_size(8 * pack_width)));
+typedef std::uint64_t UnsignedBits __attribute__((vector_size(8 * pack_width)));
 #if defined(PERIKIT_COUNT_OPERATIONS)
 extern std::uint64_t operations;
 inline void count(int n) noexcept { operations += static_cast<std::uint64_t>(n); }
@@ -71,6 +72,8 @@ struct PackMask {
   PackMask& operator|=(PackMask b) noexcept { return *this = *this | b; }
 };
 
+struct Product;
+
 struct Pack {
   detail::Lanes v;
 
@@ -92,62 +95,116 @@ struct Pack {
   }
   double operator[](int lane) const noexcept { return v[lane]; }
 
-  friend Pack operator+(Pack a, Pack b) noexcept {
-    detail::count(pack_width);
-    return {a.v + b.v};
-  }
-  friend Pack operator-(Pack a, Pack b) noexcept {
-    detail::count(pack_width);
-    return {a.v - b.v};
-  }
-  friend Pack operator*(Pack a, Pack b) noexcept {
+  inline Pack& operator+=(Pack b) noexcept;
+  inline Pack& operator-=(Pack b) noexcept;
+  inline Pack& operator+=(const Product& p) noexcept;
+  inline Pack& operator-=(const Product& p) noexcept;
+  inline Pack& operator*=(Pack b) noexcept;
+  inline Pack& operator/=(Pack b) noexcept;
+};
+
+inline Pack operator+(Pack a, Pack b) noexcept {
+  detail::count(pack_width);
+  return {a.v + b.v};
+}
+inline Pack operator-(Pack a, Pack b) noexcept {
+  detail::count(pack_width);
+  return {a.v - b.v};
+}
+inline Pack operator/(Pack a, Pack b) noexcept {
+  detail::count(pack_width);
+  return {a.v / b.v};
+}
+inline Pack operator-(Pack a) noexcept { return {-a.v}; }
+
+/// a b + c, rounded once where the level has an instruction for it (x86-64-v3 and -v4, aarch64), else twice. What the compiler would fuse by itself
+/// is not fused (-ffp-contract=off): it takes one product in one copy of a loop, and another one or none in the next.
+inline Pack multiply_add(Pack a, Pack b, Pack c) noexcept {
+  detail::count(2 * pack_width);
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return {reinterpret_cast<detail::Lanes>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
+#elif defined(__AVX__) && defined(__FMA__)
+  return {reinterpret_cast<detail::Lanes>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
+#elif defined(__aarch64__)
+  return {reinterpret_cast<detail::Lanes>(vfmaq_f64(reinterpret_cast<float64x2_t>(c.v), reinterpret_cast<float64x2_t>(a.v), reinterpret_cast<float64x2_t>(b.v)))};
+#elif defined(__FP_FAST_FMA)
+  for (int i = 0; i < pack_width; ++i) c.v[i] = __builtin_fma(a.v[i], b.v[i], c.v[i]);
+  return c;
+#else
+  return {a.v * b.v + c.v};
+#endif
+}
+/// a b - c, likewise.
+inline Pack multiply_subtract(Pack a, Pack b, Pack c) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  detail::count(2 * pack_width);
+  return {reinterpret_cast<detail::Lanes>(_mm512_fmsub_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
+#elif defined(__AVX__) && defined(__FMA__)
+  detail::count(2 * pack_width);
+  return {reinterpret_cast<detail::Lanes>(_mm256_fmsub_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
+#else
+  return multiply_add(a, b, -c);
+#endif
+}
+/// c - a b, likewise.
+inline Pack subtract_product(Pack a, Pack b, Pack c) noexcept {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  detail::count(2 * pack_width);
+  return {reinterpret_cast<detail::Lanes>(_mm512_fnmadd_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
+#elif defined(__AVX__) && defined(__FMA__)
+  detail::count(2 * pack_width);
+  return {reinterpret_cast<detail::Lanes>(_mm256_fnmadd_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
+#else
+  return multiply_add(-a, b, c);
+#endif
+}
+
+/// A product that is not rounded yet. A sum or a difference with it is rounded once: `a * b + c` is multiply_add(a, b, c), wherever it stands, at
+/// every level and whatever the compiler does. Of `a * b + c * d` the second product is rounded by itself, and so is every product that is used as a Pack.
+struct Product {
+  Pack a, b;
+
+  operator Pack() const noexcept {
     detail::count(pack_width);
     return {a.v * b.v};
   }
-  friend Pack operator/(Pack a, Pack b) noexcept {
-    detail::count(pack_width);
-    return {a.v / b.v};
-  }
-  friend Pack operator-(Pack a) noexcept { return {-a.v}; }
-  Pack& operator+=(Pack b) noexcept { return *this = *this + b; }
-  Pack& operator-=(Pack b) noexcept { return *this = *this - b; }
-  Pack& operator*=(Pack b) noexcept { return *this = *this * b; }
-  Pack& operator/=(Pack b) noexcept { return *this = *this / b; }
-
-  /// a b + c, fused where the target can. Of operators the compiler fuses what it likes, in one copy of a loop a product, in the next one another
-  /// or none: this is for loops of which several must give the same bits.
-  friend Pack multiply_add(Pack a, Pack b, Pack c) noexcept {
-    detail::count(2 * pack_width);
-#if defined(__AVX512F__) && defined(__AVX512DQ__)
-    return {reinterpret_cast<detail::Lanes>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v)))};
-#elif defined(__AVX__) && defined(__FMA__)
-    return {reinterpret_cast<detail::Lanes>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v)))};
-#elif defined(__aarch64__)
-    return {reinterpret_cast<detail::Lanes>(vfmaq_f64(reinterpret_cast<float64x2_t>(c.v), reinterpret_cast<float64x2_t>(a.v), reinterpret_cast<float64x2_t>(b.v)))};
-#elif defined(__FP_FAST_FMA)
-    for (int i = 0; i < pack_width; ++i) c.v[i] = __builtin_fma(a.v[i], b.v[i], c.v[i]);
-    return c;
-#else
-    return {a.v * b.v + c.v};
-#endif
-  }
-
-#if defined(__AVX512F__) && defined(__AVX512DQ__)
-  friend PackMask operator<(Pack a, Pack b) noexcept { return compare<_CMP_LT_OQ>(a, b); }
-  friend PackMask operator<=(Pack a, Pack b) noexcept { return compare<_CMP_LE_OQ>(a, b); }
-  friend PackMask operator==(Pack a, Pack b) noexcept { return compare<_CMP_EQ_OQ>(a, b); }
-  template <int predicate>
-  static PackMask compare(Pack a, Pack b) noexcept {
-    return {_mm512_cmp_pd_mask(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), predicate)};
-  }
-#else
-  friend PackMask operator<(Pack a, Pack b) noexcept { return {a.v < b.v}; }
-  friend PackMask operator<=(Pack a, Pack b) noexcept { return {a.v <= b.v}; }
-  friend PackMask operator==(Pack a, Pack b) noexcept { return {a.v == b.v}; }
-#endif
-  friend PackMask operator>(Pack a, Pack b) noexcept { return b < a; }
-  friend PackMask operator>=(Pack a, Pack b) noexcept { return b <= a; }
+  void store(double* p) const noexcept { Pack(*this).store(p); }
+  void store_first(double* p, int n) const noexcept { Pack(*this).store_first(p, n); }
+  double operator[](int lane) const noexcept { return a.v[lane] * b.v[lane]; }
 };
+inline Product operator*(Pack a, Pack b) noexcept { return {a, b}; }
+inline Product operator-(const Product& p) noexcept { return {-p.a, p.b}; }
+inline Pack operator+(const Product& p, Pack c) noexcept { return multiply_add(p.a, p.b, c); }
+inline Pack operator+(Pack c, const Product& p) noexcept { return multiply_add(p.a, p.b, c); }
+inline Pack operator+(const Product& p, const Product& q) noexcept { return multiply_add(p.a, p.b, Pack(q)); }
+inline Pack operator-(const Product& p, Pack c) noexcept { return multiply_subtract(p.a, p.b, c); }
+inline Pack operator-(Pack c, const Product& p) noexcept { return subtract_product(p.a, p.b, c); }
+inline Pack operator-(const Product& p, const Product& q) noexcept { return multiply_subtract(p.a, p.b, Pack(q)); }
+
+inline Pack& Pack::operator+=(Pack b) noexcept { return *this = *this + b; }
+inline Pack& Pack::operator-=(Pack b) noexcept { return *this = *this - b; }
+inline Pack& Pack::operator+=(const Product& p) noexcept { return *this = *this + p; }
+inline Pack& Pack::operator-=(const Product& p) noexcept { return *this = *this - p; }
+inline Pack& Pack::operator*=(Pack b) noexcept { return *this = *this * b; }
+inline Pack& Pack::operator/=(Pack b) noexcept { return *this = *this / b; }
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+namespace detail {
+template <int predicate>
+PackMask compare(Pack a, Pack b) noexcept {
+  return {_mm512_cmp_pd_mask(reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), predicate)};
+}
+}  // namespace detail
+inline PackMask operator<(Pack a, Pack b) noexcept { return detail::compare<_CMP_LT_OQ>(a, b); }
+inline PackMask operator<=(Pack a, Pack b) noexcept { return detail::compare<_CMP_LE_OQ>(a, b); }
+inline PackMask operator==(Pack a, Pack b) noexcept { return detail::compare<_CMP_EQ_OQ>(a, b); }
+#else
+inline PackMask operator<(Pack a, Pack b) noexcept { return {a.v < b.v}; }
+inline PackMask operator<=(Pack a, Pack b) noexcept { return {a.v <= b.v}; }
+inline PackMask operator==(Pack a, Pack b) noexcept { return {a.v == b.v}; }
+#endif
+inline PackMask operator>(Pack a, Pack b) noexcept { return b < a; }
+inline PackMask operator>=(Pack a, Pack b) noexcept { return b <= a; }
 
 inline Pack select(PackMask m, Pack a, Pack b) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -213,37 +270,24 @@ inline Pack sqrt(Pack a) noexcept {
   return r;
 #endif
 }
-/// 1/a for normal a > 0 to about one unit in the last place; not a number for 0 and infinity where it comes from an estimate.
+// Reciprocals and roots begin with a guess from the bits of the number: an exponent and digits that are subtracted from a constant are about the
+// logarithm with another sign. Estimates by instructions (vrcp14pd, vrsqrt14pd) would be other numbers at other levels and by other makers.
+/// 1/a for normal a and 1/a, to about one unit in the last place.
 inline Pack reciprocal(Pack a) noexcept {
-#if defined(__AVX512F__) && defined(__AVX512DQ__)
-  Pack r = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rcp14_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
-  r = r + r * (Pack(1.0) - a * r);
-  return r + r * (Pack(1.0) - a * r);
-#else
-  return Pack(1.0) / a;
-#endif
+  Pack r = {reinterpret_cast<detail::Lanes>(0x7fde663822fc16e6 - reinterpret_cast<detail::UnsignedBits>(a.v))};  // to 1/20
+  r = r * (Pack(2.0013) - a * r);           // to 1/769: 2 + the square of the error, halved, leaves errors of either sign
+  r = r * (Pack(2.0000008455) - a * r);     // to 2^-20
+  const Pack e = Pack(1.0) - a * r;
+  return r + r * (e + e * e);
 }
-/// 1/sqrt(a) and 1/(sqrt(a) + b) of normal a > 0 and b >= 0, to one and four units in the last place. The root is not finite where a is 0; neither
-/// is above 0 where it is infinite. With estimates the second begins from a first guess of the root, so that a loop waits less for each.
-struct ReciprocalRootAndSum {
-  Pack root, sum;
-  ReciprocalRootAndSum(Pack a, Pack b) noexcept {
-#if defined(__AVX512F__) && defined(__AVX512DQ__)
-    root = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rsqrt14_pd(0xff, reinterpret_cast<__m512d>(a.v)))};
-    const Pack half = Pack(0.5) * a;
-    root = root * (Pack(1.5) - half * root * root);
-    const Pack guess = a * root + b;  // to 27 bits
-    sum = {reinterpret_cast<detail::Lanes>(_mm512_maskz_rcp14_pd(0xff, reinterpret_cast<__m512d>(guess.v)))};
-    sum = sum + sum * (Pack(1.0) - guess * sum);
-    root = root + root * (Pack(0.5) - half * root * root);
-    sum = sum + sum * (Pack(1.0) - (a * root + b) * sum);
-#else
-    const Pack length = sqrt(a);
-    root = reciprocal(length);
-    sum = reciprocal(length + b);
-#endif
-  }
-};
+/// 1/sqrt(a) for normal a > 0, to about one unit in the last place. It says nothing where a is 0, and is not a number where a is infinite.
+inline Pack reciprocal_root(Pack a) noexcept {
+  Pack r = {reinterpret_cast<detail::Lanes>(0x5fe4075000000000 - (reinterpret_cast<detail::UnsignedBits>(a.v) >> 1))};
+  const Pack t = (a * r) * r;  // 0.7517 to 0.8458, for which the polynomial is 1/sqrt(t) to 2^-16
+  r *= Pack(2.0998561) + t * (Pack(-1.7546571) + t * Pack(0.65922143));
+  const Pack e = Pack(1.0) - (a * r) * r;
+  return r + (r * e) * (Pack(0.5) + e * (Pack(0.375) + Pack(0.3125) * e));
+}
 /// a in the lanes whose bit is set, zero elsewhere (bits: of a group of eight, shifted so that lane 0 is bit 0).
 inline Pack keep(std::uint8_t bits, Pack a) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -322,5 +366,29 @@ inline double sum(Pack a) noexcept {
   for (int i = 0; i < pack_width; ++i) r += a.v[i];
   return r;
 }
+
+/// A sum over eight lanes at a time, whatever the width of a pack is: sums over points and bonds, with the same bits at every width.
+class EightSums {
+ public:
+  EightSums() noexcept = default;
+  /// The part that lanes l ... of an array go to, l a multiple of pack_width.
+  Pack& at(int l) noexcept { return part_[l % 8 / pack_width]; }
+  friend EightSums operator+(const EightSums& a, const EightSums& b) noexcept {
+    EightSums r;
+    for (int i = 0; i < packs; ++i) r.part_[i] = a.part_[i] + b.part_[i];
+    return r;
+  }
+  /// ((lane 0 + lane 1) + lane 2) + ...
+  double total() const noexcept {
+    detail::count(8);
+    double r = 0;
+    for (int i = 0; i < 8; ++i) r += part_[i / pack_width].v[i % pack_width];
+    return r;
+  }
+
+ private:
+  static constexpr int packs = 8 / pack_width;
+  Pack part_[packs];
+};
 
 }  // namespace perikit

@@ -134,7 +134,7 @@ namespace detail {
 /// sum over k of a(i, k) b(k, j), over products that can differ from zero; A and B give the components.
 template <class S, class A, class B>
 auto contract(int i, int j, A&& a, B&& b) noexcept {
-  auto r = a(i, i) * b(i, j);
+  decltype(a(i, i) * b(i, j) + a(i, i) * b(i, j)) r = a(i, i) * b(i, j);
   PERIKIT_UNROLL for (int k = 0; k < 3; ++k) if (k != i && component<S>(i, k) >= 0 && component<S>(k, j) >= 0) r =
       r + a(i, k) * b(k, j);
   return r;
@@ -158,7 +158,7 @@ Tensor<T, S> transpose_times(const Tensor<T, S>& a, const Tensor<T, S>& b) noexc
 /// of(c) over the components of a tensor, in three sums, which do not wait for each other.
 template <class S, class Of>
 auto sum_of_components(const Of& of) noexcept {
-  decltype(of(0)) sum[3] = {of(0), of(1), of(2)};
+  decltype(of(0) + of(0)) sum[3] = {of(0), of(1), of(2)};
   PERIKIT_UNROLL for (int c = 3; c < S::components; ++c) sum[c % 3] = sum[c % 3] + of(c);
   return sum[0] + sum[1] + sum[2];
 }
