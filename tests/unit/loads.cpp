@@ -178,6 +178,27 @@ TEST_CASE("pressure that varies: force and moment of a hydrostatic wall, and of 
     }
 }
 
+TEST_CASE("tractions and pressures on a part of the surface of a lattice: force and first moments are those of its cell faces") {
+  // Three spacings from an edge, where shares of kinematics are unlike cells; faces 0 < y < 5 at x = 6, 0 < x < 6 at y = 5, thickness 2.
+    for (const char* kinematics : with_faces) {
+    INFO(kinematics);
+    const double area = 2 * 3.5, middle = 1.5 + 1.75, square = 2 * (125.0 - 27.0 / 8) / 3;   // of y^2
+    const Work uniform = virtual_work(*plate("y > 1.4", 0.0, "traction = [3, 1]\nface = \"+x\"", kinematics));
+    const Work linear = virtual_work(*plate("y > 1.4", 0.0, "traction = [\"2 + y\", 0]\nface = \"+x\"", kinematics));
+    const Work pressure = virtual_work(*plate("y > 1.4", 0.0, "pressure = 3\nface = \"+x\"", kinematics));
+    for (const auto& [found, wanted] :
+         {std::pair(uniform[0][0], 3 * area), {uniform[0][1], 3 * area * 6}, {uniform[0][2], 3 * area * middle}, {uniform[1][0], area}, {uniform[1][1], area * 6}, {uniform[1][2], area * middle},
+          {linear[0][0], area * (2 + middle)}, {linear[0][1], area * (2 + middle) * 6}, {linear[0][2], 2 * area * middle + square},
+          {pressure[0][0], -3 * area}, {pressure[0][1], -3 * area * 6}, {pressure[0][2], -3 * area * middle}})
+      CHECK(found == doctest::Approx(wanted).epsilon(1e-12));
+    // A corner: 3 of the right side, 3 of the upper one (x > 3, y > 2), each with its own pressure.
+    const Work corner = virtual_work(*plate("x > 3 && y > 2", 0.0, "pressure = \"1 + 2*y\"", kinematics));
+    for (const auto& [found, wanted] : {std::pair(corner[0][0], -2 * (3 + 21.0)), {corner[0][1], -2 * (3 + 21.0) * 6}, {corner[0][2], -2 * (10.5 + 2 * 39.0)}, {corner[1][0], -2 * 3 * 11.0},
+                                        {corner[1][1], -2 * 3 * 11.0 * 4.5}, {corner[1][2], -2 * 3 * 11.0 * 5}})
+      CHECK(found == doctest::Approx(wanted).epsilon(1e-12));
+  }
+}
+
 TEST_CASE("pressure that varies: force and moments on a cloud under water") {
   for (const char* kinematics : with_faces) {
     if (std::string(kinematics).find("ordinary") != std::string::npos || std::string(kinematics).find("bond_based") != std::string::npos) continue;   // refused

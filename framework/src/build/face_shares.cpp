@@ -9,6 +9,7 @@
 #include <map>
 
 #include "body/near_ranks.hpp"
+#include "build/first_moments.hpp"
 #include "build/free_surface.hpp"
 #include "build/outer_layer.hpp"
 #include "families/families.hpp"
@@ -84,15 +85,23 @@ class Columns {
       images->append_images(all);
       add(std::span(all).subspan(body.owned().size()), End::image);
     }
+    std::vector<std::array<std::int64_t, 3>> others;   // at the face, but not of the load
     for (const End& end : of_ranks_near(body, mine, static_cast<double>(most) * lattice_.spacing)) {
       if (end.kind & End::inner) inner_.push_back({column(end.cell), sign_ * end.cell[axis_]});
-      if ((end.kind & End::outer) && (end.kind & End::chosen)) faces_.push_back(end);
+      if (end.kind & End::outer) {
+        if (end.kind & End::chosen) faces_.push_back(end);
+        else others.push_back(end.cell);
+      }
     }
     std::ranges::sort(inner_);
+    std::ranges::sort(others);
+    part_ = counted(std::ranges::any_of(faces_, [&](const End& end) { return beside(end, others); }) ? 1 : 0).all > 0;
     own_faces_ = std::ranges::count_if(mine, [](const End& end) {
       return (end.kind & End::outer) && (end.kind & End::chosen) && !(end.kind & End::image);
     });
   }
+  /// Whether the face goes on beside the points of the load.
+  bool part() const noexcept { return part_; }
   /// The ends at the face.
   const std::vector<End>& faces() const noexcept { return faces_; }
   /// How many of them are points of this rank.
@@ -127,6 +136,16 @@ class Columns {
     if (cell[axis_] < 0 || cell[axis_] >= lattice_.extent[axis_]) return false;
     return body_.alive(static_cast<std::size_t>(p + lattice_.shift(step)));
   }
+  /// Whether one of the cells has a side in common with the end.
+  bool beside(const End& end, const std::vector<std::array<std::int64_t, 3>>& cells) const {
+    for (std::size_t a = 0; a < 3; ++a)
+      for (const int step : {-1, 1}) {
+        std::array<std::int64_t, 3> cell = end.cell;
+        cell[a] += step;
+        if (a != axis_ && std::ranges::binary_search(cells, cell)) return true;
+      }
+    return false;
+  }
   /// A number of the column of a cell of the whole lattice.
   std::int64_t column(std::array<std::int64_t, 3> cell) const noexcept {
     cell[axis_] = 0;
@@ -142,6 +161,7 @@ class Columns {
   std::vector<std::pair<std::int64_t, std::int64_t>> inner_;  ///< column, and how far out it begins
   std::vector<std::uint8_t> complete_;                        ///< by internal index
   std::int64_t own_faces_ = 0;
+  bool part_ = false;
 };
 
 /// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
@@ -187,7 +207,12 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
       if (const std::int32_t p = columns.below(end, k); p >= 0) add(p, face.outward * areas.data()[p]);
   }
   const double wanted = static_cast<double>(counted(columns.own_faces()).all) * area, found = total_of(body, total);
-  if (!exact) return in_order(shares, std::move(samples));
+  const auto finished = [&] {
+    FaceShares all = in_order(shares, std::move(samples));
+    if (exact && !images && columns.part()) give_first_moments(body, all.points, all.samples, all.share);
+    return all;
+  };
+  if (!exact) return finished();
   if (thin = counted(thin).all; thin > 0) {
     // Parts of this face beyond the middle are missing, and there are as large ones of the opposite face: the first moment of the half is right, its sum is not.
     // What the sum lacks acts in the middle of the columns. It has no moment there, and under the same stress on both faces it cancels.
@@ -199,10 +224,10 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
       group = groups[n];
       for (const std::int64_t k : {(depth - 1) / 2, depth / 2}) add(columns.below(end, k), 0.5 * lack);
     }
-    return in_order(shares, std::move(samples));
+    return finished();
   }
   for (auto& [p, share] : shares) share.area *= wanted / found;
-  return in_order(shares, std::move(samples));
+  return finished();
 }
 
 /// The points of a cloud at a face. Of a part of a body all ranks must call it.

@@ -3,20 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "body/near_ranks.hpp"
 #include "build/face_shares.hpp"
+#include "build/first_moments.hpp"
 #include "build/free_surface.hpp"
 #include "families/families.hpp"
 
 namespace perikit {
 
 namespace {
-
-double length(const Point& a) {
-  return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
 
 SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const ImageMap* images) {
   const auto axis = static_cast<std::size_t>(load.face[1] - 'x');
@@ -70,27 +66,6 @@ std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts
                    "gradients, or a traction on a face");
 }
 
-/// What is missing of the free faces of the set's cells, in proportion to the areas that are there.
-void correct_total(const Body& body, const std::vector<std::uint8_t>& in_set, SurfaceAreas& areas) {
-  const CellFaces faces(body);
-  std::array<ExactSum, 3> missing;
-  ExactSum sizes;
-  for (const std::int32_t p : body.owned())
-    for (std::size_t c = 0; in_set[static_cast<std::size_t>(p)] && c < 3; ++c)
-      missing[c].add(faces.area[static_cast<std::size_t>(p)][c]);
-  for (const Point& area : areas.area) {
-    for (std::size_t c = 0; c < 3; ++c) missing[c].add(-area[c]);
-    sizes.add(length(area));
-  }
-  Point total{};
-  for (std::size_t c = 0; c < 3; ++c) total[c] = total_of(body, missing[c]);
-  const double size = total_of(body, sizes);
-  for (Point& area : areas.area) {
-    const double share = length(area) / size;
-    for (std::size_t c = 0; c < 3; ++c) area[c] += share * total[c];
-  }
-}
-
 /// To the samples of the surface the places of the points that carry it.
 void add_points(const Body& body, SurfaceSamples& samples, std::size_t axis, SurfaceAreas& areas) {
   for (const std::int32_t p : areas.points) {
@@ -112,6 +87,16 @@ void add_samples(const Body& body, const std::vector<std::uint8_t>& in_set, Surf
     add_cell(body.dimension(), static_cast<int>(axis), middle, body.spacing(), sign * area, samples[axis]);
   });
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(body.dimension()); ++axis) add_points(body, samples[axis], axis, areas);
+}
+
+/// Of a part of the surface of a lattice: force and first moments of a pressure on its cell faces.
+void exact_moments(const Body& body, SurfaceAreas& areas) {
+  std::vector<double> share(areas.area.size());
+  for (std::size_t axis = 0; axis < static_cast<std::size_t>(body.dimension()); ++axis) {
+    for (std::size_t k = 0; k < share.size(); ++k) share[k] = areas.area[k][axis];
+    give_first_moments(body, areas.points, *areas.samples[axis], share);
+    for (std::size_t k = 0; k < share.size(); ++k) areas.area[k][axis] = share[k];
+  }
 }
 
 /// Of the whole surface of a cloud, whose faces nobody knows: by Gauss's theorem the integral of f n over it is that of grad f over the body. Cells of points have
@@ -167,9 +152,10 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
     std::erase_if(found.points, [&](std::int32_t p) { return !complete[static_cast<std::size_t>(p)]; });
   }
   for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
-  if (body.lattice() && !images) correct_total(body, in_set, found);
+  const bool whole = counted(std::ssize(surface)).all == counted(chosen).all;
   if (body.lattice()) add_samples(body, in_set, found);
-  else if (!images && counted(std::ssize(surface)).all == counted(chosen).all) add_cells(body, found);
+  if (body.lattice() && !images && !whole) exact_moments(body, found);
+  if (!body.lattice() && !images && whole) add_cells(body, found);
   return found;
 }
 
