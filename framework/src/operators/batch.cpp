@@ -279,6 +279,23 @@ void BatchWork::screen(std::int64_t first_point, int first_lane, int lanes, cons
     if (s.highest[first_lane + l] > limit[l % group]) screen_->mark(static_cast<std::size_t>(first_point + l % group));
 }
 
+bool BatchWork::may_hold_too_much(std::int64_t first_point, int lanes, const BatchScratch& s) const noexcept {
+  constexpr auto group = static_cast<int>(padding);
+  const double* limit = screen_->density.data() + first_point;
+  bool any = false;
+  for (int l = 0; l < lanes; ++l) any |= s.highest[l] > limit[l % group];
+  return any;
+}
+
+void BatchWork::screen_bonds(int n, int far_end, const BatchScratch& s, const double* factor, const double* far_factor) const {
+  const auto held = [&](const double* factors, int lane, int at) { return (factors && screen_->with_factors ? factors[lane] : 1.0) * s.highest[at]; };
+  for (int l = 0; l < n; ++l) {
+    const double psi = held(factor, l, l), far_psi = far_end < 0 ? 0.0 : held(far_factor, l, far_end + l);
+    if (s.far[l] >= 0 && std::max(psi, far_psi) > screen_->density[static_cast<std::size_t>(s.owner[l])])
+      screen_->look(s.owner[l], s.far[l], psi, far_psi);
+  }
+}
+
 void BatchWork::screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept {
   if (!screen_) return;
   for (int l = 0; l < lanes; ++l) {

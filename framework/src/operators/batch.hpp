@@ -151,6 +151,13 @@ class BatchWork {
   void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
   /// The same where the first `lanes` lanes belong to `count` points in turn, every eighth to the same one. From any thread.
   void screen(const std::int32_t* points, int count, int lanes, const BatchScratch& s) const noexcept;
+  /// Whether evaluation points that belong to bonds are screened by bond: their ends are to be in s.owner and s.far.
+  bool screens_bonds() const noexcept { return screen_ && screen_->by_bond(); }
+  /// Whether one of these lanes, which belong to a chunk of points in turn, may hold too much.
+  bool may_hold_too_much(std::int64_t first_point, int lanes, const BatchScratch& s) const noexcept;
+  /// After evaluate: names the bonds of n lanes that may hold too much. far_end: the lane of the far end's evaluation point of lane 0; -1: none. Of
+  /// evaluation points with factors these; null: 1.
+  void screen_bonds(int n, int far_end, const BatchScratch& s, const double* factor = nullptr, const double* far_factor = nullptr) const;
   /// Whether the numbers of lanes are asked for.
   bool numbered() const noexcept { return history_ || laminates_ || finder_; }
   /// Some evaluation points are laminates.

@@ -48,6 +48,24 @@ void BondSamples::merge() {
   // Sorted by owner in one sweep, and then the few entries of each by their far ends.
   std::int32_t highest = -1;
   any_whole_ = false;
+  // Where one thread has all of them in order, as one thread does on clouds, they stay where they are.
+  const auto full = [](const std::vector<Entry>& entries) { return !entries.empty(); };
+  if (const auto one = std::ranges::find_if(of_thread_, full); one != of_thread_.end() && std::ranges::count_if(of_thread_, full) == 1) {
+    lowest_ = one->front().owner;
+    first_.assign(1, 0);
+    std::size_t k = 0;
+    for (const Entry* last = nullptr; k < one->size(); last = &(*one)[k++]) {
+      const Entry& entry = (*one)[k];
+      if (last && (last->owner > entry.owner || (last->owner == entry.owner && last->far >= entry.far))) break;
+      any_whole_ |= entry.far < 0;
+      if (const auto o = static_cast<std::size_t>(entry.owner - lowest_); first_.size() <= o) first_.resize(o + 1, k);
+    }
+    if (k == one->size()) {
+      all_.swap(*one);
+      return first_.push_back(k);
+    }
+    any_whole_ = false;
+  }
   lowest_ = std::numeric_limits<std::int32_t>::max();
   for (const auto& entries : of_thread_)
     for (const Entry& entry : entries) {

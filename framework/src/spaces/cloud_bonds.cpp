@@ -264,8 +264,9 @@ int CloudBonds<D>::bonds_of_point(std::size_t p, BatchScratch& s, Pass& pass, Gr
     if (pass.work.numbered()) number(p, begin, n, lanes, s);
     const int bad = pass.work.evaluate(n, s, both_ends, energy);
     if (bad >= 0) return bad;
-    const auto owner = static_cast<std::int32_t>(p);
-    pass.work.screen(&owner, 1, selective_ && both_ends ? 2 * lanes : n, s);
+    if (pass.work.screens_bonds())
+      pass.work.screen_bonds(n, !both_ends ? -1 : selective_ ? lanes : 0, s, factor_ ? factor_ + begin : nullptr,
+                             factor_ && both_ends ? far_factor_.data() + far_first_[p] + (begin - upper_[p]) : nullptr);
     if (pass.work.work() == Work::sample) pass.add_samples(n, s);
     if (pass.work.balance() && pass.alone()) std::copy_n(s.psi, n, pass.work.balance()->factors + begin);
     if (pass.alone()) continue;

@@ -208,15 +208,21 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
     one_sided_gradients(chunk, slot, slots, vectors, pass.u, gradient_, H, s);
     if (tangent) one_sided_gradients(chunk, slot, slots, vectors, pass.w, direction_, dH, s);
   }
-  for (int k = 0; k < slots && (pass.work.samples() || (!laws_.single() && s.one_law < 0)); ++k)
-    for (int l = 0; l < chunk_points; ++l) {
-      s.owner[k * chunk_points + l] = chunk.first + l;
-      s.far[k * chunk_points + l] = static_cast<std::int32_t>((masks[k] >> l & 1) ? p + shifts[k] + l : p + l);
-    }
+  const auto set_ends = [&] {
+    for (int k = 0; k < slots; ++k)
+      for (int l = 0; l < chunk_points; ++l) {
+        s.owner[k * chunk_points + l] = chunk.first + l;
+        s.far[k * chunk_points + l] = static_cast<std::int32_t>((masks[k] >> l & 1) ? p + shifts[k] + l : p + l);
+      }
+  };
+  if (pass.work.samples() || (!laws_.single() && s.one_law < 0)) set_ends();
   if (pass.work.numbered()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
   const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;
-  pass.work.screen(p, 0, selective_ && both_ends ? 2 * lanes : lanes, s);
+  if (pass.work.screens_bonds() && pass.work.may_hold_too_much(p, selective_ && both_ends ? 2 * lanes : lanes, s)) {
+    set_ends();
+    pass.work.screen_bonds(lanes, !both_ends ? -1 : selective_ ? lanes : 0, s);
+  }
   if (sample) {
     const bool one_law = laws_.single() || s.one_law >= 0;
     pass.add_samples(lanes, s, sampled_pairs && one_law);

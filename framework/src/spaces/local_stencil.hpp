@@ -54,8 +54,11 @@ class LocalStencil {
   void adjoint(double* const (&t)[D]) noexcept;
   /// g_qk, all of them: g[(q * bonds + k) * D + e].
   void expand(std::vector<double>& g) const;
+  /// g_qk without the shift of one evaluation point: g[k * D + e].
+  void expand_one(int q, double* g) const;
   /// The influence of bond k in evaluation point q, and an entry of K_q^-1, 0 where it has no gradient.
-  double influence(int q, int k) const noexcept { return omega_[static_cast<std::size_t>(q) * row_ + static_cast<std::size_t>(k)]; }
+  double influence(int q, int k) const noexcept { return influences(q)[k]; }
+  const double* influences(int q) const noexcept { return omega_.data() + static_cast<std::size_t>(q) * row_; }
   double inverse(int q, int entry) const noexcept { return inverse_[static_cast<std::size_t>(entry) * lanes_ + static_cast<std::size_t>(q)]; }
   /// Local force states: the factor of P_q g_qq; empty for others.
   const std::vector<double>& tested() const noexcept { return tested_; }
@@ -65,8 +68,6 @@ class LocalStencil {
   void make(const StencilRules& rules, const FamilyArrays& family, const double* bond_share, int fields, const double* const (*u)[D],
             double family_volume);
   void set_shift(const StencilRules& rules, const FamilyArrays& family);
-  /// g_qk without the shift: g[k * D + e].
-  void expand_one(int q, double* g) const;
   void set_lever(const StencilRules& rules, const FamilyArrays& family);
   template <int Fields>
   void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "families/cloud_rows.hpp"
+#include "perikit/core/dimension.hpp"
 #include "spaces/balance_solver.hpp"
 #include "spaces/cloud_gradient.hpp"
 #include "spaces/local_stencil.hpp"
@@ -377,8 +378,9 @@ Field find_part_shift(const SpaceParts& parts, const ClosedPoints& closed, const
 }
 
 void shift_gradient(const FamilyArrays& family, ConstFieldView lambda, std::vector<double>& g) {
-  const auto size = static_cast<std::size_t>(family.dimension);
-  each_shift(family, family.omega.data(), g.data(), lambda, 0, [&](std::size_t k, std::size_t e, double d) { g[k * size + e] += d; });
+  with_dimension(family.dimension, [&](auto D) {
+    each_shift<D>(family, family.omega.data(), g.data(), lambda, 0, [&](std::size_t k, std::size_t e, double d) { g[k * D + e] += d; });
+  });
 }
 
 template Field find_shift<1>(const SpaceParts&, const ClosedPoints&, const CloudConsistency&, Balanced&);

@@ -16,7 +16,7 @@ void StencilShift<D>::begin(int points, const FamilyArrays& family) {
 
 template <int D>
 void StencilShift<D>::set(int q, const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first) {
-  each_shift(family, omega, g, lambda, first, [&](std::size_t k, std::size_t e, double d) { d_[(static_cast<std::size_t>(q) * D + e) * row_ + k] = d; });
+  each_shift<D>(family, omega, g, lambda, first, [&](std::size_t k, std::size_t e, double d) { d_[(static_cast<std::size_t>(q) * D + e) * row_ + k] = d; });
 }
 
 template <int D>
@@ -24,10 +24,13 @@ void StencilShift<D>::gradients(int fields, const double* const (*u)[D]) {
   H_.assign(static_cast<std::size_t>(fields * points_) * D * D, 0.0);
   double* to = H_.data();
   for (int f = 0; f < fields; ++f)
-    for (int q = 0; q < points_; ++q)
-      for (std::size_t c = 0; c < D; ++c)
-        for (std::size_t e = 0; e < D; ++e, ++to)
-          for (std::size_t k = 0; k < bonds_; ++k) *to += u[f][c][k] * row(q, e)[k];
+    for (int q = 0; q < points_; ++q, to += D * D) {
+      double sums[D][D] = {};   // they do not wait for each other
+      for (std::size_t k = 0; k < bonds_; ++k)
+        for (int c = 0; c < D; ++c)
+          for (int e = 0; e < D; ++e) sums[c][e] += u[f][c][k] * row(q, static_cast<std::size_t>(e))[k];
+      for (int c = 0; c < D; ++c) std::copy_n(sums[c], D, to + c * D);
+    }
 }
 
 template <int D>

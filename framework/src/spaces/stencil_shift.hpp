@@ -6,28 +6,32 @@
 
 namespace perikit {
 
-/// visit(k, e, d) of what lambda moves the gradient g[k * d + e] of a loaded family by: d_k = omega_k V_k (lambda_k - G xi_k), G = sum_k
+/// visit(k, e, d) of what lambda moves the gradient g[k * D + e] of a loaded family by: d_k = omega_k V_k (lambda_k - G xi_k), G = sum_k
 /// lambda_k (x) g_k, with the influence omega[k] of the evaluation point, and lambda by point in components first ... Not where there is no
-/// gradient to move.
-template <class Visit>
+/// gradient to move, and not of bonds without influence.
+template <int D, class Visit>
 void each_shift(const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first, Visit&& visit) {
   const std::size_t bonds = family.far.size();
-  const auto d = static_cast<std::size_t>(family.dimension);
-  if (std::all_of(g, g + bonds * d, [](double x) { return x == 0; })) return;
-  const auto difference = [&](std::size_t k, std::size_t c) {
-    const double* const values = lambda.component(first + static_cast<int>(c));
-    return values[family.far[k]] - values[family.owner];
-  };
-  double G[9] = {};
-  for (std::size_t k = 0; k < bonds; ++k)
-    for (std::size_t c = 0; c < d; ++c)
-      for (std::size_t e = 0; e < d; ++e) G[c * d + e] += difference(k, c) * g[k * d + e];
-  for (std::size_t k = 0; k < bonds; ++k)
-    for (std::size_t c = 0; c < d; ++c) {
-      double z = difference(k, c);
-      for (std::size_t e = 0; e < d; ++e) z -= G[c * d + e] * family.xi[e][k];
-      visit(k, c, omega[k] * family.volume[k] * z);
+  if (std::all_of(g, g + bonds * D, [](double x) { return x == 0; })) return;
+  const double* values[D];
+  for (int c = 0; c < D; ++c) values[c] = lambda.component(first + c);
+  const auto difference = [&](std::size_t k, int c) { return values[c][family.far[k]] - values[c][family.owner]; };
+  double G[D * D] = {};
+  for (std::size_t k = 0; k < bonds; ++k) {
+    if (omega[k] == 0) continue;
+    for (int c = 0; c < D; ++c) {
+      const double l = difference(k, c);
+      for (int e = 0; e < D; ++e) G[c * D + e] += l * g[k * D + static_cast<std::size_t>(e)];
     }
+  }
+  for (std::size_t k = 0; k < bonds; ++k) {
+    if (omega[k] == 0) continue;
+    for (int c = 0; c < D; ++c) {
+      double z = difference(k, c);
+      for (int e = 0; e < D; ++e) z -= G[c * D + e] * family.xi[e][k];
+      visit(k, static_cast<std::size_t>(c), omega[k] * family.volume[k] * z);
+    }
+  }
 }
 
 /// What a balanced cloud adds to the gradients of a family (spaces/shift.hpp): d_qk of its first evaluation points, H_q += sum_k u_k

@@ -112,7 +112,7 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
 
 template <int D>
 std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone(), ends = sample || pass.work.screens_bonds();
   const std::size_t size = m.family.size;
   load_differences(p, u_rows_, m, m.u);
   if (tangent) load_differences(p, w_rows_, m, m.w);
@@ -126,6 +126,7 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
   double* const H = selective_ ? s.Ht : s.H;
   double* const dH = selective_ ? s.dHt : s.dH;
   const double volume = weight(p);
+  double factors[batch_points];
   for (int first = 0; first < stencil.points(); first += batch_points) {
     const int n = std::min(batch_points, stencil.points() - first);
     stencil.gradient(0, first, n, H, batch_points);
@@ -134,15 +135,17 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
       const int k = first + l - owners_, original = k < 0 || m.original.empty() ? k : m.original[static_cast<std::size_t>(k)];
-      s.weight[l] = volume * stencil.share(first + l) * factor(p, original);
+      factors[l] = factor(p, original);
+      s.weight[l] = volume * stencil.share(first + l) * factors[l];
       s.number[l] = k < 0 ? -1 : number + 8 * original;
-      if (sample) s.far[l] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
+      if (ends) s.far[l] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : m.family.far[static_cast<std::size_t>(k)];
     }
     if (pass.work.evaluate(n, s, false, energy) >= 0) return p;
     if (pass.work.balance() && alone)
       for (int l = std::max(0, owners_ - first); l < n; ++l)
         pass.work.balance()->factors[factor_of(p, first + l - owners_)] = s.psi[l];
-    pass.work.screen(&p, 1, n, s);
+    if (pass.work.screens_bonds()) pass.work.screen_bonds(n, -1, s, factors);
+    else pass.work.screen(&p, 1, n, s);
     if (sample) pass.add_samples(n, s);
     if (alone) continue;
     if (selective_) add_pressures(n, 1, s, tangent, m);
@@ -183,7 +186,7 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
   const MirroredStencil<D>& stencil = stencils_[static_cast<std::size_t>(g.stencil)];
   const std::int32_t* members = members_.data() + g.first;
   const LanePoints points{members, g.count, g.contiguous, classes_[static_cast<std::size_t>(g.family)].shifts.data()};
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone();
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone(), ends = sample || pass.work.screens_bonds();
   const std::uint8_t here = lanes(g, pass);
   const bool all = here == (1u << g.count) - 1;
   const auto bonds = static_cast<std::size_t>(stencil.bonds()), evaluated = static_cast<std::size_t>(stencil.points());
@@ -214,13 +217,14 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
           s.owner[lane] = members[l];
           s.weight[lane] = lane_weight[l] * stencil.share(end->element[i]);
           s.number[lane] = k < 0 || !(here >> l & 1) ? -1 : number + 8 * k + l;
-          if (sample) s.far[lane] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : members[l] + points.shift[k];
+          if (ends) s.far[lane] = parts_ > 0 ? far_of_part(k, pass) : k < 0 ? -1 : members[l] + points.shift[k];
         }
     }
     if (selective_ && begin == orbits.begin()) keep_owner_gradients(8, 1.0, m, s, tangent);
     const int bad = pass.work.evaluate(slots * 8, s, false, energy);
     if (bad >= 0) return members[bad % 8];
-    pass.work.screen(members, 8, slots * 8, s);
+    if (pass.work.screens_bonds()) pass.work.screen_bonds(slots * 8, -1, s);
+    else pass.work.screen(members, 8, slots * 8, s);
     if (sample) pass.add_samples(slots * 8, s);
     if (selective_ && !alone) add_pressures(slots * 8, 8, s, tangent, m);
     if (!alone) pass.work.weigh_stress(slots * 8, s);

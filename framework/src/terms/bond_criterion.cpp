@@ -14,11 +14,10 @@ namespace {
 
 /// Directed bonds that are sampled at a time.
 constexpr std::size_t most_at_once = std::size_t{1} << 19;
-/// The criterion of what bonds set free asks for stored energy, too: a bond fails where an evaluation point of one of its ends holds this
-/// part of what would be needed if bonds set free what they hold. What a bond sets free is not bounded by what it holds, so that this is no
-/// saving without consequences but a part of the criterion, with run.skip = false as well. In running cracks of the strip of
-/// framework/docs/fracture.md the least part with which a bond failed was 0.58 (`baqp`, `projection`) and 0.26 (`bond_augmented`,
-/// `bond_associated`).
+/// The criterion of what bonds set free asks for stored energy, too: a bond fails where one of its own two evaluation points, or where these belong to points
+/// one of either end, holds per volume this part of what would be needed if bonds set free what they hold. What a bond sets free is not bounded by what it
+/// holds, so that this is no saving without consequences but a part of the criterion, with run.skip = false as well: see
+/// framework/docs/decisions/0021-what-bonds-set-free.md.
 double least_held(const Formulation& formulation) noexcept { return formulation.bond && formulation.g_from_xi_only ? 0.25 : 0.125; }
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
@@ -48,8 +47,8 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
 
 /// Each term may have the same part of what a point holds.
 /// Proof that no bond beyond its limit is left out of a look by what bonds hold: a bond holds psi_ij/N_i + psi_ji/N_j over its share, N the
-/// normaliser of its share, and fails where this sum is above the limit. Then one of the two psi is above half of the limit times its N, which
-/// is the density that its owner is marked beyond.
+/// normaliser of its share, psi with its factor, and fails where this sum is above the limit. Then one of the two psi is above half of the limit times
+/// its N, which is the density beyond which the bond is named, or its owner marked.
 void BondCriterion::set_screen(std::span<const double> factors) {
   const BondWeight kind = by_point_ ? BondWeight::kernel : formulation_.weight;
   const Field& onset = damage_->onset;
@@ -75,25 +74,27 @@ void BondCriterion::set_screen(std::span<const double> factors) {
       for (std::size_t k = 0; k < family.far.size(); ++k) most = std::max(most, share[k]);
     });
   }
-  const std::size_t parts = by_point_ ? static_cast<std::size_t>(formulation_.parts(body_.dimension())) : 0;
-  const auto largest_factor = [&](std::size_t p) {
-    if (factors.empty()) return 1.0;
-    const FamilyLists& lists = families_.cloud()->lists();
-    const auto of_point = parts > 0 ? factors.subspan(p * parts, parts)
-                                    : factors.subspan(static_cast<std::size_t>(lists.first[p]), static_cast<std::size_t>(lists.first[p + 1] - lists.first[p]));
-    return of_point.empty() ? 1.0 : std::max(1.0, std::ranges::max(of_point));
-  };
   const auto own = [&](std::int32_t p) {
-    const auto at = static_cast<std::size_t>(p);
-    return (release_ ? least_held(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(at, kind) / (most * largest_factor(at) * static_cast<double>(terms_.size()));
+    return (release_ ? least_held(formulation_) : 1.0) * 0.5 * (1 - 1e-9) * screen_.limit * families_.normaliser(static_cast<std::size_t>(p), kind) /
+           (most * static_cast<double>(terms_.size()));
   };
-  for (const std::int32_t p : body_.owned()) {
+  if (by_point_) {
+    const auto parts = static_cast<std::size_t>(formulation_.parts(body_.dimension()));
+    const auto largest_factor = [&](std::size_t p) { return factors.empty() ? 1.0 : std::max(1.0, std::ranges::max(factors.subspan(p * parts, parts))); };
+    for (const std::int32_t p : body_.owned())
+      if (onset.data()[p] < infinite) screen_.density[static_cast<std::size_t>(p)] = own(p) / largest_factor(static_cast<std::size_t>(p));
+    return;
+  }
+  screen_.with_factors = !release_;
+  screen_.of_bonds.assign(body_.stride(), infinite);
+  for (const std::int32_t p : body_.internal())
+    if (onset.data()[p] < infinite) screen_.of_bonds[static_cast<std::size_t>(p)] = own(p);
+  for (const std::int32_t p : body_.internal()) {
     const auto at = static_cast<std::size_t>(p);
     if (onset.data()[at] == infinite) continue;
-    screen_.density[at] = own(p);
-    if (by_point_) continue;
+    screen_.density[at] = screen_.of_bonds[at];
     families_.load(at, BondsOf::uncut, family);
-    for (const std::int32_t far : family.far) screen_.density[at] = std::min(screen_.density[at], own(far));
+    for (const std::int32_t far : family.far) screen_.density[at] = std::min(screen_.density[at], screen_.of_bonds[static_cast<std::size_t>(far)]);
   }
 }
 
@@ -104,6 +105,8 @@ BondScreen* BondCriterion::screen() noexcept {
 void BondCriterion::begin_forces() {
   screen_.known = false;
   std::fill(screen_.near.begin(), screen_.near.end(), std::uint8_t{0});
+  screen_.bonds.resize(static_cast<std::size_t>(thread_count()));
+  for (auto& bonds : screen_.bonds) bonds.clear();
 }
 
 void BondCriterion::end_forces(ConstFieldView u) {
@@ -126,6 +129,28 @@ void BondCriterion::clear_forces(int components) {
   std::fill_n(forces_.data(), forces_.size(), 0.0);
 }
 
+/// The bonds that may fail, by the last forces, where evaluation points belong to bonds.
+void BondCriterion::name_near_failure() {
+  for (const auto& of_thread : screen_.bonds) named_.insert(named_.end(), of_thread.begin(), of_thread.end());
+  // Terms beside them know points alone.
+  FamilyArrays family;
+  for (const std::int32_t p : body_.internal()) {
+    if (!marked(screen_.near, static_cast<std::size_t>(p))) continue;
+    families_.load(static_cast<std::size_t>(p), BondsOf::intact, family);
+    for (const std::int32_t far : family.far) named_.push_back(BondId::of(p, far));
+  }
+  std::erase_if(named_, [&](BondId b) { return !body_.owns(static_cast<std::size_t>(b.point)); });   // their owners look at them
+  std::ranges::sort(named_);
+  const auto rest = std::ranges::unique(named_);
+  named_.erase(rest.begin(), rest.end());
+}
+
+/// Those of these groups, by their lower ends.
+std::span<const BondId> BondCriterion::named_in(std::int32_t first_group, std::int32_t last_group) const noexcept {
+  const auto group = [](BondId b) { return b.point / static_cast<std::int32_t>(padding); };
+  return {std::ranges::lower_bound(named_, first_group, {}, group), std::ranges::upper_bound(named_, last_group, {}, group)};
+}
+
 /// The points with bonds that may fail at u.
 GroupMarks BondCriterion::near_failure(ConstFieldView u) {
   const bool known = known_at(u);
@@ -145,6 +170,11 @@ GroupMarks BondCriterion::near_failure(ConstFieldView u) {
   return near;
 }
 
+void BondCriterion::look_at_named() {
+  looked_at_.assign(own_.size(), 0);
+  for (const BondId bond : named_) mark(looked_at_, static_cast<std::size_t>(bond.point));
+}
+
 std::vector<std::int32_t> BondCriterion::groups_with(const GroupMarks& marks) const {
   std::vector<std::int32_t> groups;
   for (const std::int32_t g : groups_)
@@ -159,20 +189,27 @@ GroupMarks BondCriterion::looked_at(std::span<const std::int32_t> groups) const 
   return families_.evaluated(std::move(marks));
 }
 
-/// What the evaluation points of these points hold, and those of everything in their families.
+/// What the evaluation points of these points hold, and those of the far ends of the bonds that are looked at.
 void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
+  if (groups.empty()) return;
   own_ = looked_at(groups);
   if (flux_.flux.data) {
     samples_.ask(BondSampling::energy);
     return collect(u, own_, own_);
   }
   if (formulation_.pairs) return collect(u, own_, own_);  // both ends at once
-  near_ = families_.around(own_);
+  if (named_.empty()) {
+    near_ = families_.around(own_);
+  } else {
+    std::vector<std::int32_t> ends;
+    for (const BondId bond : named_in(groups.front(), groups.back())) ends.insert(ends.end(), {bond.point, bond.far});
+    near_ = families_.marks_of(ends);
+  }
   if (!release_) return collect(u, near_, own_);
   samples_.ask(BondSampling::derivative);
   const GroupMarks owners = release_->reach() > 1 ? families_.around(near_) : near_;
   collect(u, owners, near_);
-  release_->find(u, near_, owners, samples_);
+  release_->find(u, near_, owners, {own_, named_}, samples_);
 }
 
 void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldView u) {
@@ -225,14 +262,14 @@ double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double b, doub
   return energy;
 }
 
-void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const std::int32_t> named, Bonds& m) const {
+void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const BondId> named, Bonds& m) const {
   families_.load(static_cast<std::size_t>(p), BondsOf::intact, m.family);
   m.place.clear();
   for (std::size_t k = 0; k < m.family.far.size(); ++k) {
     const std::int32_t far = m.family.far[k];
     // A bond is looked at once: at its lower end, or at the one whose group is looked at.
     const bool here = named.empty() ? p < far || !looks_at(static_cast<std::size_t>(far))
-                                    : std::binary_search(named.begin(), named.end(), far);
+                                    : std::ranges::binary_search(named, BondId{p, far});
     if (here) m.place.push_back(k);
   }
   const std::size_t n = m.place.size(), size = padded(n);
@@ -284,7 +321,8 @@ void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit
   for (std::size_t l = 0; l < padding; ++l) {
     const std::size_t p = static_cast<std::size_t>(group) * padding + l;
     if (!body_.alive(p) || !looks_at(p)) continue;
-    load(static_cast<std::int32_t>(p), u, {}, m);
+    const auto [first, last] = std::ranges::equal_range(named_, static_cast<std::int32_t>(p), {}, &BondId::point);
+    load(static_cast<std::int32_t>(p), u, {first, last}, m);
     if (!m.place.empty()) visit(static_cast<std::int32_t>(p), m);
   }
 }
@@ -294,7 +332,14 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   found_.clear();
   found_at_ = u.data;
   if (release_) mark_by_forces(u);
-  looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), whole_group);
+  named_.clear();
+  const bool by_bond = (skip_ || release_) && screen_.by_bond() && known_at(u);
+  if (by_bond) {
+    name_near_failure();
+    look_at_named();
+  } else {
+    looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), whole_group);
+  }
   const std::vector<std::int32_t> near = groups_with(looked_at_);
   find_flux(near, u);
   by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
@@ -335,14 +380,14 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-  looked_at_.assign(own_.size(), 0);
-  for (const BondId bond : bonds) mark(looked_at_, static_cast<std::size_t>(bond.point));
+  named_.assign(bonds.begin(), bonds.end());
+  std::ranges::sort(named_);
+  look_at_named();
   find_flux(groups, u);
   sample(groups, u);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {
-    const std::int32_t far[] = {bonds[k].far};
-    load(bonds[k].point, u, far, m);
+    load(bonds[k].point, u, {&bonds[k], 1}, m);
     values[k] = m.place.empty() ? 0.0 : m.value[0];
   }
   flux_ = {};
@@ -351,6 +396,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
 std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
   std::vector<BondEnergy> all;
   looked_at_.assign(own_.size(), whole_group);
+  named_.clear();
   find_flux(groups_, u);
   by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<BondEnergy>> found(groups.size());

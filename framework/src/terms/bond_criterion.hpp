@@ -30,7 +30,7 @@ class BondCriterion final : public BondFinder {
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }
   std::size_t bytes() const noexcept override {
-    return samples_.bytes() + forces_.bytes() + 5 * own_.size() + near_.size() + (screen_.density.size() + screen_.u.size()) * sizeof(double);
+    return samples_.bytes() + forces_.bytes() + 5 * own_.size() + near_.size() + (screen_.density.size() + screen_.of_bonds.size() + screen_.u.size()) * sizeof(double);
   }
   /// For evaluations of forces to mark the groups that need a look; null where they cannot, or need not.
   BondScreen* screen() noexcept;
@@ -57,6 +57,10 @@ class BondCriterion final : public BondFinder {
   /// Whether the last evaluation of forces with a screen was at u.
   bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
   GroupMarks near_failure(ConstFieldView u);
+  void name_near_failure();
+  /// The named bonds, at their lower ends.
+  void look_at_named();
+  std::span<const BondId> named_in(std::int32_t first_group, std::int32_t last_group) const noexcept;
   /// Evaluates forces at u, where the last evaluation was at other displacements, for the marks that they leave.
   void mark_by_forces(ConstFieldView u);
   void clear_forces(int components);
@@ -73,8 +77,8 @@ class BondCriterion final : public BondFinder {
   /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).
   template <class Visit>
   void bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit);
-  /// The bonds of p with their states and values; `named`: these far ends alone.
-  void load(std::int32_t p, ConstFieldView u, std::span<const std::int32_t> named, Bonds& bonds) const;
+  /// The bonds of p with their states and values; `named`: these alone.
+  void load(std::int32_t p, ConstFieldView u, std::span<const BondId> named, Bonds& bonds) const;
   double energy_of(std::int32_t p, std::int32_t far, double b, double whole_omega) const noexcept;
 
   const Families& families_;
@@ -92,7 +96,8 @@ class BondCriterion final : public BondFinder {
   Field forces_;                        ///< that nobody reads
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
   GroupMarks looked_at_;              ///< the points whose bonds are looked at
-  GroupMarks own_, near_;             ///< what was sampled last: points, and everything in their families
+  std::vector<BondId> named_;         ///< ascending: of the bonds of these points those that are; empty: all
+  GroupMarks own_, near_;             ///< what was sampled last: points, and those at the far ends of bonds that are looked at
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
   std::size_t checked_ = 0;

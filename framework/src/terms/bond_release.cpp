@@ -13,6 +13,7 @@
 #include "spaces/bond_ends.hpp"
 #include "spaces/local_stencil.hpp"
 #include "spaces/shift.hpp"
+#include "spaces/stencil_shift.hpp"
 #include "terms/family_point.hpp"
 #include "terms/penalty_matrix.hpp"
 
@@ -63,6 +64,24 @@ void change_inverse(const double* inverse, double weight, const double* xi, doub
     for (int b = a; b < D; ++b) changed[symmetric_index(D, a, b)] = inverse[symmetric_index(D, a, b)] - by * weight * Ax[a] * Ax[b];
 }
 
+/// The entries of an owner, asked for in ascending order of their far ends.
+class EntriesOf {
+ public:
+  EntriesOf(const BondSamples& samples, std::int32_t owner) : samples_(samples), owner_(owner), next_(end()) {}
+  const BondSamples::Entry* at(std::int32_t far) noexcept {
+    if (next_ != end() && next_->owner == owner_ && next_->far == far) return next_++;
+    const BondSamples::Entry* const entry = samples_.find(owner_, far);
+    next_ = entry ? entry + 1 : end();
+    return entry;
+  }
+
+ private:
+  const BondSamples::Entry* end() const noexcept { return samples_.entries().data() + samples_.entries().size(); }
+  const BondSamples& samples_;
+  std::int32_t owner_;
+  const BondSamples::Entry* next_;
+};
+
 /// One law with the same constants at all points that store energy; on every rank the same.
 bool one_law(const Laws& laws) {
   const auto stores = [](const MaterialRecord& record) { return !record.silent; };
@@ -74,6 +93,7 @@ bool one_law(const Laws& laws) {
 /// Of one thread. Vectors by bond have D components each.
 struct BondRelease::Memory {
   FamilyArrays family;
+  std::vector<std::size_t> wanted;    ///< which bonds are
   std::vector<double> xi, u, z;       ///< bond vectors, relative displacements, and what is not affine of them
   std::vector<double> g, gradient;    ///< corrections of the bonds, and the point gradient
   AlignedVector<double> correction, shares;
@@ -93,7 +113,8 @@ struct BondRelease::Memory {
 BondRelease::BondRelease(const ReleaseParts& parts)
     : parts_(parts),
       one_state_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws)),
-      mirrored_(one_state_ && parts.factors.empty()) {}
+      mirrored_(one_state_ && parts.factors.empty()),
+      through_point_gradient_(!parts.formulation.weighted || parts.formulation.selective()) {}
 BondRelease::~BondRelease() = default;
 
 const char* BondRelease::unknown(const Formulation& f, int dimension, bool stabilized) {
@@ -154,7 +175,7 @@ void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const
   }
 }
 
-void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples) {
+void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const WantedBonds& wanted, const BondSamples& samples) {
   const Body& body = parts_.families.body();
   for (std::size_t k = 0; k < count_; ++k) place_[static_cast<std::size_t>(owners_[k].point)] = -1;
   place_.resize(body.stride(), -1);
@@ -166,11 +187,11 @@ void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMark
     owners_[count_].point = p;
     place_[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(count_++);
   }
-  with_dimension(body.dimension(), [&](auto d) { find_bonds<d>(u, near, samples); });
+  with_dimension(body.dimension(), [&](auto d) { find_bonds<d>(u, near, wanted, samples); });
 }
 
 template <int D>
-void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const BondSamples& samples) {
+void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const WantedBonds& wanted, const BondSamples& samples) {
   const auto over_owners = [&](auto&& visit) {
     parallel_for(count_, [&](std::size_t k) { visit(owners_[k], *memory_[static_cast<std::size_t>(thread_index())]); });
   };
@@ -192,6 +213,9 @@ void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const Bon
   over_owners([&](Owner& owner, Memory& m) {
     if (!marked(near, static_cast<std::size_t>(owner.point))) return;
     twice ? load<D>(owner.point, m) : with_bonds(owner, m);
+    m.wanted.clear();
+    for (std::size_t k = 0; k < owner.far.size(); ++k)
+      if (wanted(owner.point, owner.far[k])) m.wanted.push_back(k);
     find_gradient<D>(owner.point, u, m);
     release<D>(owner, samples, m);
   });
@@ -227,6 +251,7 @@ void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m)
       const double* const component = u.component(static_cast<int>(c));
       m.u[D * k + c] = component[m.family.far[k]] - component[p];
     }
+  if (!through_point_gradient_ && !parts_.stabilization) return;
   // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
   const double horizon = parts_.families.body().horizon();
   const int order = point_gradient(m.family, horizon, parts_.formulation.order, m.gradient);
@@ -244,8 +269,9 @@ template <int D>
 void BondRelease::find_onto(Owner& owner, const BondSamples& samples, Memory& m) const {
   const std::size_t n = owner.far.size();
   owner.onto.assign(n * D * D, 0.0);
+  EntriesOf entries(samples, owner.point);
   for (std::size_t k = 0; k < n; ++k) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    const BondSamples::Entry* const entry = entries.at(owner.far[k]);
     if (!entry) continue;
     for (std::size_t c = 0; c < D; ++c) {
       const double t = product<D>(entry->tensor + c * D, &m.g[D * k]);
@@ -270,7 +296,8 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
     std::copy_n(entry->tensor, D * D, S);
     release_weight(owner, entry->energy, m);
   }
-  for (std::size_t k = 0; k < owner.far.size(); ++k) owner.released[k] += work<D>(S, &m.z[D * k], &m.gradient[D * k]) / m.family.b(k);
+  if (through_point_gradient_)
+    for (std::size_t k = 0; k < owner.far.size(); ++k) owner.released[k] += work<D>(S, &m.z[D * k], &m.gradient[D * k]) / m.family.b(k);
   if (parts_.stabilization) release_penalty<D>(owner, m);
 }
 
@@ -287,27 +314,28 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
   const std::size_t n = owner.far.size();
   if (n == 0) return;
   LocalStencil<D>& stencil = m.stencil<D>();
-  const StencilRules rules{&parts_.formulation, parts_.families.body().horizon()};
-  stencil.build(rules, m.family, nullptr, 0, nullptr);
-  stencil.expand(m.weighted);
-  const std::vector<double>* g = &m.weighted;
-  if (parts_.shift.data) {   // it moves the gradients, not what the fits leave
-    stencil.build({rules.formulation, rules.horizon, parts_.shift}, m.family, nullptr, 0, nullptr);
-    stencil.expand(m.shifted);
-    g = &m.shifted;
-  }
+  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, m.family, nullptr, 0, nullptr);
+  std::vector<double>& g = m.weighted;
+  g.resize(n * D);
   double stored = 0;
-  for (std::size_t q = 0; q < static_cast<std::size_t>(stencil.points()); ++q) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, BondSamples::part(static_cast<int>(q)));
+  for (int q = 0; q < stencil.points(); ++q) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, BondSamples::part(q));
     if (!entry) continue;
     stored += entry->energy;
+    const double* const influence = stencil.influences(q);
+    if (std::ranges::none_of(m.wanted, [&](std::size_t k) { return influence[k] != 0; })) continue;
+    stencil.expand_one(q, g.data());
     double H[D * D];
-    sum_gradient<D>(n, m.u.data(), m.weighted.data() + q * n * D, H);
-    for (std::size_t k = 0; k < n; ++k) {
+    sum_gradient<D>(n, m.u.data(), g.data(), H);
+    // The shift moves the gradient, not what the fit leaves.
+    if (parts_.shift.data)
+      each_shift<D>(m.family, influence, g.data(), parts_.shift, 0, [&](std::size_t k, std::size_t e, double d) { g[k * D + e] += d; });
+    for (const std::size_t k : m.wanted) {
+      if (influence[k] == 0) continue;
       double z[D];
       std::copy_n(&m.u[D * k], D, z);
       subtract<D>(H, &m.xi[D * k], z);
-      owner.released[k] += work<D>(entry->tensor, z, g->data() + (q * n + k) * D) / m.family.b(k);
+      owner.released[k] += work<D>(entry->tensor, z, &g[D * k]) / m.family.b(k);
     }
   }
   release_weight(owner, stored, m);
@@ -337,8 +365,9 @@ template <int D>
 void BondRelease::release_shares(Owner& owner, const BondSamples& samples, const Memory& m, double* S) const {
   const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
   double pressure = 0, by_share = 0;
+  EntriesOf entries(samples, owner.point);
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    const BondSamples::Entry* const entry = entries.at(owner.far[k]);
     if (!entry) continue;
     owner.released[k] += entry->energy / m.family.b(k);
     pressure += entry->pressure;
@@ -376,8 +405,9 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
   m.correction.resize(D * size);
   // By bond and component of its g: dE/dg_e = (dE/dH)_ce (u - A xi)_c.
   m.weighted.assign(D * n, 0.0);
+  EntriesOf entries(samples, owner.point);
   for (std::size_t k = 0; k < n; ++k) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[k]);
+    const BondSamples::Entry* const entry = entries.at(owner.far[k]);
     if (!entry) continue;
     double A[D * D], z[D];
     const double* const other = share > 0 ? owner_of(owner.far[k]).H : m.H;
@@ -429,13 +459,14 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
   stencil.build({&parts_.formulation, parts_.families.body().horizon()}, family, m.shares.data(), 0, nullptr);
   stencil.expand(m.weighted);
   const std::size_t owners = parts_.formulation.selective() ? 1 : 0;
+  EntriesOf entries(samples, owner.point);
   for (std::size_t j = 0; j < n; ++j) {
-    const BondSamples::Entry* const entry = samples.find(owner.point, owner.far[j]);
+    const BondSamples::Entry* const entry = entries.at(owner.far[j]);
     if (!entry) continue;
     const double* const g = m.weighted.data() + (owners + j) * n * D;
     double H[D * D];
     sum_gradient<D>(n, m.u.data(), g, H);
-    for (std::size_t k = 0; k < n; ++k) {
+    for (const std::size_t k : m.wanted) {
       double z[D];
       std::copy_n(&m.u[D * k], D, z);
       subtract<D>(H, &m.xi[D * k], z);

@@ -8,6 +8,7 @@
 /// and what corrections, volumes of owners and penalty matrices change by. Kinematics with one gradient of order 1 per point, with
 /// bonds, and with weighted gradients of bonds.
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "families/families.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/point_flux.hpp"
+#include "perikit/families/bonds.hpp"
 #include "perikit/model/formulation.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
@@ -31,6 +33,16 @@ struct ReleaseParts {
   std::span<const double> factors;     ///< of the weights of evaluation points (EvaluationSpace::set_factors); empty: 1
 };
 
+/// Bonds of which it is asked what they set free: those that are named, ascending; or all with an end in `ends`.
+struct WantedBonds {
+  const GroupMarks& ends;
+  std::span<const BondId> named;
+  bool operator()(std::int32_t p, std::int32_t far) const noexcept {
+    return named.empty() ? marked(ends, static_cast<std::size_t>(p)) || marked(ends, static_cast<std::size_t>(far))
+                         : std::ranges::binary_search(named, BondId::of(p, far));
+  }
+};
+
 class BondRelease {
  public:
   /// Why it is not known of this formulation; null where it is.
@@ -40,9 +52,9 @@ class BondRelease {
   ~BondRelease();
   /// How many bonds away from a point evaluation points matter to what its bonds set free.
   int reach() const noexcept { return parts_.formulation.bond && parts_.formulation.far_share > 0 && !mirrored_ ? 2 : 1; }
-  /// Of the bonds of points in the groups `near`. samples: derivatives, of the groups `wide` (those of `near` and, at a reach of 2,
+  /// Of the wanted bonds of points in the groups `near`, at least. samples: derivatives, of the groups `wide` (those of `near` and, at a reach of 2,
   /// everything in their families).
-  void find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const BondSamples& samples);
+  void find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const WantedBonds& wanted, const BondSamples& samples);
   /// dE/db_ij by what belongs to p and its evaluation points [J], of an intact bond; the rest is that of the far end.
   double of(std::int32_t p, std::int32_t far) const noexcept;
 
@@ -65,7 +77,7 @@ class BondRelease {
   };
   struct Memory;
   template <int D>
-  void find_bonds(ConstFieldView u, const GroupMarks& near, const BondSamples& samples);
+  void find_bonds(ConstFieldView u, const GroupMarks& near, const WantedBonds& wanted, const BondSamples& samples);
   /// The bonds of a point; their corrections; its gradient, and what of the bonds is not affine.
   template <int D>
   void load(std::int32_t point, Memory& m) const;
@@ -101,6 +113,7 @@ class BondRelease {
   ReleaseParts parts_;
   bool one_state_;  ///< both directions of a bond have the same gradient, law and stress
   bool mirrored_;   ///< and weights as their normalisers say
+  bool through_point_gradient_;   ///< of the owner; else evaluation points have gradients of their own alone
   std::vector<Owner> owners_;
   std::size_t count_ = 0;            ///< of them in use
   std::vector<std::int32_t> place_;  ///< by point: its owner, or -1
