@@ -17,6 +17,7 @@ class SparseStencils {
   /// Appends the stencil of the next point, with the far ends of its bonds.
   void append(const LocalStencil<D>& stencil, std::span<const std::int32_t> far);
 
+  std::size_t size() const noexcept { return begin_.size() - 1; }
   double share(std::size_t i, int q) const noexcept { return share_[begin_[i] + static_cast<std::size_t>(q)]; }
   /// H_q of evaluation points first ... first + n - 1 of the i-th point appended, point p of the body; H[component * stride + 8 (q - first)].
   void gradient(std::size_t i, int first, int n, std::size_t p, const Row* u, double* H, std::size_t stride) const noexcept;

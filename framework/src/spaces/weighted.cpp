@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <type_traits>
 
 #include "spaces/weighted_kernel.hpp"
 
@@ -101,6 +102,20 @@ void Weighted<D>::find_numbers(std::int32_t p, const Group& g, Memory& m) const 
 template <int D>
 std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
   const Place& place = place_[static_cast<std::size_t>(p)];
+  if (!sparse_.empty()) {
+    std::unique_ptr<SparseStencils<D>>& stencil = remade_[static_cast<std::size_t>(p)];
+    if (!stencil) {
+      stencil = std::make_unique<SparseStencils<D>>();
+      load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
+      if (!m.family.far.empty()) {
+        build(m, 0, nullptr);
+        stencil->append(m.stencil, m.family.far);
+      }
+    }
+    if (stencil->size() == 0) return -1;
+    m.original.clear();
+    return evaluate_point(p, number_of(place.group) + place.lane, StoredStencil{*this, *stencil, p}, m, s, pass, energy);
+  }
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
   if (pass.work.numbered() || factor_)
@@ -111,8 +126,50 @@ std::int32_t Weighted<D>::left(std::int32_t p, Memory& m, BatchScratch& s, Pass&
 }
 
 template <int D>
+struct Weighted<D>::MadeStencil {
+  Weighted& space;
+  Memory& m;
+  std::int32_t p;
+  int points() const noexcept { return m.stencil.points(); }
+  double share(int q) const noexcept { return m.stencil.share(q); }
+  void gradient(int field, int first, int n, double* H) const noexcept { m.stencil.gradient(field, first, n, H, batch_points); }
+  void add_stress(int first, int n, double* P) const noexcept {
+    // Of whole packs.
+    for (int c = 0; c < D * D; ++c) std::fill(P + c * batch_points + n, P + c * batch_points + static_cast<int>(padded(static_cast<std::size_t>(n))), 0.0);
+    m.stencil.add_stress(first, n, P, batch_points);
+  }
+  void finish() const { space.scatter_rows(p, m); }
+};
+
+/// Its evaluation points come at every eighth lane.
+template <int D>
+struct Weighted<D>::StoredStencil {
+  Weighted& space;
+  const SparseStencils<D>& stencil;
+  std::int32_t p;
+  int points() const noexcept { return space.owners_ + space.parts_; }
+  double share(int q) const noexcept { return stencil.share(0, q); }
+  void gradient(int field, int first, int n, double* H) const noexcept {
+    const AlignedVector<Row>& rows = field == 0 ? space.u_rows_ : space.w_rows_;
+    double apart[9 * batch_points];
+    stencil.gradient(0, first, n, static_cast<std::size_t>(p), rows.data(), apart, batch_points);
+    for (int c = 0; c < D * D; ++c) {
+      for (int q = 0; q < n; ++q) H[c * batch_points + q] = apart[c * batch_points + 8 * q];
+      std::fill(H + c * batch_points + n, H + c * batch_points + static_cast<int>(padded(static_cast<std::size_t>(n))), 0.0);
+    }
+  }
+  void add_stress(int first, int n, const double* P) const noexcept {
+    double apart[9 * batch_points];
+    for (int c = 0; c < D * D; ++c)
+      for (int q = 0; q < n; ++q) apart[c * batch_points + 8 * q] = P[c * batch_points + q];
+    stencil.scatter(0, first, n, static_cast<std::size_t>(p), apart, batch_points, space.out_rows_.data());
+  }
+  void finish() const noexcept {}
+};
+
+template <int D>
 std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone(), ends = sample || pass.work.screens_bonds();
+  const bool tangent = pass.work.tangent();
   const std::size_t size = m.family.size;
   load_differences(p, u_rows_, m, m.u);
   if (tangent) load_differences(p, w_rows_, m, m.w);
@@ -122,15 +179,23 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     fields[1][c] = m.w.data() + (tangent ? c * size : 0);
   }
   build(m, tangent ? 2 : 1, fields, rules_.local() ? families_.normaliser(static_cast<std::size_t>(p), BondWeight::volume) : 0.0);
-  LocalStencil<D>& stencil = m.stencil;
+  return evaluate_point(p, number, MadeStencil{*this, m, p}, m, s, pass, energy);
+}
+
+template <int D>
+template <class Stencil>
+std::int32_t Weighted<D>::evaluate_point(std::int32_t p, std::int64_t number, Stencil stencil, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.alone(), ends = sample || pass.work.screens_bonds();
   double* const H = selective_ ? s.Ht : s.H;
   double* const dH = selective_ ? s.dHt : s.dH;
   const double volume = weight(p);
   double factors[batch_points];
-  for (int first = 0; first < stencil.points(); first += batch_points) {
-    const int n = std::min(batch_points, stencil.points() - first);
-    stencil.gradient(0, first, n, H, batch_points);
-    if (tangent) stencil.gradient(1, first, n, dH, batch_points);
+  // A multiple of eight that the lanes of a stored stencil leave room for.
+  constexpr int at_once = std::is_same_v<Stencil, StoredStencil> ? batch_points / 8 : batch_points;
+  for (int first = 0; first < stencil.points(); first += at_once) {
+    const int n = std::min(at_once, stencil.points() - first);
+    stencil.gradient(0, first, n, H);
+    if (tangent) stencil.gradient(1, first, n, dH);
     if (selective_ && first == 0) keep_owner_gradients(1, families_.left(static_cast<std::size_t>(p)), m, s, tangent);
     for (int l = 0; l < n; ++l) {
       s.owner[l] = p;
@@ -150,15 +215,14 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
     if (alone) continue;
     if (selective_) add_pressures(n, 1, s, tangent, m);
     pass.work.weigh_stress(n, s);
-    stencil.add_stress(first, n, s.P, batch_points);
+    stencil.add_stress(first, n, s.P);
   }
   if (alone) return -1;
   if (selective_) {
     owner_stresses(m, tangent, s);
-    for (int c = 0; c < D * D; ++c) std::fill_n(s.P + c * batch_points + 1, 7, 0.0);
-    stencil.add_stress(0, 1, s.P, batch_points);
+    stencil.add_stress(0, 1, s.P);
   }
-  scatter_rows(p, m);
+  stencil.finish();
   return -1;
 }
 

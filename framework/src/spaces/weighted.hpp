@@ -19,7 +19,7 @@ namespace perikit {
 /// Evaluation points with weights of their own over the family (weighted kinematics, and point gradients of orders above 1). On a
 /// lattice, points with equal families are a class that shares one stencil in the basis of its
 /// mirrors, and up to eight of them are evaluated at a time. Points of a cloud with few evaluation points keep their stencils,
-/// without the bonds that an evaluation point does not see. With an evaluation point at every bond, points of a cloud, of rare
+/// without the bonds that an evaluation point does not see, and make them anew where bonds have failed. With an evaluation point at every bond, points of a cloud, of rare
 /// classes, and of classes beyond a cap in bytes make their stencil when they need it. So does a point whose bonds have failed:
 /// it leaves its group.
 template <int D>
@@ -100,6 +100,11 @@ class Weighted final : public EvaluationSpace {
   std::int32_t left(std::int32_t p, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   /// A point with the family in m; `number` is that of its first evaluation point.
   std::int32_t evaluate_family(std::int32_t p, std::int64_t number, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
+  /// The stencil of a single point: the one that was made of the family in m, or a stored one.
+  struct MadeStencil;
+  struct StoredStencil;
+  template <class Stencil>
+  std::int32_t evaluate_point(std::int32_t p, std::int64_t number, Stencil stencil, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
   void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
   /// Of evaluation point k of a point of a cloud, where they belong to bonds.
   std::size_t factor_of(std::int32_t p, int k) const noexcept {
@@ -155,6 +160,7 @@ class Weighted final : public EvaluationSpace {
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows
   std::vector<Place> place_;                     ///< by point, once bonds have failed
   std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending
+  std::vector<std::unique_ptr<SparseStencils<D>>> remade_;  ///< clouds with few evaluation points: by point that has left, as its bonds are now; null: to be made
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;
   ScratchPool scratch_;
   std::vector<std::unique_ptr<Memory>> memory_;

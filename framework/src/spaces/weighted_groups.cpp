@@ -125,6 +125,7 @@ template <int D>
 void Weighted<D>::make_cloud_stencils() {
   std::vector<std::size_t> fallbacks(blocks(), 0), dropped(blocks(), 0);
   if (parts_ > 0) sparse_.assign(blocks(), {});
+  remade_.clear();
   parallel_for(blocks(), [&](std::size_t b) {
     Memory m;
     const auto member = [&](std::size_t g) { return g < groups_.size() ? groups_[g].first : members_.size(); };
@@ -164,7 +165,9 @@ void Weighted<D>::place_points() {
 template <int D>
 void Weighted<D>::bonds_changed(std::span<const std::int32_t> points) {
   if (place_.empty()) place_points();
+  if (!sparse_.empty()) remade_.resize(body_.stride());
   for (const std::int32_t p : points) {
+    if (!remade_.empty()) remade_[static_cast<std::size_t>(p)].reset();
     // Families that are whole again return: a restored space is bitwise a new one.
     Place& place = place_[static_cast<std::size_t>(p)];
     if (place.left == families_.lost_bonds(static_cast<std::size_t>(p))) continue;
@@ -200,6 +203,7 @@ void Weighted<D>::report(ModelReport& report) const {
   std::size_t stencils = 0, together = 0;
   for (const MirroredStencil<D>& s : stencils_) stencils += s.bytes();
   for (const SparseStencils<D>& s : sparse_) report.bytes += s.bytes();
+  for (const auto& stencil : remade_) report.bytes += sizeof(stencil) + (stencil ? stencil->bytes() : 0);
   for (const Group& group : groups_) together += group.stencil >= 0 ? group.count : 0;
   report.bytes += stencils + groups_.size() * sizeof(Group) + number_.size() * sizeof(std::size_t) + members_.size() * sizeof(std::int32_t) + place_.size() * sizeof(Place) +
                   (u_rows_.size() + w_rows_.size() + out_rows_.size()) * sizeof(Row) + scratch_.bytes();
