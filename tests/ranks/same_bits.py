@@ -58,6 +58,14 @@ HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisso
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
 
+CRACK_COLUMNS = """ { name = "torque", set = "low", quantity = "reaction", component = "z", reduce = "moment", about = %(middle)s },
+  { name = "area", quantity = "damage", reduce = "area" },
+  { name = "tip", quantity = "damage", reduce = "tip", above = 0.2, direction = %(ones)s },
+  { name = "pieces", quantity = "fragment", reduce = "max" },
+  { name = "second", quantity = "fragment", reduce = "mass", piece = 2 },
+  { name = "released", value = "dissipated_energy/area" }, """
+
+
 def with_inclusion(text):
     return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
 
@@ -242,7 +250,8 @@ def own_parts(everything):
         yield kind + "traction", drawn(text, dimension, "high", "+x")
         if not cloud and (everything or dimension == 2):
             yield kind + "traction on two materials", drawn(with_regions(text, *regions[dimension]), dimension, "all", "+y")
-        yield kind + "hole, regions, pre-crack and failing bonds", pulled.replace('"reaction"]', '"reaction", "damage"]') + crack[dimension] + DAMAGE["critical_stretch"]
+        pulled = pulled.replace('"reaction"]', '"reaction", "damage", "fragment"]').replace("history = [", "history = [" + CRACK_COLUMNS % {"middle": [9] * dimension, "ones": [1] * dimension})
+        yield kind + "hole, regions, pre-crack and failing bonds", pulled + crack[dimension] + DAMAGE["critical_stretch"]
 
 
 def loads_on_surfaces(everything):

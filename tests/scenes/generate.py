@@ -194,6 +194,8 @@ class Generator:
                                                        "seed": lambda: r.randint(1, 99)}, 0.1, section="run")
         if run:
             scene["run"] = run
+        if columns := list(self.columns_of_cracks()):
+            scene["output"].setdefault("history", []).extend(columns)
         return scene
 
     def draw_scales(self):
@@ -457,6 +459,22 @@ class Generator:
             if self.maybe(0.4, "load.follower"):
                 load["follower"] = True
         return load
+
+    def columns_of_cracks(self):
+        """Columns of moments, cracks, pieces and other columns. Drawn last, so that scenes of before stay as they are."""
+        middle = [rounded(0.5 * (low + high)) for low, high in zip(self.lower, self.upper)]
+        if self.maybe(0.05, "output.history.about") and self.dimension > 1:
+            yield {"name": "moment", "quantity": "reaction", "reduce": "moment", "about": middle} | ({"component": "z"} if self.dimension == 3 else {})
+        for key, reduce in (("direction", "extent"), ("above", "tip")):
+            if self.maybe(0.05, "output.history." + key):
+                yield {"name": reduce, "quantity": "damage", "reduce": reduce, "above": 0.3, "direction": [1.0] * self.dimension}
+        if self.maybe(0.05, "output.history.piece"):
+            yield {"name": "pieces", "quantity": "fragment", "reduce": "max"}
+            if self.integrator_name == "verlet":   # others may have no density
+                yield {"name": "largest", "quantity": "fragment", "reduce": "mass", "piece": 1}
+        if self.maybe(0.05, "output.history.value"):
+            yield {"name": "broken", "quantity": "damage", "reduce": "area"}
+            yield {"name": "released", "value": "dissipated_energy/broken"}
 
     # -- output -------------------------------------------------------------------------------------------------------------------------------
 

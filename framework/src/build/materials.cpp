@@ -142,7 +142,7 @@ std::optional<InputError> missing_density(const Scene& scene, const Body& body, 
     if (density > 0) continue;
     const ParameterValues& values = materials(scene)[body.material_ids().empty() ? 0 : body.material_ids()[p]]->values;
     if (!values.has("density"))
-      return values.error("density", "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs need");
+      return values.error("density", "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs and columns of masses need");
     const Point x = body.position(p);
     return values.error("density", fmt::format("found {} at ({:.6g}, {:.6g}, {:.6g}); allowed: a density > 0 [kg/m^3]", density,
                                                x[0], x[1], x[2]));

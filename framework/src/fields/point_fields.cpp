@@ -4,7 +4,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "families/families.hpp"
+#include "perikit/core/communicator.hpp"
 #include "perikit/problem/motion.hpp"
+#include "problem/pieces.hpp"
 
 namespace perikit {
 
@@ -30,7 +33,8 @@ const std::vector<PointField>& point_fields() {
        [](From f) { return f.scalar(f.once("damage", [&](Field) { return f.problem_.terms().damage(); })); }},
       {"shape_tensor_condition", 1, true, Sampling::nothing, "shape tensor condition", "",
        [](From f) { return f.scalar(f.once("shape_tensor_condition", [&](Field) { return f.problem_.terms().shape_tensor_condition(); })); }},
-      {"material_id", 1, false, Sampling::nothing, "material id", "", [](From f) { return f.material_id(); }}};
+      {"material_id", 1, false, Sampling::nothing, "material id", "", [](From f) { return f.material_id(); }},
+      {"fragment", 1, false, Sampling::nothing, "number of the piece", "", [](From f) { return f.scalar(f.piece_numbers()); }}};
   return all;
 }
 
@@ -146,6 +150,18 @@ std::vector<double> PointFields::jacobian() const {
     out[p] = f[0] * (f[4] * f[8] - f[5] * f[7]) - f[1] * (f[3] * f[8] - f[5] * f[6]) + f[2] * (f[3] * f[7] - f[4] * f[6]);
   }
   return out;
+}
+
+const Field& PointFields::piece_numbers() {
+  const auto version = static_cast<std::int64_t>(problem_.families().version());
+  if (communicator().largest(version != pieces_of_ ? 1 : 0) > 0) pieces_ = perikit::piece_numbers(problem_.families(), problem_);
+  pieces_of_ = version;
+  return pieces_;
+}
+
+const CrackAreas& PointFields::crack_areas() {
+  if (!crack_areas_) crack_areas_.emplace(problem_.families());
+  return *crack_areas_;
 }
 
 std::vector<double> PointFields::material_id() const {

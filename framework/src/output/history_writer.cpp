@@ -61,12 +61,14 @@ std::string kept_text(const std::filesystem::path& file, const std::string& head
 struct HistoryWriter::Implementation {
   std::filesystem::path file;
   std::vector<std::string> columns;
+  std::vector<bool> may_be_missing;
   Descriptor descriptor;
   off_t size = 0;
   std::int64_t rows = 0;
 };
 
-HistoryWriter::HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows)
+HistoryWriter::HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows,
+                             const std::vector<std::string>& missing)
     : implementation_(std::make_unique<Implementation>()) {
   check_columns(file, columns);
   const std::string header = header_line(columns);
@@ -74,7 +76,9 @@ HistoryWriter::HistoryWriter(const std::filesystem::path& file, std::vector<std:
   write_file_atomically(file, text);
   Descriptor descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   if (!descriptor) throw_system_error(file, "cannot write", errno);
-  *implementation_ = {file, std::move(columns), std::move(descriptor), static_cast<off_t>(text.size()), std::max<std::int64_t>(keep_rows, 0)};
+  std::vector<bool> may_be_missing;
+  for (const std::string& column : columns) may_be_missing.push_back(std::ranges::find(missing, column) != missing.end());
+  *implementation_ = {file, std::move(columns), std::move(may_be_missing), std::move(descriptor), static_cast<off_t>(text.size()), std::max<std::int64_t>(keep_rows, 0)};
 }
 
 HistoryWriter::~HistoryWriter() {
@@ -88,7 +92,7 @@ void HistoryWriter::row(std::span<const double> values) {
         fmt::format("{}: found {} values; there are {} columns", self.file.string(), values.size(), self.columns.size()));
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (std::isfinite(values[i])) continue;
+    if (std::isfinite(values[i]) || (std::isnan(values[i]) && self.may_be_missing[i])) continue;
     throw RunError(fmt::format("{}: column '{}' is {} where {} = {}", self.file.string(), self.columns[i], values[i],
                                self.columns[0], values[0]));
   }

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <numeric>
 
 #include "core/symmetric_matrix.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -26,162 +24,31 @@ constexpr std::size_t most_motions = motions_of(3);
 /// Products of each motion with each.
 using Products = std::array<double, most_motions * most_motions>;
 
-/// Which of so many things belong together.
-class Parts {
- public:
-  explicit Parts(std::size_t things) : above_(things) { std::iota(above_.begin(), above_.end(), 0); }
-  std::int32_t of(std::int32_t p) {
-    while (above_[static_cast<std::size_t>(p)] != p) {
-      std::int32_t& above = above_[static_cast<std::size_t>(p)];
-      above = above_[static_cast<std::size_t>(above)];
-      p = above;
-    }
-    return p;
-  }
-  void join(std::int32_t p, std::int32_t q) {
-    p = of(p);
-    q = of(q);
-    above_[static_cast<std::size_t>(std::max(p, q))] = std::min(p, q);
-  }
-
- private:
-  std::vector<std::int32_t> above_;
-};
-
 Point place(const Body& body, ConstFieldView u, std::int32_t p) {
   Point y = body.position(static_cast<std::size_t>(p));
   for (int c = 0; c < u.components; ++c) y[static_cast<std::size_t>(c)] += u.component(c)[p];
   return y;
 }
 
-/// What images are of: by internal index their source and the signs of its components.
-struct Sources {
-  std::vector<std::int32_t> source;  ///< -1: no image
-  Field sign;
-};
-
-Sources sources_of(const Body& body, const ImageMap* images) {
-  Sources all{std::vector<std::int32_t>(body.stride(), -1), {}};
-  if (!images) return all;
-  Field number = body.make_field(1);
-  all.sign = body.make_field(body.dimension());
-  for (const std::int32_t p : body.internal()) {
-    if (body.image(static_cast<std::size_t>(p))) continue;
-    number.data()[p] = p;
-    for (int c = 0; c < body.dimension(); ++c) all.sign.component(c)[p] = 1;
-  }
-  images->copy_from_sources(number);
-  images->extend(all.sign);
-  for (const std::int32_t p : body.internal())
-    if (body.image(static_cast<std::size_t>(p))) all.source[static_cast<std::size_t>(p)] = static_cast<std::int32_t>(number.data()[p]);
-  return all;
-}
-
-/// Pieces of one rank that are parts of one: `other` holds the lowest number of a point of the other part, on its rank.
-struct Link {
-  std::int64_t mine, other;
-};
-
-/// What the pieces are called that have parts on several ranks: by the lowest number of a part that of the whole. All ranks must call it.
-std::map<std::int64_t, std::int64_t> names_of_parts(const std::vector<Link>& links) {
-  const std::vector<Link> all = gathered(std::span(links));
-  std::vector<std::int64_t> numbers;
-  for (const Link& link : all) {
-    numbers.push_back(link.mine);
-    numbers.push_back(link.other);
-  }
-  std::ranges::sort(numbers);
-  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
-  const auto index = [&](std::int64_t number) { return static_cast<std::int32_t>(std::ranges::lower_bound(numbers, number) - numbers.begin()); };
-  Parts parts(numbers.size());
-  for (const Link& link : all) parts.join(index(link.mine), index(link.other));
-  std::vector<Link> names;
-  for (const std::int64_t number : numbers)
-    names.push_back({number, numbers[static_cast<std::size_t>(parts.of(index(number)))]});
-  std::map<std::int64_t, std::int64_t> name_of;
-  for (const Link& name : told_to_all(names)) name_of[name.mine] = name.other;
-  return name_of;
-}
-
-/// values, `width` of each piece, <- their sums over all parts of the piece. All ranks must call it.
+/// values, `width` of each piece, <- their sums over all ranks.
 void add_up(const std::vector<LoosePiece>& pieces, std::size_t width, std::span<double> values) {
-  if (communicator().size() == 1) return;
-  std::vector<double> mine;  // of each piece its number, which a double holds, and the values
-  for (std::size_t k = 0; k < pieces.size(); ++k) {
-    if (!pieces[k].shared) continue;
-    mine.push_back(static_cast<double>(pieces[k].first));
-    mine.insert(mine.end(), values.begin() + k * width, values.begin() + (k + 1) * width);
-  }
-  const std::vector<double> all = gathered<double>(mine);
-  std::map<double, std::vector<double>> sums;
-  for (std::size_t k = 0; k < all.size(); k += width + 1) {
-    std::vector<double>& sum = sums.try_emplace(all[k], width, 0.0).first->second;
-    for (std::size_t i = 0; i < width; ++i) sum[i] += all[k + 1 + i];
-  }
-  std::vector<double> told;
-  for (const auto& [number, sum] : sums) {
-    told.push_back(number);
-    told.insert(told.end(), sum.begin(), sum.end());
-  }
-  told = told_to_all(told);
-  std::map<double, std::size_t> place;
-  for (std::size_t k = 0; k < told.size(); k += width + 1) place[told[k]] = k + 1;
-  for (std::size_t k = 0; k < pieces.size(); ++k)
-    if (pieces[k].shared) std::copy_n(told.begin() + place.at(static_cast<double>(pieces[k].first)), width, values.begin() + k * width);
+  add_up_over_ranks(pieces.size(), [&](std::size_t k) -> const Piece& { return pieces[k]; }, width, values);
 }
 
-/// The pieces of which this rank has points, with these alone.
-std::vector<LoosePiece> find_pieces(const Body& body, Parts& parts, Problem& problem) {
-  constexpr std::int64_t none = std::numeric_limits<std::int64_t>::max();
-  std::vector<std::int64_t> first(body.stride(), none);  // by the point that the part leads to
-  const auto first_of = [&](std::int32_t p) -> std::int64_t& { return first[static_cast<std::size_t>(parts.of(p))]; };
-  for (const std::int32_t p : body.owned()) first_of(p) = std::min(first_of(p), body.number(static_cast<std::size_t>(p)));
-  std::map<std::int64_t, std::int64_t> name_of;
-  if (communicator().size() > 1) {
-    Field at_owners = body.make_field(1);
-    for (const std::int32_t p : body.owned()) at_owners.data()[p] = static_cast<double>(first_of(p));
-    problem.share(at_owners);
-    std::vector<Link> links;
-    for (const std::int32_t p : body.internal()) {
-      const auto point = static_cast<std::size_t>(p);
-      if (!body.owns(point) && !body.image(point) && first_of(p) != none) links.push_back({first_of(p), static_cast<std::int64_t>(at_owners.data()[p])});
-    }
-    const auto both = [](const Link& link) { return std::pair(link.mine, link.other); };
-    std::ranges::sort(links, {}, both);
-    links.erase(std::ranges::unique(links, {}, both).begin(), links.end());
-    name_of = names_of_parts(links);
-  }
-  std::map<std::int64_t, std::size_t> place;  // by name
-  std::vector<LoosePiece> pieces;
-  for (const std::int32_t p : body.owned()) {
-    const auto found = name_of.find(first_of(p));
-    const std::int64_t name = found == name_of.end() ? first_of(p) : found->second;
-    const auto [piece, fresh] = place.try_emplace(name, pieces.size());
-    if (fresh) {
-      pieces.emplace_back().first = name;
-      pieces.back().shared = found != name_of.end();
-    }
-    pieces[piece->second].points.push_back(p);
-  }
-  for (LoosePiece& piece : pieces) std::ranges::sort(piece.points);
-  return pieces;
-}
-
-/// How many points the pieces have, where they are, and their motions before they are sifted: those of unit norm that move a piece at all.
+/// Where the pieces are, and their motions before they are sifted: those of unit norm that move a piece at all.
 void find_motions(const Body& body, ConstFieldView u, std::vector<LoosePiece>& pieces) {
   const int d = body.dimension(), m = motions_of(d);
-  std::vector<std::array<double, 4>> places(pieces.size());
+  std::vector<std::array<double, 3>> places(pieces.size());
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    places[k] = {static_cast<double>(pieces[k].points.size())};
+    places[k] = {};
     for (const std::int32_t p : pieces[k].points)
-      for (std::size_t c = 0; c < 3; ++c) places[k][1 + c] += place(body, u, p)[c];
+      for (std::size_t c = 0; c < 3; ++c) places[k][c] += place(body, u, p)[c];
   }
-  add_up(pieces, 4, {places.front().data(), 4 * places.size()});
+  add_up(pieces, 3, {places.front().data(), 3 * places.size()});
   std::vector<Products> gram(pieces.size());
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     LoosePiece& piece = pieces[k];
-    piece.count = static_cast<std::int64_t>(places[k][0]);
-    for (std::size_t c = 0; c < 3; ++c) piece.centre[c] = places[k][1 + c] / places[k][0];
+    for (std::size_t c = 0; c < 3; ++c) piece.centre[c] = places[k][c] / static_cast<double>(piece.count);
     gram[k] = {};
     for (const std::int32_t p : piece.points) {
       std::array<Point, most_motions> at;
@@ -232,20 +99,12 @@ void keep_free(const Products& squares, LoosePiece& piece) {
   piece.motions = std::move(free);
 }
 
-/// The larger first, then the one with the lowest point.
-bool comes_before(const LoosePiece& a, const LoosePiece& b) { return a.count != b.count ? a.count > b.count : a.first < b.first; }
-
 /// Whether `mine` (null: this rank has none) comes before those of all other ranks. All ranks must call it, each with another piece.
 bool comes_first(const LoosePiece* mine) {
   const double most = communicator().largest(mine ? static_cast<double>(mine->count) : 0.0);
   const bool largest = mine && static_cast<double>(mine->count) == most;
   const double number = largest ? -static_cast<double>(mine->first) : -std::numeric_limits<double>::infinity();
   return communicator().largest(number) == number && largest;
-}
-
-/// Whether this rank speaks for the piece: it has its first point.
-bool speaks_for(const LoosePiece& piece, const Body& body) {
-  return std::ranges::any_of(piece.points, [&](std::int32_t p) { return body.number(static_cast<std::size_t>(p)) == piece.first; });
 }
 
 }  // namespace
@@ -283,23 +142,11 @@ std::string names(const std::vector<LoosePiece>& pieces, const Body& body) {
 std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, ConstFieldView u) {
   const Body& body = families.body();
   const int d = body.dimension();
-  const Sources sources = sources_of(body, problem.images());
+  const Sources sources(body, problem.images());
   const auto source = [&](std::int32_t p) { return sources.source[static_cast<std::size_t>(p)]; };
-  Parts parts(body.stride());
-  std::vector<std::pair<std::int32_t, std::int32_t>> bonded_images;  // and a point that is bonded to it
-  FamilyArrays family;
-  for (const std::int32_t p : body.owned()) {
-    families.load(static_cast<std::size_t>(p), BondsOf::intact, family);
-    for (int k = 0; k < family.bonds; ++k) {
-      const std::int32_t q = family.far[static_cast<std::size_t>(k)];
-      parts.join(p, source(q) >= 0 ? source(q) : q);
-      if (source(q) >= 0) bonded_images.emplace_back(q, p);
-    }
-  }
-  std::ranges::sort(bonded_images);
-  bonded_images.erase(std::ranges::unique(bonded_images, {}, &std::pair<std::int32_t, std::int32_t>::first).begin(), bonded_images.end());
-
-  std::vector<LoosePiece> pieces = find_pieces(body, parts, problem);
+  std::vector<BondedImage> bonded_images;
+  std::vector<LoosePiece> pieces;
+  for (Piece& piece : find_pieces(families, problem, sources, &bonded_images)) pieces.emplace_back(std::move(piece));
   find_motions(body, u, pieces);
   std::vector<std::int32_t> piece_at(body.stride(), -1);
   for (std::size_t k = 0; k < pieces.size(); ++k)

@@ -4,24 +4,21 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "families/families.hpp"
-#include "perikit/problem/problem.hpp"
+#include "problem/pieces.hpp"
 
 namespace perikit {
 
-/// Points that whole bonds join to each other and to no others, and the rigid motions that no constraint prevents. It may lie on
-/// several ranks, of which each has its own points.
-struct LoosePiece {
+/// A piece with the rigid motions that no constraint prevents.
+struct LoosePiece : Piece {
   /// Translation along the axes, then turning in the planes xy, xz, yz, about `centre` and over `size`; of unit norm over the
   /// piece.
   using Motion = std::array<double, 6>;
 
-  std::vector<std::int32_t> points;  ///< of this rank: internal indices, ascending
-  std::int64_t first = 0;            ///< the lowest input number of its points, on whatever rank
-  std::int64_t count = 0;            ///< of its points
-  bool shared = false;               ///< whether it lies on several ranks
+  explicit LoosePiece(Piece piece) : Piece(std::move(piece)) {}
+
   Point centre{};                    ///< [m], mean of the points where they are
   double size = 1;                   ///< [m]
   std::vector<Motion> motions;       ///< orthonormal

@@ -74,8 +74,8 @@ NothingToKeep::~NothingToKeep() { --without_results; }
 bool NothingToKeep::holds() noexcept { return without_results > 0; }
 
 std::vector<std::string> history_columns(const Scene& scene, bool laws_dissipate) {
-  std::vector<std::string> columns{"step", "time", "time_step", "strain_energy", "kinetic_energy", "external_work", "dissipated_energy", "iterations", "residual"};
-  if (laws_dissipate) columns.emplace_back("dissipated_by_laws");
+  std::vector<std::string> columns = fixed_history_columns();
+  if (!laws_dissipate) columns.pop_back();
   for (const HistoryDescription& record : scene.output.history) columns.push_back(record.name);
   return columns;
 }
@@ -112,7 +112,10 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   });
   shares_frames_ = simulation.problem().partition() && simulation.problem().body().points_of_all_ranks() > most_points_gathered();
   if (!first_) return;
-  history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1);
+  std::vector<std::string> missing;
+  for (const HistoryDescription& record : scene.output.history)
+    if (record.may_be_missing()) missing.push_back(record.name);
+  history_ = std::make_unique<HistoryWriter>(folder_ / "history.csv", columns_, earlier ? done_.history_rows : -1, missing);
   if (shares_frames_) log("frames        written by all ranks");
 }
 
@@ -248,7 +251,7 @@ bool RunRecorder::wants_sample(std::int64_t step, double time) {
 std::vector<std::string> RunRecorder::fields_due(bool row, bool frame) const {
   std::vector<std::string> wanted;
   for (const HistoryDescription& record : simulation_.scene().output.history)
-    if (row) wanted.push_back(record.quantity);
+    if (row && !record.value) wanted.push_back(record.quantity);
   if (frame) wanted.insert(wanted.end(), frame_fields_.begin(), frame_fields_.end());
   if (frame && simulation_.small_strains().watched()) wanted.emplace_back("deformation_gradient");
   return wanted;
@@ -403,11 +406,25 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           static_cast<double>(report.iterations),
                           report.residual};
   if (problem.laws().dissipates()) row.push_back(energies.dissipated_by_laws);
-  for (const HistoryDescription& record : simulation_.scene().output.history)
-    row.push_back(reduced(record, problem, fields_, report.time));
+  const OutputDescription& output = simulation_.scene().output;
+  for (const HistoryDescription& record : output.history)
+    row.push_back(record.value ? 0 : reduced(record, problem, fields_, report.time));
+  for (const std::size_t k : output.derived) row[columns_.size() - output.history.size() + k] = derived_value(output.history[k], row, report.time);
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;
   if (first_) history_->row(row);
+}
+
+double RunRecorder::derived_value(const HistoryDescription& record, std::span<const double> row, double time) {
+  std::vector<double> values;
+  for (const std::string& name : record.value->columns()) values.push_back(row[static_cast<std::size_t>(std::ranges::find(columns_, name) - columns_.begin())]);
+  const double value = (*record.value)(values, time);
+  const bool follows = std::ranges::any_of(values, [](double given) { return std::isnan(given); });   // from a column that is missing itself
+  if (!std::isnan(value) || follows || !undefined_.insert(record.name).second) return value;
+  std::string given;
+  for (std::size_t k = 0; k < values.size(); ++k) given += fmt::format("{}{} = {:.6g}", k == 0 ? "" : ", ", record.value->columns()[k], values[k]);
+  log(fmt::format("warning: history column {}: {} is no finite number at t = {:.6g}, where {}; nan stands in its place", record.name, record.value->text(), time, given));
+  return value;
 }
 
 bool RunRecorder::line_due() {

@@ -15,6 +15,6 @@ namespace perikit {
 ///   error: sqrt(sum V (value - exact)^2 / sum V exact^2) at time `t` [s, or the load parameter]. Throws RunError where exact
 ///   vanishes.
 /// Vectors without a component stand for their magnitude. All ranks must call it; rank 0 gets the number.
-double reduced(const HistoryDescription& record, const BodyProblem& problem, PointFields& fields, double t);
+double reduced(const HistoryDescription& record, BodyProblem& problem, PointFields& fields, double t);
 
 }  // namespace perikit

@@ -68,7 +68,12 @@ void Simulation::evaluate_conditions() {
     problem_->constraints().prescribe_displacement(0, scratch);
   problem_->constraints().prescribe_displacement(end, scratch);
   const Body& body = problem_->body();
-  for (const HistoryDescription& record : scene_.output.history) {
+  for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
+    const HistoryDescription& record = scene_.output.history[k];
+    if (record.reduce == "mass") problem_->masses().by_point();   // throws where a density is missing
+    if (record.value && !problem_->laws().dissipates() && std::ranges::find(record.value->columns(), "dissipated_by_laws") != record.value->columns().end())
+      throw InputError(record.value->position(), fmt::format("output.history.{}.value", k),
+                       "found the column dissipated_by_laws, which there is only where a law dissipates; allowed: the other columns");
     if (!record.exact) continue;
     for (const std::int32_t p : body.set(record.set)) (*record.exact)(body.position(static_cast<std::size_t>(p)), 0);
   }
@@ -85,7 +90,7 @@ void Simulation::refuse_gradients() const {
   };
   for (const std::string& field : scene_.output.fields) check(field, scene_.output.fields_position, "output.fields");
   for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
-    check(scene_.output.history[k].quantity, scene_.output.history[k].position, fmt::format("output.history.{}.quantity", k));
+    if (!scene_.output.history[k].value) check(scene_.output.history[k].quantity, scene_.output.history[k].position, fmt::format("output.history.{}.quantity", k));
   }
 }
 

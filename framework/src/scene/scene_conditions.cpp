@@ -1,10 +1,10 @@
-// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it.
+// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it. Columns of the
+// history: scene_history.cpp.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
-#include "perikit/fields/point_field.hpp"
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml_text.hpp"
@@ -188,60 +188,6 @@ void SceneReader::read_output(const toml::table& root) {
                        fmt::format("found \"{}\" twice; allowed: each field once", description.fields[i]));
   }
   read_history(output);
-}
-
-void SceneReader::read_history(const toml::table& output) {
-  const ParameterTable table = history_parameters();
-  std::vector<std::string> columns{"time", "step"};
-  for (const toml::table* record : sections(output, "history", "output.history")) {
-    const std::string path = fmt::format("output.history.{}", scene_.output.history.size());
-    const ParameterValues values = reader_.read(*record, table, path);
-    writer_.header("output.history", true);
-    writer_.lines(table, values);
-    const auto text = [&](const char* key) { return values.has(key) ? values.text(key) : std::string(); };
-    HistoryDescription description{
-        text("name"), set_of(values), text("quantity"), text("component"), text("reduce"), values.position("quantity"), {}, {}};
-    const auto refuse = [&](const char* key, const std::string& message) {
-      reader_.errors.add(values.position(key), join_path(path, key), message);
-    };
-
-    if (values.has("name")) {
-      const std::string& name = description.name;
-      const bool fits_csv = !name.empty() && std::none_of(name.begin(), name.end(),
-                                                          [](unsigned char c) { return c < 0x20 || c == ',' || c == '"'; });
-      if (!fits_csv)
-        refuse("name",
-               fmt::format("found {}; allowed: a column name without commas, quotes and control characters", toml_string(name)));
-      else if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
-        refuse("name", fmt::format("found \"{}\" again; allowed: names that no other column of history.csv has", name));
-      }
-      columns.push_back(name);
-    }
-    if (values.has("quantity")) {
-      const std::vector<std::string> allowed = find_point_field(description.quantity)->components(reader_.dimension);
-      const bool known = std::find(allowed.begin(), allowed.end(), description.component) != allowed.end();
-      if (allowed.empty() && values.has("component")) {
-        refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", description.component,
-                                        description.quantity));
-      } else if (!allowed.empty() && !known && (values.has("component") || !record->contains("component"))) {
-        refuse("component",
-               fmt::format("found {}; allowed: {}", values.has("component") ? toml_string(description.component) : "nothing",
-                           fmt::join(allowed, ", ")));
-      }
-    }
-    for (const auto& [key, reduce] : {std::pair{"at", "fit"}, {"exact", "error"}}) {
-      if (values.has("reduce") && values.has(key) && description.reduce != reduce) {
-        refuse(key, fmt::format("found it with reduce = \"{}\"; allowed: only with reduce = \"{}\"", description.reduce, reduce));
-      } else if (description.reduce == reduce && !record->contains(key)) {
-        refuse("reduce", fmt::format("found \"{}\" without {}; allowed: {}", reduce, key, allowed(*table.find(key))));
-      }
-    }
-    if (values.has("at")) std::ranges::copy(values.numbers("at"), description.at.begin());
-    if (values.has("exact")) {
-      description.exact.emplace(values.expression("exact"), scene_.constants, true, values.position("exact"), join_path(path, "exact"));
-    }
-    scene_.output.history.push_back(std::move(description));
-  }
 }
 
 void SceneReader::read_run(const toml::table& root) {

@@ -43,6 +43,8 @@ class SceneReader {
   void read_loads(const toml::table& root);
   void read_output(const toml::table& root);
   void read_history(const toml::table& output);
+  void read_column(const toml::table& record, const ParameterValues& values, HistoryDescription& column);
+  void read_derived(const std::vector<ParameterValues>& columns);
   void read_run(const toml::table& root);
   static void names_below(const toml::node& node, std::set<std::string>& names);
   void find_unused_constants(const toml::table& root);

@@ -223,15 +223,30 @@ ParameterTable history_parameters() {
   ParameterTable table;
   table.string("name", "Name of the column.").require();
   table.string("set", "The points that are sampled.").by_default("\"all\"");
-  table.choice("quantity", point_field_names(), "A point field.").require();
-  table.string("component", "Component of a vector (x) or tensor (xy).");
+  table.choice("quantity", point_field_names(), "A point field.");
+  table.string("value", "In place of a quantity: an expression of other columns of the same row, of t and of [constants], such as \"stress/strain\".");
+  table.string("component", "Component of a vector (x) or tensor (xy); with reduce = \"moment\" of the moment, in 2D z, which may be left out.");
   table
-      .choice("reduce", {"mean", "sum", "min", "max", "fit", "error"},
+      .choice("reduce", {"mean", "sum", "min", "max", "fit", "error", "moment", "extent", "tip", "area", "mass"},
               "How the values of the set become one. fit: an affine function fitted to them, taken at the place `at`; error: their "
-              "root-mean-square distance from `exact`, relative to that of `exact` from 0, weighted by volume.")
+              "root-mean-square distance from `exact`, relative to that of `exact` from 0, weighted by volume; moment: of forces about the point "
+              "`about` [N m]; extent: how far the points with a value above `above` extend along `direction` [m]; tip: the place of the outermost of "
+              "them along `direction` [m]; area: of damage, the area of the cracks of the run [m^2]; mass: of fragment, the mass of the piece `piece` [kg].")
       .by_default("\"mean\"");
   table.add(ParameterType::numbers, "at", "m", "With reduce = \"fit\": a place, which need not be a point of the body.").one_per_axis();
   table.add(ParameterType::expression, "exact", "-", "With reduce = \"error\": what the quantity should be, in its own unit.").with_time();
+  table.add(ParameterType::numbers, "about", "m", "With reduce = \"moment\": a fixed place. Lever arms reach from it to the points where they are.").one_per_axis();
+  table.add(ParameterType::numbers, "direction", "-", "With reduce = \"extent\" or \"tip\": along which is measured, from the origin, where the points were.").one_per_axis();
+  table.number("above", "-", "With reduce = \"extent\" or \"tip\": points count where the quantity is above this, in its own unit.");
+  table.integer("piece", "With reduce = \"mass\": number of the piece, 1 for the biggest.").at_least(1);
+  table.exactly(1, {"quantity", "value"});
+  return table;
+}
+
+ParameterTable derived_column_parameters() {
+  const ParameterTable all = history_parameters();
+  ParameterTable table;
+  for (const char* key : {"name", "value"}) table.add(ParameterType::text, key, "-", "") = *all.find(key);
   return table;
 }
 

@@ -22,6 +22,8 @@ ParameterTable periodic_parameters();
 ParameterTable load_parameters();
 ParameterTable output_parameters();
 ParameterTable history_parameters();
+/// Those of a column with a value from other columns.
+ParameterTable derived_column_parameters();
 ParameterTable run_parameters();
 
 /// Keys that the framework adds to every part of a kind at the top level: stabilization, no_fail, gradual.

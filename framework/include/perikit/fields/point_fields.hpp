@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "perikit/fields/crack_areas.hpp"
 #include "perikit/fields/point_field.hpp"
 #include "perikit/problem/body_problem.hpp"
 
@@ -33,6 +34,8 @@ class PointFields {
   void expect(std::span<const std::string> names);
   /// They are asked for at the end of the step whose forces are evaluated next.
   void expect_after_step(std::span<const std::string> names) { problem_.sample_along(samples_of(names)); }
+  /// What broken bonds stand for.
+  const CrackAreas& crack_areas();
   /// Frees its memory until it is asked for again.
   void forget(const std::string& name) { cache_.erase(name), made_.erase(name); }
 
@@ -61,12 +64,17 @@ class PointFields {
   std::vector<double> reaction();
   std::vector<double> jacobian() const;
   std::vector<double> material_id() const;
+  /// Of `fragment`. It changes when bonds do, which is known, and is kept until then. All ranks must call it.
+  const Field& piece_numbers();
 
   BodyProblem& problem_;
   bool dynamic_, moves_;
   std::map<std::string, OutputField> cache_;
   std::optional<PointSamples> samples_;
   std::map<std::string, Made> made_;     ///< by `once`
+  Field pieces_;
+  std::int64_t pieces_of_ = -1;          ///< version of the families that pieces_ belongs to
+  std::optional<CrackAreas> crack_areas_;
   std::span<const std::int32_t> rows_;   ///< the points that are computed for
 };
 

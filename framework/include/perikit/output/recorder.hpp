@@ -84,10 +84,11 @@ class FrameWriter {
 /// history.csv: a header line with names, then one row per sample; flushed row by row, 17 significant digits.
 class HistoryWriter {
  public:
-  /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows.
-  HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows = -1);
+  /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows. `missing`: the columns that may be NaN, which is written as nan.
+  HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows = -1,
+                const std::vector<std::string>& missing = {});
   ~HistoryWriter();
-  /// One value per column. Throws RunError naming the column where a value is not finite (the row is not written), or where the disk
+  /// One value per column. Throws RunError naming the column where a value is not finite and may not be missing (the row is not written), or where the disk
   /// is full (the file then ends with the row before).
   void row(std::span<const double> values);
   /// The rows so far survive a machine that stops. Throws RunError.

@@ -99,6 +99,7 @@ class BodyProblem final : public Problem {
 
   Terms& terms() noexcept { return *parts_.terms; }
   const Terms& terms() const noexcept { return *parts_.terms; }
+  const Families& families() const noexcept { return *parts_.families; }
   /// Null where one rank has the whole body.
   const Partition* partition() const noexcept { return parts_.partition.get(); }
   const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }

@@ -170,6 +170,8 @@ class RunRecorder final : public Observer {
   std::string energy_warning() const;
   /// counts: not a row of a stop alone.
   void write_history(const StepReport& report, bool counts);
+  /// The first value of a column that is NaN is a warning.
+  double derived_value(const HistoryDescription& record, std::span<const double> row, double time);
   void progress(const StepReport& report);
   /// Whether a line of progress is due, which is then taken to be shown.
   bool line_due();
@@ -206,6 +208,7 @@ class RunRecorder final : public Observer {
   double time_step_ = 0;   ///< of the last step that was reported
   std::vector<std::string> warnings_;
   bool faces_crossed_ = false;             ///< a warning said so
+  std::set<std::string> undefined_;        ///< columns from others that were NaN
   std::set<std::string> strange_fields_;   ///< that were not finite somewhere
   bool shares_frames_ = false;             ///< ranks write frames together
 };

@@ -13,6 +13,7 @@
 #include "perikit/core/space.hpp"
 #include "perikit/plugin/parameters.hpp"
 #include "perikit/plugin/part.hpp"
+#include "perikit/scene/column_expression.hpp"
 #include "perikit/scene/expression.hpp"
 
 namespace perikit {
@@ -113,8 +114,15 @@ struct LoadDescription {
 struct HistoryDescription {
   std::string name, set, quantity, component, reduce;
   SourcePosition position;                   ///< of the quantity
+  std::optional<ColumnExpression> value;     ///< of other columns; then nothing but the name is set besides
   std::optional<Expression> exact;           ///< with reduce "error"
   std::array<double, 3> at{};                ///< with reduce "fit" [m]
+  std::array<double, 3> about{};             ///< with reduce "moment" [m]
+  std::array<double, 3> direction{};         ///< with reduce "extent" and "tip", of length 1
+  double above = 0;                          ///< likewise, in the unit of the quantity
+  std::int64_t piece = 0;                    ///< with reduce "mass"
+  /// Whether a row may have no value, which is written as nan.
+  bool may_be_missing() const noexcept { return value || reduce == "tip"; }
 };
 
 struct OutputDescription {
@@ -125,7 +133,11 @@ struct OutputDescription {
   std::vector<std::string> fields;           ///< empty: default
   SourcePosition fields_position;
   std::vector<HistoryDescription> history;
+  std::vector<std::size_t> derived;          ///< those with a value from other columns, each after the ones that it uses
 };
+
+/// The columns that every history.csv begins with, and dissipated_by_laws, which follows where a law dissipates.
+const std::vector<std::string>& fixed_history_columns();
 
 struct Scene {
   std::filesystem::path file;
