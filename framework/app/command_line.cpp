@@ -57,10 +57,12 @@ void add_commands(CLI::App& app, Options& options) {
   study_command->add_flag("--force", options.force, "Replace files in the folder that perikit did not write");
   study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");
   study_command->add_flag("--quiet", options.quiet, "No progress, no summary");
-  CLI::App* plot_command = add("plot", "Draw a field or a history column of a run", plot);
-  plot_command->add_option("results", options.plot.results, "Folder of a run, or its results.h5")->required();
-  plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")
-      ->capture_default_str();
+  CLI::App* plot_command = add("plot", "Draw a field of a run, or curves of histories", plot);
+  plot_command->add_option("results", options.plot.results, "Folder of a run, or its results.h5; of several with --y")->required();
+  CLI::Option* field = plot_command->add_option("--field", options.plot.field, "Point field, or history:NAME for a column of history.csv")->capture_default_str();
+  CLI::Option* y = plot_command->add_option("--y", options.plot.y, "A column of history.csv: a curve of it for each run")->excludes(field);
+  plot_command->add_option("--x", options.plot.x, "The column that --y is drawn over; default: time")->needs(y);
+  plot_command->add_option("--window", options.window, "x0 x1 y0 y1: the part of the picture to draw, of bodies in a plane or on a line and of curves")->expected(4);
   plot_command->add_option("--component", options.plot.component, "x, y, z, magnitude; xx ... zz, von_mises, trace, determinant");
   plot_command->add_option("--frame", options.frame, "Frame index; default: the last one");
   plot_command->add_option("--deformed", options.plot.deformed, "Factor of the displacement that is added to the positions");

@@ -228,6 +228,7 @@ void plot(const Options& options) {
   if (!options.unit.empty()) plot_options.unit = options.unit;
   if (options.view.size() == 3) plot_options.view = {options.view[0], options.view[1], options.view[2]};
   if (options.range.size() == 2) plot_options.range = {{options.range[0], options.range[1]}};
+  if (options.window.size() == 4) plot_options.window = {{options.window[0], options.window[1], options.window[2], options.window[3]}};
   plot_options.output = options.output;
   fmt::print("{}\n", perikit::plot(plot_options).string());
 }

@@ -25,7 +25,7 @@ struct Options {
   PlotOptions plot;
   std::int64_t frame = -1;
   std::string unit;
-  std::vector<double> view, range;
+  std::vector<double> view, range, window;
   BenchOptions bench;
 };
 

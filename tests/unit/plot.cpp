@@ -124,8 +124,8 @@ TEST_CASE("bodies of every dimension become pictures") {
   if (gnuplot_missing()) return;
   const TemporaryFolder folder;
   const auto draw = [&](const Sample& sample, const std::string& title, PlotOptions options) {
-    options.results = folder.path / title;
-    sample.write(options.results, title);
+    options.results = {folder.path / title};
+    sample.write(options.results.front(), title);
     options.output = picture_folder(folder) / (title + ".png");
     CHECK(plot(options) == options.output);
     check_png(options.output);
@@ -156,7 +156,7 @@ TEST_CASE("history columns, file types and default names") {
     for (int k = 0; k < 100; ++k) history.row(std::vector<double>{1.0 * k, 0.1 * k, std::sin(0.1 * k)});
   }
   PlotOptions options;
-  options.results = run / "results.h5";
+  options.results = {run / "results.h5"};
   options.field = "history:tip_uy";
   options.output = picture_folder(folder) / "history.png";
   plot(options);
@@ -173,6 +173,7 @@ TEST_CASE("history columns, file types and default names") {
   CHECK(dynamic.find(">tip uy [m]<") != std::string::npos);
   CHECK(dynamic.find(">time [s]<") != std::string::npos);
   CHECK(quasi_static.find(">time<") != std::string::npos);
+  CHECK(drawn("[integrator]\nsteps = 10\n").find(">load parameter<") != std::string::npos);
   options.unit = "mm";
   CHECK(drawn(own).find(">tip uy [mm]<") != std::string::npos);
   CHECK(drawn(own).find(">time<") != std::string::npos);
@@ -192,13 +193,74 @@ TEST_CASE("history columns, file types and default names") {
   check_png(run / "volume_00000000.png");
 }
 
+TEST_CASE("curves of columns over each other, of several runs, with gaps where a value is missing") {
+  if (gnuplot_missing()) return;
+  const TemporaryFolder folder;
+  PlotOptions options;
+  for (const char* name : {"coarse", "fine"}) {
+    std::filesystem::create_directories(folder.path / name);
+    HistoryWriter history(folder.path / name / "history.csv", {"step", "time", "u", "P", "E"}, -1, {"E"});
+    for (int k = 0; k < 30; ++k) {
+      const double u = 0.1 * k, P = std::sin(u) * (name[0] == 'c' ? 1 : 1.2);
+      history.row(std::vector<double>{1.0 * k, u, u, P, k == 0 ? std::nan("") : P / u});
+    }
+    options.results.push_back(folder.path / name);
+  }
+  options.x = "u", options.y = "P";
+  options.output = picture_folder(folder) / "curves.png";
+  plot(options);
+  check_png(options.output);
+  options.output = folder.path / "curves.svg";
+  const auto drawn = [&] { return plot(options), bytes(options.output); };
+  const std::string usual = drawn();
+  for (const char* word : {">u<", ">P<", ">coarse<", ">fine<"}) CHECK_MESSAGE(usual.find(word) != std::string::npos, word);
+  options.window = {0, 1, 0, 0.5};
+  CHECK(drawn() != usual);
+  options.y = "E";
+  CHECK(drawn().find("nan") == std::string::npos);
+  options.results.pop_back();
+  CHECK(drawn().find(">coarse<") == std::string::npos);   // one curve needs no name
+  options.output.clear();
+  CHECK(plot(options) == folder.path / "coarse" / "history_E_over_u.png");
+}
+
+TEST_CASE("the title says frame, time and factor; points without bonds are dots; a window shows a part") {
+  if (gnuplot_missing()) return;
+  const TemporaryFolder folder;
+  const auto drawn = [&](const Sample& sample, auto change) {
+    sample.write(folder.path / "plate", "plate");
+    PlotOptions options;
+    options.results = {folder.path / "plate"};
+    options.field = "damage";
+    options.output = folder.path / "picture.svg";
+    change(options);
+    plot(options);
+    return bytes(options.output);
+  };
+  Sample sample = plate(0);
+  std::ranges::fill(sample.damage.data, 0.5);
+  const std::string usual = drawn(sample, [](PlotOptions&) {});
+  CHECK(usual.find(">plate, frame 1, time 0.5<") != std::string::npos);
+  CHECK(drawn(sample, [](PlotOptions& o) { o.deformed = 3; }).find(", deformed 3 times<") != std::string::npos);
+  CHECK(drawn(sample, [](PlotOptions& o) { o.window = {20, 40, 0, 15}; }) != usual);
+  std::ofstream(folder.path / "plate" / "scene.toml") << "[integrator]\nsteps = 4\n";
+  CHECK(drawn(sample, [](PlotOptions&) {}).find(">plate, frame 1, load parameter 0.5<") != std::string::npos);
+  // A point that has lost all bonds is another picture than one that has lost most.
+  const auto with_damage = [&](double damage) {
+    sample.damage.data[100] = damage;
+    return drawn(sample, [](PlotOptions& o) { o.range = {0, 0.5}; });
+  };
+  CHECK(with_damage(0.99) == with_damage(0.999));
+  CHECK(with_damage(0.99) != with_damage(1));
+}
+
 TEST_CASE("range, view, unit and frame change the picture") {
   if (gnuplot_missing()) return;
   const TemporaryFolder folder;
   bar(20).write(folder.path, "bar");
   const auto drawn = [&](auto change) {
     PlotOptions options;
-    options.results = folder.path;
+    options.results = {folder.path};
     options.output = folder.path / "picture.png";
     change(options);
     plot(options);
@@ -219,7 +281,7 @@ TEST_CASE("what cannot be drawn is refused with the names that can") {
   plate(0).write(folder.path, "plate");
   write_file_atomically(folder.path / "history.csv", "time,tip_uy\n0,1\n");
   PlotOptions usual;
-  usual.results = folder.path;
+  usual.results = {folder.path};
   const auto refused = [&](auto change, const char* message) {
     PlotOptions options = usual;
     change(options);
@@ -232,17 +294,23 @@ TEST_CASE("what cannot be drawn is refused with the names that can") {
   refused([](PlotOptions& o) { o.field = "damage", o.component = "x"; }, "'damage' is a scalar");
   refused([](PlotOptions& o) { o.frame = 7; }, "frame: found 7; must be one of 0 ... 1");
   refused([](PlotOptions& o) { o.field = "history:tip_ux"; }, "the columns are time, tip_uy; did you mean 'tip_uy'?");
+  refused([](PlotOptions& o) { o.y = "tip_ux"; }, "y: found 'tip_ux'; the columns are time, tip_uy; did you mean 'tip_uy'?");
+  refused([](PlotOptions& o) { o.x = "tmie", o.y = "tip_uy"; }, "x: found 'tmie'; the columns are time, tip_uy; did you mean 'time'?");
+  refused([](PlotOptions& o) { o.x = "time"; }, "y: found nothing over time; must be a column of history.csv");
+  refused([](PlotOptions& o) { o.results.push_back(o.results.front()); }, "results: found 2 runs for the picture of a field");
+  refused([](PlotOptions& o) { o.window = {1, 1, 0, 1}; }, "window: found 1 1 0 1; must be from x to a larger x");
+  refused([](PlotOptions& o) { o.window = {500, 600, 0, 1}; }, "window: found a window without points; the body lies between ");
   refused([](PlotOptions& o) { o.output = "picture.gif"; }, "found 'picture.gif'; must end in .png, .svg or .pdf");
   refused([](PlotOptions& o) { o.view = {0, 0, 0}; }, "view: must be a direction");
   refused([](PlotOptions& o) { o.range = {1, 1}; }, "range: found 1 ... 1");
-  refused([](PlotOptions& o) { o.results = "/no/such/run"; }, "/no/such/run: cannot be read: No such file");
+  refused([](PlotOptions& o) { o.results = {"/no/such/run"}; }, "/no/such/run: cannot be read: No such file");
 }
 
 TEST_CASE("a missing gnuplot is said so") {
   const TemporaryFolder folder;
   plate(0).write(folder.path, "plate");
   PlotOptions options;
-  options.results = folder.path;
+  options.results = {folder.path};
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", folder.path.c_str(), 1);
   CHECK_THROWS_WITH_AS(plot(options), doctest::Contains("gnuplot is not installed"), RunError);

@@ -423,7 +423,7 @@ double RunRecorder::derived_value(const HistoryDescription& record, std::span<co
   if (!std::isnan(value) || follows || !undefined_.insert(record.name).second) return value;
   std::string given;
   for (std::size_t k = 0; k < values.size(); ++k) given += fmt::format("{}{} = {:.6g}", k == 0 ? "" : ", ", record.value->columns()[k], values[k]);
-  log(fmt::format("warning: history column {}: {} is no finite number at t = {:.6g}, where {}; nan stands in its place", record.name, record.value->text(), time, given));
+  log(named("not_finite", fmt::format("warning: history column {}: {} is no finite number at t = {:.6g}, where {}; nan stands in its place", record.name, record.value->text(), time, given)));
   return value;
 }
 

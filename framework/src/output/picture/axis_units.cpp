@@ -11,6 +11,20 @@
 
 namespace perikit {
 
+namespace {
+
+/// Of a column that the scene asks for; that of one with a value from others nobody knows.
+std::string unit_of(const toml::table& column) {
+  const std::string quantity = column["quantity"].value_or(std::string()), reduce = column["reduce"].value_or(std::string());
+  if (reduce == "error") return "";
+  if (reduce == "moment") return "N m";
+  if (reduce == "extent" || reduce == "tip") return "m";
+  if (reduce == "area") return "m²";
+  return reduce == "mass" ? "kg" : field_unit(quantity);
+}
+
+}  // namespace
+
 SceneUnits::SceneUnits(const std::string& scene) {
   toml::table root;
   try {
@@ -18,12 +32,14 @@ SceneUnits::SceneUnits(const std::string& scene) {
   } catch (const InputError&) {
     return;
   }
-  if (root["integrator"]["end_time"]) time_ = std::string("s");
+  const auto integrator = root["integrator"];
+  if (integrator["end_time"]) time_ = std::string("s");
+  else if (integrator["steps"]) time_name_ = "load parameter";
   const toml::array* history = root["output"]["history"].as_array();
   if (!history) return;
   for (const toml::node& entry : *history) {
     const toml::table* table = entry.as_table();
-    if (table) own_.emplace_back((*table)["name"].value_or(std::string()), field_unit((*table)["quantity"].value_or(std::string())));
+    if (table) own_.emplace_back((*table)["name"].value_or(std::string()), unit_of(*table));
   }
 }
 

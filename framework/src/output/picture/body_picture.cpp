@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string_view>
 
@@ -84,6 +85,11 @@ std::vector<std::uint8_t> draw_cells(const PointCells& body, const BodyPicture& 
     PointCell cell = body.cells[p];
     cell.centre.head<2>() -= frame.lower;
     cell.centre *= scale;
+    if (cell.dot) {
+      const double radius = 0.8 * scale * cell.half_edge.col(0).norm();
+      raster.disc(cell.centre, std::max(radius, 1.5 * samples), map_colour((picture.values[p] - picture.range[0]) / (picture.range[1] - picture.range[0])));
+      continue;
+    }
     cell.half_edge *= scale * widened;
     const Colour colour = map_colour((picture.values[p] - picture.range[0]) / (picture.range[1] - picture.range[0]));
     if (plane) {
@@ -131,14 +137,14 @@ std::string triad_and_scale(const Matrix3d& axes, const Frame& frame, double pix
 }  // namespace
 
 std::string body_script(const BodyPicture& picture) {
-  PointCells body = make_point_cells(picture.dimension, picture.reference, picture.drawn, picture.volume);
+  PointCells body = make_point_cells(picture.dimension, picture.reference, picture.drawn, picture.volume, picture.lone);
   const Matrix3d axes = view_axes(picture.dimension, picture.view);
   for (PointCell& cell : body.cells) {
     cell.centre = axes * cell.centre;
     cell.half_edge = axes * cell.half_edge;
     cell.normal = axes * cell.normal;
   }
-  const Frame frame = frame_around(body.cells);
+  const Frame frame = picture.window ? Frame{{(*picture.window)[0], (*picture.window)[2]}, {(*picture.window)[1], (*picture.window)[3]}} : frame_around(body.cells);
   const double scale = std::min(1150 / frame.size().x(), 850 / frame.size().y());
   const int columns = std::max(1, static_cast<int>(std::lround(scale * frame.size().x())));
   const int rows = std::max(1, static_cast<int>(std::lround(scale * frame.size().y())));
@@ -191,15 +197,26 @@ std::string body_script(const BodyPicture& picture) {
 }
 
 std::string curve_script(const CurvePicture& picture) {
+  constexpr std::array colours{"#1c61a8", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#3a3a3a", "#17a2a2", "#8c564b"};
+  constexpr std::array marks{7, 5, 9, 11, 13, 6, 4};   // fewer than colours: the pairs repeat late
+  const bool several = picture.curves.size() > 1;
   std::string script = gnuplot_terminal(picture.file, 1150, 750);
-  script += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\nset yrange {}\nunset key\n", gnuplot_quoted(picture.title),
-                        gnuplot_quoted(picture.x_label), gnuplot_quoted(picture.y_label), picture.y_range);
-  script += "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset rmargin 4\n$curve << end\n";
-  for (std::size_t i = 0; i < picture.x.size(); ++i) script += fmt::format("{} {}\n", picture.x[i], picture.y[i]);
-  script += "end\nplot $curve using 1:2 with ";
-  // Few points are shown as points too.
-  script += picture.x.size() <= 60 ? "linespoints pt 7 ps 0.7" : "lines";
-  return script + " lw 2.5 lc rgb '#1c61a8'\n";
+  script += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\nset xrange {}\nset yrange {}\n", gnuplot_quoted(picture.title),
+                        gnuplot_quoted(picture.x_label), gnuplot_quoted(picture.y_label), picture.x_range, picture.y_range);
+  script += several ? "set key below left Left reverse samplen 2\n" : "unset key\n";
+  script += "set datafile missing 'nan'\nset grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset rmargin 4\n";
+  std::string plots;
+  for (std::size_t k = 0; k < picture.curves.size(); ++k) {
+    const Curve& curve = picture.curves[k];
+    script += fmt::format("$curve{} << end\n", k);
+    for (std::size_t i = 0; i < curve.x.size(); ++i) script += fmt::format("{} {}\n", curve.x[i], curve.y[i]);
+    script += "end\n";
+    // Few points are shown as points too.
+    plots += fmt::format("{} $curve{} using 1:2 with {} lw 2.5 lc rgb '{}' title {}", k == 0 ? "plot" : ",", k,
+                         curve.x.size() <= 60 ? fmt::format("linespoints pt {} ps 0.7", marks[k % marks.size()]) : "lines", colours[k % colours.size()],
+                         gnuplot_quoted(curve.name));
+  }
+  return script + plots + "\n";
 }
 
 }  // namespace perikit

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,17 +16,24 @@ struct BodyPicture {
   std::span<const double> drawn;      ///< positions as drawn, rows of 3
   std::span<const double> volume;     ///< per point
   std::span<const double> values;     ///< per point
+  std::vector<bool> lone;             ///< per point, or empty: whether no bond joins it to others
   std::array<double, 2> range{};      ///< of the colours
+  std::optional<std::array<double, 4>> window;   ///< 2D: from x to x and from y to y
   std::array<double, 3> view{};       ///< 3D: towards the eye
   std::string title, value_label, length_unit;
   std::filesystem::path file;
 };
 std::string body_script(const BodyPicture& picture);
 
+struct Curve {
+  std::vector<double> x, y;   ///< NaN: a gap
+  std::string name = {};
+};
+
 struct CurvePicture {
-  std::span<const double> x, y;
+  std::vector<Curve> curves;   ///< of several the names are shown
   std::string title, x_label, y_label;
-  std::string y_range;  ///< gnuplot's "[a:b]", or "[*:*]"
+  std::string x_range, y_range;  ///< gnuplot's "[a:b]", or "[*:*]"
   std::filesystem::path file;
 };
 std::string curve_script(const CurvePicture& picture);

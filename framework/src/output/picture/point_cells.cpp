@@ -95,7 +95,7 @@ class NeighbourSearch {
 }  // namespace
 
 PointCells make_point_cells(int dimension, std::span<const double> reference, std::span<const double> drawn,
-                            std::span<const double> volume) {
+                            std::span<const double> volume, const std::vector<bool>& lone) {
   PointCells result;
   const std::size_t points = volume.size();
   const std::vector<double> spacings = sample_spacings(dimension, reference);
@@ -113,7 +113,13 @@ PointCells make_point_cells(int dimension, std::span<const double> reference, st
     const double keep = 1e-6 * result.spacing * result.spacing;
     Matrix3d shape = keep * Matrix3d::Identity(), moved = shape;
     Vector3d outwards = Vector3d::Zero();
+    const double size = result.spacing * std::pow(volume[p] / median_volume, 1.0 / dimension);
+    if (!lone.empty() && lone[p]) {
+      result.cells.push_back({point(drawn, p), 0.5 * size * Matrix3d::Identity(), true, Vector3d::Zero()});
+      continue;
+    }
     search.each(p, [&](std::size_t q) {
+      if (!lone.empty() && lone[q]) return;
       const Vector3d bond = point(reference, q) - point(reference, p), now = point(drawn, q) - point(drawn, p);
       const double length = bond.norm();
       if (length == 0 || now.norm() > torn * length) return;
@@ -124,11 +130,10 @@ PointCells make_point_cells(int dimension, std::span<const double> reference, st
       outwards -= bond / length;
     });
     const Matrix3d deformation = moved * shape.inverse();
-    const double size = result.spacing * std::pow(volume[p] / median_volume, 1.0 / dimension);
     Vector3d normal = Vector3d::Zero();
     if (outwards.norm() > 0.8) normal = (deformation.inverse().transpose() * outwards).normalized();
     if (!normal.allFinite()) normal.setZero();
-    result.cells.push_back({point(drawn, p), 0.5 * size * deformation, normal});
+    result.cells.push_back({point(drawn, p), 0.5 * size * deformation, false, normal});
   }
   return result;
 }

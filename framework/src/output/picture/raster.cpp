@@ -33,6 +33,21 @@ void Raster::fill(const Eigen::Vector3d& centre, const Eigen::Vector3d& a, const
   }
 }
 
+void Raster::disc(const Eigen::Vector3d& centre, double radius, const Colour& colour) {
+  if (!centre.allFinite()) return;
+  const auto first = [&](double at) { return static_cast<int>(std::max(0.0, std::floor(at - radius))); };
+  const auto last = [&](double at, int limit) { return static_cast<int>(std::min<double>(limit, std::ceil(at + radius))); };
+  for (int row = first(centre.y()); row < last(centre.y(), height_); ++row) {
+    for (int column = first(centre.x()); column < last(centre.x(), width_); ++column) {
+      if (std::hypot(column + 0.5 - centre.x(), row + 0.5 - centre.y()) > radius) continue;
+      const std::size_t pixel = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column);
+      if (static_cast<float>(centre.z()) <= depth_[pixel]) continue;
+      depth_[pixel] = static_cast<float>(centre.z());
+      colour_[pixel] = colour;
+    }
+  }
+}
+
 std::vector<std::uint8_t> Raster::rgba(int factor) const {
   const int columns = width_ / factor, rows = height_ / factor;
   std::vector<std::uint8_t> bytes;

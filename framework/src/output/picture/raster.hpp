@@ -24,6 +24,9 @@ class Raster {
   void fill(const Eigen::Vector3d& centre, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Colour& colour,
             double dome = 0);
 
+  /// A disc towards the eye; x, y and radius in pixels.
+  void disc(const Eigen::Vector3d& centre, double radius, const Colour& colour);
+
   /// Bytes red, green, blue, alpha, rows from below; blocks of `factor` x `factor` pixels are averaged.
   std::vector<std::uint8_t> rgba(int factor) const;
 
