@@ -53,6 +53,7 @@ void add_commands(CLI::App& app, Options& options) {
   study_command->add_option("--jobs", options.jobs, "Runs side by side; the default, 1, is for run times that are to be compared")
       ->default_val(1)
       ->check(CLI::Range(1, 1024));
+  study_command->add_flag("--keep-going", options.keep_going, "Exit status 0 also where runs have failed or were refused");
   study_command->add_flag("--resume", options.resume, "Keep the runs of the folder that are done already");
   study_command->add_flag("--force", options.force, "Replace files in the folder that perikit did not write");
   study_command->add_flag("--trust", options.trust, "Open the libraries that the scene itself lists");

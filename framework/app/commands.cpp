@@ -207,6 +207,10 @@ void study(const Options& options) {
     fmt::print("\n{}\n{} of {} runs done; table{} in {}\n", table.markdown(), done, table.rows.size(),
                study.plot ? " and plot" : "", folder.string());
   if (done == 0) throw RunError(fmt::format("no run of the study came to its end; the first: {}", table.rows.front().reason));
+  const std::string unfinished = unfinished_runs(table);
+  if (unfinished.empty()) return;
+  if (!options.keep_going) throw RunError(unfinished + "\n--keep-going ends such a study with status 0");
+  tell(unfinished + '\n');   // with --quiet, too: who reads the table alone would not see it
 }
 
 void list(const Options& options) {

@@ -19,7 +19,7 @@ struct Options {
   std::vector<std::string> overrides;
   std::vector<std::filesystem::path> plugin_path;
   int threads = 0, jobs = 1, ranks = 1;
-  bool explain = false, quiet = false, trust = false, resume = false, force = false, markdown = false, machine = false;
+  bool explain = false, quiet = false, keep_going = false, trust = false, resume = false, force = false, markdown = false, machine = false;
   std::string kind, part;
   bool history = false;           ///< of a new material
   PlotOptions plot;

@@ -97,4 +97,11 @@ TEST_CASE("errors: a study of which nothing came to its end says why the first r
   const std::string faster = "--set 'initial={velocity=[\"-60*(x > 4)\",0]}'";
   check_said(desk.perikit("study study.toml --quiet -o bad " + faster), 1,
              {"the run failed: no run of the study came to its end; the first: ", "inadmissible", "point "});
+  // Of which some did: the others by name, also where nobody wants to hear of progress.
+  desk.write("some.toml", replaced(desk.text("study.toml"), "[1.0, 2.0]", "[1.0, -1.0]"));
+  check_said(desk.perikit("study some.toml --quiet -o some"), 1,
+             {"the run failed: 1 of 2 runs of the study did not come to their end:\n  runs/1 (material.density = -1.0) refused: ", "density", "--keep-going"});
+  const Result going = desk.perikit("study some.toml --quiet -o some --resume --keep-going");
+  CHECK(going.status == 0);
+  CHECK(going.err.find("1 of 2 runs of the study did not come to their end:") != std::string::npos);
 }

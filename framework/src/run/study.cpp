@@ -164,6 +164,8 @@ std::string resolved_scene(const fs::path& folder) {
   return marked ? marked->text : std::string();
 }
 
+}  // namespace
+
 std::string described(const Study& study, const StudyRow& row) {
   std::vector<std::string> texts;
   for (std::size_t k = 0; k < study.keys.size(); ++k)
@@ -171,7 +173,16 @@ std::string described(const Study& study, const StudyRow& row) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-}  // namespace
+std::string unfinished_runs(const StudyTable& table) {
+  std::string runs;
+  std::size_t count = 0;
+  for (const StudyRow& row : table.rows) {
+    if (row.status == "done") continue;
+    ++count;
+    runs += fmt::format("\n  runs/{} ({}) {}: {}", row.run, described(table.study, row), row.status, row.reason.substr(0, row.reason.find('\n')));
+  }
+  return count == 0 ? runs : fmt::format("{} of {} runs of the study did not come to their end:{}", count, table.rows.size(), runs);
+}
 
 std::vector<std::vector<std::size_t>> combinations(const Study& study) {
   std::vector<std::vector<std::size_t>> all;
@@ -257,7 +268,7 @@ StudyTable run_study(const Study& study, PartCatalogue& parts, const SceneOption
   if (stop_requested()) {
     throw RunError(fmt::format("stopped by a signal; {} of {} runs are in {}", table.rows.size(), runs.size(), (folder / "table.csv").string()));
   }
-  if (study.plot) {
+  if (study.plot && std::ranges::any_of(table.rows, [](const StudyRow& row) { return row.status == "done"; })) {
     const StudyTable drawn = in_order_of_axis(table);
     for (const char* picture : {"plot.png", "plot.svg"}) draw(drawn, folder / picture);
   }

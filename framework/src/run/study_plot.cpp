@@ -35,6 +35,13 @@ Key key_below(const std::vector<StudySeries>& lines, const std::filesystem::path
   return {fmt::format("set key below left Left reverse height 0.6 maxrows {} samplen 1.5 font ',{:.3g}'\n", rows, size), static_cast<int>(of_a_row * static_cast<double>(rows))};
 }
 
+/// " (2 failed, 1 refused)" for runs that are not in the picture.
+std::string words_of_missing(const StudySeries& line) {
+  std::string words;
+  for (const auto& [what, count] : line.missing) words += fmt::format("{}{} {}", words.empty() ? "" : ", ", count, what);
+  return words.empty() ? words : fmt::format(" ({}{})", line.points.empty() ? "no point: " : "", words);
+}
+
 }  // namespace
 
 void draw(const StudyTable& table, const std::filesystem::path& picture) {
@@ -42,19 +49,23 @@ void draw(const StudyTable& table, const std::filesystem::path& picture) {
   constexpr std::array colours{"#1c61a8", "#d1495b", "#2e8b57", "#e09f3e", "#6a4c93", "#3a3a3a", "#17a2a2", "#8c564b"};
   constexpr std::array marks{7, 5, 9, 11, 13, 6, 4};   // fewer than colours: the pairs repeat late
   const StudyPlot& plot = *table.study.plot;
-  const std::vector<StudySeries> lines = plotted_series(table);
-  if (lines.empty()) throw RunError(fmt::format("{}: no run gives numbers for {} and {}", picture.string(), plot.x, plot.y));
+  std::vector<StudySeries> lines = plotted_series(table);
+  if (std::ranges::all_of(lines, [](const StudySeries& line) { return line.points.empty(); })) throw RunError(fmt::format("{}: no run gives numbers for {} and {}", picture.string(), plot.x, plot.y));
 
-  const bool wide = !plot.series.empty() && std::ranges::any_of(lines, [](const StudySeries& line) { return line.name.size() > 24; });  // would leave no room beside it
+  const std::string series = series_title(table);
+  const bool some_missing = std::ranges::any_of(lines, [](const StudySeries& line) { return !line.missing.empty(); });
+  for (StudySeries& line : lines) line.name += words_of_missing(line);
+  const bool wide = (!series.empty() || some_missing) && std::ranges::any_of(lines, [](const StudySeries& line) { return line.name.size() > 24; });  // would leave no room beside it
   const Key below = wide ? key_below(lines, picture) : Key();
   std::string script = gnuplot_terminal(picture, width, height + below.height);
   script += axes(table);
   script +=
       "set grid lt 1 lw 1 lc rgb '#dddddd'\nset tics out nomirror\nset offsets graph 0.03, graph 0.03, graph 0.05, graph 0.05\n";
-  script += plot.series.empty() ? "unset key\n"
+  script += series.empty() && !some_missing ? "unset key\n"
                 : wide      ? below.script
-                            : fmt::format("set key outside right top title {}\n", gnuplot_quoted(plot.series));
+                            : fmt::format("set key outside right top title {}\n", gnuplot_quoted(series));
   for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i].points.empty()) lines[i].points.emplace_back(NAN, NAN);   // its name alone, in the key
     script += fmt::format("$line{} << end\n", i);
     for (const auto& [x, y] : lines[i].points) script += fmt::format("{} {}\n", x, y);
     script += "end\n";

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <sstream>
 #include <tuple>
 
 #include "files/toml_limits.hpp"
@@ -41,7 +42,8 @@ ParameterTable plot_table() {
   ParameterTable table;
   table.string("x", "Column of the horizontal axis.").require();
   table.string("y", "Column of the vertical axis.").require();
-  table.string("series", "A line for each value of this key.");
+  table.string("series", "A line for each value of this key; of several, separated by commas, for each combination of their values. Over a key, all other keys "
+                         "that have several values are added (mode = \"grid\").");
   table.choice("log", {"", "x", "y", "xy"}, "Axes with a logarithmic scale.").by_default("\"\"");
   table.number("level", "-", "A value of y: a line in the picture, and a table of where each series stays below it.");
   return table;
@@ -246,9 +248,7 @@ class StudyReader {
       columns.push_back(quantity.name);
       if (quantity.reference) columns.push_back(quantity.error_column());
     }
-    const auto name = [&](const char* key, const std::vector<std::string>& known) -> std::string {
-      if (!values.has(key)) return "";
-      const std::string& text = values.text(key);
+    const auto check = [&](const char* key, const std::string& text, const std::vector<std::string>& known) {
       if (std::ranges::find(known, text) == known.end()) {
         reader_.errors.add(
             values.position(key), join_path("plot", key),
@@ -256,8 +256,16 @@ class StudyReader {
       }
       return text;
     };
+    const auto name = [&](const char* key, const std::vector<std::string>& known) { return values.has(key) ? check(key, values.text(key), known) : ""; };
+    std::vector<std::string> series;
+    std::istringstream list(values.has("series") ? values.text("series") : "");
+    for (std::string key; std::getline(list, key, ',');) {
+      key.erase(0, std::min(key.find_first_not_of(' '), key.size()));
+      key.erase(key.find_last_not_of(' ') + 1);
+      series.push_back(check("series", key, keys));
+    }
     study_.plot =
-        StudyPlot{name("x", columns), name("y", columns), name("series", keys), values.has("log") ? values.text("log") : "",
+        StudyPlot{name("x", columns), name("y", columns), series, values.has("log") ? values.text("log") : "",
                             values.has("level") ? std::optional(values.number("level")) : std::nullopt};
     if (study_.plot->level && study_.plot->log.find('y') != std::string::npos && !(*study_.plot->level > 0)) {
       reader_.errors.add(values.position("level"), "plot.level", fmt::format("found {}; allowed with a logarithmic axis: a number > 0", *study_.plot->level));

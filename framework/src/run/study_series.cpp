@@ -9,24 +9,45 @@
 
 namespace perikit {
 
+std::vector<std::size_t> keys_of_series(const StudyTable& table) {
+  const StudyPlot& plot = *table.study.plot;
+  const auto& keys = table.study.keys;
+  const bool over_a_key = std::ranges::find(keys, plot.x, &StudyKey::key) != keys.end();
+  std::vector<std::size_t> found;
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    const bool named = std::ranges::find(plot.series, keys[k].key) != plot.series.end();
+    const bool needed = over_a_key && !table.study.zip && keys[k].key != plot.x && keys[k].values.size() > 1;
+    if (named || needed) found.push_back(k);
+  }
+  return found;
+}
+
 std::vector<StudySeries> plotted_series(const StudyTable& table) {
   const StudyPlot& plot = *table.study.plot;
   const auto drawable = [&](const std::optional<double>& value, char axis) {
     const bool logarithmic = plot.log.find(axis) != std::string::npos;
     return value && std::isfinite(*value) && (!logarithmic || *value > 0);
   };
-  const auto& keys = table.study.keys;
-  const auto series = static_cast<std::size_t>(std::ranges::find(keys, plot.series, &StudyKey::key) - keys.begin());
+  const std::vector<std::size_t> keys = keys_of_series(table);
   std::vector<StudySeries> lines;
   for (const StudyRow& row : table.rows) {
-    const auto x = table.number(row, plot.x), y = table.number(row, plot.y);
-    if (!drawable(x, 'x') || !drawable(y, 'y')) continue;
-    const std::string name = series < keys.size() ? row.values[series].shown : plot.y;
+    std::string name = keys.empty() ? plot.y : "";
+    for (const std::size_t k : keys) name += (name.empty() ? "" : ", ") + row.values[k].shown;
     auto line = std::ranges::find(lines, name, &StudySeries::name);
-    if (line == lines.end()) line = lines.insert(lines.end(), StudySeries{name, {}});
-    line->points.emplace_back(*x, *y);
+    if (line == lines.end()) line = lines.insert(lines.end(), StudySeries{name, {}, {}});
+    const auto x = table.number(row, plot.x), y = table.number(row, plot.y);
+    if (drawable(x, 'x') && drawable(y, 'y'))
+      line->points.emplace_back(*x, *y);
+    else
+      ++line->missing[row.status == "done" ? "without numbers" : row.status];
   }
   return lines;
+}
+
+std::string series_title(const StudyTable& table) {
+  std::string title;
+  for (const std::size_t k : keys_of_series(table)) title += (title.empty() ? "" : ", ") + table.study.keys[k].key;
+  return title;
 }
 
 Crossing crossing(std::vector<std::pair<double, double>> points, double level, bool logarithmic) {
@@ -45,11 +66,11 @@ std::string level_table(const StudyTable& table) {
   const StudyPlot& plot = *table.study.plot;
   std::vector<std::pair<Crossing, std::string>> rows;
   for (const StudySeries& line : plotted_series(table))
-    rows.emplace_back(crossing(line.points, *plot.level, plot.log == "xy"), line.name);
+    if (!line.points.empty()) rows.emplace_back(crossing(line.points, *plot.level, plot.log == "xy"), line.name);
   const auto order = [](const auto& row) { return std::tuple(row.first.kind == Crossing::Kind::never, row.first.x); };
   std::ranges::stable_sort(rows, [&](const auto& a, const auto& b) { return order(a) < order(b); });
   std::string text = fmt::format("| {} | {} from which {} stays below {:g} |\n| --- | --- |\n",
-                                 plot.series.empty() ? "series" : plot.series, plot.x, plot.y, *plot.level);
+                                 series_title(table).empty() ? "series" : series_title(table), plot.x, plot.y, *plot.level);
   for (const auto& [found, name] : rows) {
     constexpr std::array signs{"", "< ", "> "};
     text += fmt::format("| {} | {}{:.2g} |\n", name, signs[static_cast<std::size_t>(found.kind)], found.x);

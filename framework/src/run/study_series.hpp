@@ -1,6 +1,7 @@
 #pragma once
 /// The lines of a study's plot.
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,9 +13,17 @@ namespace perikit {
 struct StudySeries {
   std::string name;
   std::vector<std::pair<double, double>> points;  ///< in the order of the rows
+  std::map<std::string, std::size_t> missing;     ///< rows without a point, by what they are: "failed", "refused", "without numbers"
 };
 
-/// By the values of plot.series. Rows without numbers (or, on a logarithmic axis, positive numbers) are left out.
+/// The keys of which each combination of values is a line: those of plot.series, and, of all combinations (mode = "grid") over a key, every other key
+/// that has several values.
+std::vector<std::size_t> keys_of_series(const StudyTable& table);
+
+/// Their names: what the lines are told apart by; empty where there is one line alone.
+std::string series_title(const StudyTable& table);
+
+/// A line for each combination of these, also where all its points are missing: rows without numbers (or, on a logarithmic axis, positive numbers).
 std::vector<StudySeries> plotted_series(const StudyTable& table);
 
 /// "from which x on y stays below the level", a row a series, the first to get there first.

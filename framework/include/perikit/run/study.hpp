@@ -15,7 +15,7 @@
 ///   [plot]
 ///   x = "cost"                               # columns of the table
 ///   y = "tip_error"
-///   series = "kinematics.type"               # a line for each of its values
+///   series = "kinematics.type"               # a line for each of its values; "kinematics.type, material.type": for each combination
 ///   log = "xy"
 ///   level = 0.01                             # a line at this y, and in table.md from which x on each series stays below it
 
@@ -55,7 +55,7 @@ struct StudyQuantity {
 
 struct StudyPlot {
   std::string x, y;
-  std::string series;  ///< a key of the values; empty: one line
+  std::vector<std::string> series;  ///< keys of the values, of which each combination is a line; see plotted_series
   std::string log;     ///< axes with a logarithmic scale: "", "x", "y", "xy"
   std::optional<double> level;   ///< of y
 };
@@ -126,6 +126,11 @@ struct StudyTable {
   std::string csv() const;
   std::string markdown() const;
 };
+
+/// "kinematics.type = "baqp", n = 4": the values of a run.
+std::string described(const Study& study, const StudyRow& row);
+/// The runs that failed or were refused, with their number, their values and the reason, a line each; empty where all are done.
+std::string unfinished_runs(const StudyTable& table);
 
 /// From which x on the points (x, y) of a series stay at or below a level of y, interpolated on a straight line (of logarithms where both
 /// axes have them).
