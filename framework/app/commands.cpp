@@ -81,20 +81,22 @@ std::string version() { return PERIKIT_VERSION " (" PERIKIT_LEVEL ")"; }
 
 void run(const Options& options) {
   std::optional<NothingToKeep> set_up_alone(std::in_place);
+  TimesBefore before{.begin = std::chrono::steady_clock::now()};
   const auto registry = open_registry(options);
   const Scene scene = read(options, *registry);
-  const auto start = std::chrono::steady_clock::now();
   const bool show = !options.quiet && communicator().rank() == 0 && isatty(STDERR_FILENO);
   auto line = std::make_unique<SetUpLine>(show);
   Simulation simulation(scene, *registry, [&](const std::string& step) { line->write(step); });
-  line.reset();
   simulation.tell_limits(*registry);
-  const double set_up = seconds_since(start);
+  before.set_up = seconds_since(before.begin);
   const auto planning = std::chrono::steady_clock::now();
   const bool first = communicator().rank() == 0;     // which alone speaks
+  simulation.set_up().begin("plan of the steps");
   const std::string summary = simulation.summary();  // estimates the step: not after a checkpoint is in place
   simulation.refuse_memory();
-  const double plan = seconds_since(planning);
+  simulation.set_up().end();
+  line.reset();
+  before.plan = seconds_since(planning);
   if (options.explain && first) fmt::print("{}", simulation.explanation(*registry));
   const std::filesystem::path folder = options.output.empty() ? std::filesystem::path("out") / scene.file.stem() : options.output;
   set_up_alone.reset();
@@ -122,7 +124,7 @@ void run(const Options& options) {
     log_end(recorder, fmt::format("failed: {}", reason));
     throw RunError(reason);
   }
-  const std::string closing = recorder.closing(set_up, plan);
+  const std::string closing = recorder.closing(before);
   log_end(recorder, closing);
   if (!options.quiet && first)
     fmt::print("{}\nskipped       what the scene does not need: --explain, or {}\n", closing, (folder / "run.log").string());

@@ -38,7 +38,7 @@ all=(
 
 # By default bonds of these stay where their failure would raise the energy.
 lawful=(conventional bond_augmented sub_horizon selective_non_spherical)
-seconds() { sed -n 's/^time .* set-up, \([0-9.]*\) s steps.*/\1/p' "$out/$1/run.log"; }
+seconds() { sed -n 's/^time .* \([0-9.]*\) s steps.*/\1/p' "$out/$1/run.log"; }
 done_with() { grep -qsE '^(speed  |failed: )' "$out/$1/run.log" && ! grep -q '^stopped by a signal' "$out/$1/run.log"; }
 
 # run NAME KINEMATICS KERNEL GRADUAL

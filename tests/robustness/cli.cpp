@@ -194,7 +194,7 @@ TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and w
   const Desk desk;
   const Result run = desk.perikit("run scene.toml -o out");
   REQUIRE(run.status == 0);
-  for (const std::string word : {"s set-up", "s plan", "s steps", "s output (6 frames, 51 rows of history, 0 checkpoints)", "50 steps of 40 points", "points/s", "MB of arrays", "work put in",
+  for (const std::string word : {" s in all: ", "s set-up", "s plan", "s steps", "s output (6 frames, 51 rows of history, 0 checkpoints)", "50 steps of 40 points", "points/s", "MB of arrays", "work put in",
                                  "warnings      none", "6 frames in out"}) {
     CHECK_MESSAGE(contains(run.out, word), "no '", word, "' in\n", run.out);
     CHECK_MESSAGE(contains(desk.text("out/run.log"), word), "no '", word, "' in run.log");

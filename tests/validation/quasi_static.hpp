@@ -16,9 +16,11 @@ class Protocol final : public Observer {
   bool wants_sample(std::int64_t, double) override { return true; }
   void step_done(const StepReport& report) override { reports.push_back(report); }
   void log(std::string_view message) override { text += message; }
+  void working(std::string_view what) override { shown.emplace_back(what); }
 
   std::vector<StepReport> reports;
   std::string text;
+  std::vector<std::string> shown;   ///< on the line of progress
   int iterations() const {
     int sum = 0;
     for (const StepReport& report : reports) sum += report.iterations;

@@ -177,7 +177,9 @@ TEST_CASE("bond_rounds ends a run that breaks on, with load parameter and key") 
                        RunError);
   CHECK(protocol.reports.back().time > 0);
   CHECK(protocol.reports.back().time < 1);
-  CHECK(protocol.text.find("bonds fail, round   2") != std::string::npos);
+  CHECK(protocol.text.find("bonds fail, round   2: ") != std::string::npos);
+  // Each iteration on the way to the next equilibrium tells of its round and of the bonds that have failed until then.
+  CHECK(std::ranges::any_of(protocol.shown, [](const std::string& line) { return line.find(": round 2 of failing bonds, ") != line.npos && line.find(" failed: iteration ") != line.npos; }));
 }
 
 TEST_CASE("a body that falls apart under a load has no equilibrium, and the run says so") {

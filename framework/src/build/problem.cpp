@@ -240,7 +240,9 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   of_terms.further = std::move(further);
   steps.begin("evaluation points");
+  if (of_terms.consistency) of_terms.consistency->show_share = [&steps](double share) { steps.share_done(share); };
   parts.terms = std::make_unique<Terms>(of_terms);
+  if (of_terms.consistency) of_terms.consistency->show_share = {};
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);
   parts.materials.resize(parts.laws->records().size(), scene.material->type);

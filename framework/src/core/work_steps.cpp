@@ -8,8 +8,15 @@ void WorkSteps::begin(std::string step) {
   end();
   if (show_) show_(step);
   steps_.emplace_back(std::move(step), 0.0);
-  began_ = std::chrono::steady_clock::now();
+  began_ = told_ = std::chrono::steady_clock::now();
   open_ = true;
+}
+
+void WorkSteps::share_done(double share) {
+  const auto now = std::chrono::steady_clock::now();
+  if (!show_ || !open_ || now - told_ < std::chrono::milliseconds(300)) return;
+  told_ = now;
+  show_(fmt::format("{}, {:.0f} %", steps_.back().first, 100 * share));
 }
 
 void WorkSteps::end() {

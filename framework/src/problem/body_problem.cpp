@@ -340,6 +340,8 @@ std::string BodyProblem::watch_pieces(double weak_springs) {
   return weak_springs_->names();
 }
 
+std::int64_t BodyProblem::failed_bonds() const { return static_cast<std::int64_t>(terms().bond_checks().failed); }
+
 std::string BodyProblem::crossed_faces() {
   if (!parts_.fracture.damage() && body().cracks().empty()) return {};
   CrossedFaces found = find_crossed_faces(*parts_.families, seen(state().displacement(), seen_));

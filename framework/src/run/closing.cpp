@@ -34,14 +34,15 @@ double RunRecorder::bytes_of_pieces(std::size_t points_of_all_ranks) noexcept {
   return 60.0 * static_cast<double>(std::min(points_of_all_ranks, rows_of_piece));
 }
 
-std::string RunRecorder::closing(double set_up, double plan) const {
+std::string RunRecorder::closing(const TimesBefore& before) const {
   BodyProblem& problem = simulation_.problem();
-  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(), steps_time = std::max(0.0, spent - output_seconds_);
+  const auto now = std::chrono::steady_clock::now();
+  const double spent = std::chrono::duration<double>(now - start_).count(), all = std::chrono::duration<double>(now - before.begin).count(), steps_time = std::max(0.0, spent - output_seconds_);
   const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.body().points_of_all_ranks());
   std::string text = problem.fracture_summary() + quiet_summary(problem.terms().quiet_counts(), simulation_.dynamic());
-  text += fmt::format("time          {:.2f} s set-up, {:.2f} s plan, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", set_up, plan, steps_time,
-                                 output_seconds_, frames_written_, rows_written_, checkpoints_written_);
-  if (set_up >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
+  text += fmt::format("time          {:.2f} s in all: {:.2f} s set-up, {:.2f} s plan, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", all,
+                      before.set_up, before.plan, steps_time, output_seconds_, frames_written_, rows_written_, checkpoints_written_);
+  if (before.set_up + before.plan >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());
   if (steps > 0) {
     text += fmt::format("speed         {:.0f} steps of {:.0f} points, {:.3g} points/s ({:.3g} ns a point and step, {} thread{})\n", steps, points,
                         steps * points / std::max(steps_time, 1e-9), steps_time / (steps * points) * 1e9, thread_count(), thread_count() > 1 ? "s" : "");

@@ -80,7 +80,7 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
 
 bool Equilibrium::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
   if (!goes_on()) return false;
-  if (observer_ && ++actions_ % 8 == 0) observer_->working(fmt::format("{}, {} tangent actions", last_note_, actions_));
+  if (observer_ && ++actions_ % 8 == 0) observer_->working(fmt::format("t = {:.4g}: {}{}, {} tangent actions", t_, stage_, last_note_, actions_));
   EvaluationStatus status = problem_.tangent_action(u, w, Kw);
   if (status.ok() && problem_.loads().follow()) status = problem_.add_load_stiffness(u, t_, w, Kw);
   if (!status.ok()) {
@@ -97,7 +97,7 @@ void Equilibrium::note(std::string_view line) {
   if (!observer_) return;
   actions_ = 0;
   last_note_ = line.substr(std::min(line.find_first_not_of(' '), line.size()));
-  observer_->working(fmt::format("t = {:.4g}: {}", t_, last_note_));
+  observer_->working(fmt::format("t = {:.4g}: {}{}", t_, stage_, last_note_));
   const auto now = std::chrono::steady_clock::now();
   if (now - logged_ < std::chrono::seconds(5)) return;
   logged_ = now;

@@ -164,6 +164,7 @@ class LoadSteps {
     const double t = (position() + span) / planned();
     copy(u_, start_);
     if (extrapolate) combine(1, u_, span / last_span(), last_increment_, start_);
+    equilibrium_.stage("");
     equilibrium_.note(fmt::format("step {}  t = {:.9g}", state_.step + 1, t));
     return find(t, extrapolate);
   }
@@ -209,7 +210,9 @@ class LoadSteps {
       if (!solution.converged) solution.failure = equilibrium_.failure();
       if (!solution.converged || equilibrium_.converged()) break;
       settled = equilibrium_.residual_norm() <= negligible * largest_reference();
-      equilibrium_.note(fmt::format("  bonds fail, round {:3}: {:.4g} J dissipated so far", round, energies.dissipated));
+      const std::int64_t failed = problem_.failed_bonds();
+      equilibrium_.note(fmt::format("  bonds fail, round {:3}: {} failed, {:.4g} J dissipated so far", round, failed, energies.dissipated));
+      equilibrium_.stage(fmt::format("round {} of failing bonds, {} failed: ", round, failed));
       if (round > options_.bond_rounds) {
         observer_.log(equilibrium_.take_notes());
         throw RunError(

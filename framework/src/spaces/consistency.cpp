@@ -220,6 +220,8 @@ class WeightSearch {
     const int before = out_.weights.iterations;
     for (out_.rounds = 1;; ++out_.rounds) {
       const double residual = residuals.emplace_back(left());
+      if (out_.show_share && residual > 0 && residuals.front() > rounding_residual)
+        out_.show_share(std::clamp(std::log(residuals.front() / residual) / std::log(residuals.front() / rounding_residual), 0.0, 1.0));
       const int spent = out_.weights.iterations - before;
       if (effort_.ends(residual, spent) || out_.rounds > most_rounds) return true;
       const bool stuck = residuals.size() > 3 && residual > 0.75 * residuals[residuals.size() - 4];

@@ -45,6 +45,7 @@ struct CloudConsistency {
   int rounds = 0;
   double smallest = 1, largest = 1;  ///< f_q
   double seconds = 0;
+  std::function<void(double)> show_share;  ///< told of the share of the search for f_q that is done, on the way to rounding; empty: nobody
 
   void report(ModelReport& report) const;
 };

@@ -67,6 +67,7 @@ class BodyProblem final : public Problem {
   void sample_along(Sampling asked) noexcept { along_ = asked; }
   bool constant_stiffness() const noexcept override;
   bool advance(double time_step, FieldView velocity = {}) override;
+  std::int64_t failed_bonds() const override;
   std::unique_ptr<WeakeningBonds> weakening_bonds() override;
   std::unique_ptr<DamagedPart> damaged_part() override;
   StretchRange stretches(ConstFieldView u) override;

@@ -95,6 +95,8 @@ class Problem {
   /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium
   /// of a step, after the first one with time_step = 0: as long as bonds change, the step is not over.
   virtual bool advance(double time_step, FieldView velocity = {}) = 0;
+  /// Bonds that have failed so far, of all ranks. All ranks must call it.
+  virtual std::int64_t failed_bonds() const { return 0; }
   /// Bonds that weaken gradually, for solvers that forecast how far they do; as long as it lives, advance() leaves that to it. Null where none
   /// do, and on several ranks. The problem must outlive it.
   virtual std::unique_ptr<WeakeningBonds> weakening_bonds() = 0;

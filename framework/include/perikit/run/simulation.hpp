@@ -31,7 +31,7 @@ class Simulation {
   /// What the integrator takes beyond the problem [bytes]; RunError where the machine has less.
   double refuse_memory();
   /// What the set-up took.
-  const WorkSteps& set_up() const noexcept { return set_up_; }
+  WorkSteps& set_up() noexcept { return set_up_; }
   BodyProblem& problem() noexcept { return *problem_; }
   Integrator& integrator() noexcept { return *integrator_; }
   /// Watches strains and rotations where parts of the scene are for small ones only.
@@ -74,6 +74,12 @@ std::vector<std::string> history_columns(const Scene& scene, bool laws_dissipate
 
 /// The libraries that a registry has opened, a line "file name, fingerprint of the bytes" for each.
 std::string library_fingerprints(const Registry& registry);
+
+/// What went by before a run began its steps.
+struct TimesBefore {
+  std::chrono::steady_clock::time_point begin;   ///< of the program's work
+  double set_up = 0, plan = 0;                   ///< [s]; plan: until it was known which steps the run would make
+};
 
 enum class RunStart {
   fresh,   ///< from the initial state; what an earlier run left in the folder is replaced
@@ -137,9 +143,8 @@ class RunRecorder final : public Observer {
   /// Written by this rank: by rank 0.
   std::int64_t frames() const noexcept { return writer_ ? writer_->frames() : 0; }
   const std::vector<std::string>& history_columns() const noexcept { return columns_; }
-  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings. Before the run set_up seconds
-  /// went by, and `plan` seconds until it was known which steps it would make.
-  std::string closing(double set_up, double plan) const;
+  /// What a user wants to know at the end: time by phase, speed, memory, energy balance, warnings.
+  std::string closing(const TimesBefore& before) const;
   /// What rank 0 takes beyond its part to write what other ranks have: 60 bytes a point (measured) of the pieces in which that comes.
   static double bytes_of_pieces(std::size_t points_of_all_ranks) noexcept;
   /// The step of the checkpoint that the run goes on from; -1: from the initial state.

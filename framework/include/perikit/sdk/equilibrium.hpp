@@ -4,6 +4,7 @@
 #include <chrono>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "perikit/problem/integrator.hpp"
 #include "perikit/problem/problem.hpp"
@@ -58,6 +59,8 @@ class Equilibrium {
   /// False where the run is to end: evaluations fail from now on, and what works without them, as factorisations do, is to be given up.
   bool goes_on();
 
+  /// What the observer is told before each line of progress: "round 12, 340 bonds failed". Until the next one.
+  void stage(std::string words) { stage_ = std::move(words); }
   /// A line for run.log; lines of one step are written together, or every few seconds where it takes longer.
   void note(std::string_view line);
   std::string take_notes();
@@ -66,7 +69,7 @@ class Equilibrium {
   Problem& problem_;
   Observer* observer_ = nullptr;
   bool stopped_ = false;
-  std::string last_note_;
+  std::string last_note_, stage_;
   std::int64_t actions_ = 0;   ///< of the tangent since the last note
   std::chrono::steady_clock::time_point logged_ = std::chrono::steady_clock::now();
   double tolerance_;
