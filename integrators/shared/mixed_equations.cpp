@@ -87,10 +87,17 @@ bool MixedEquations::solve(Equilibrium& equilibrium, ConstFieldView rhs, double 
 
 bool MixedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, bool last) {
   std::string failure;
-  // The companion does not know the bulk moduli: where these are large, conjugate gradients hardly ever come to their end. They meet a buckling mode long before.
+  if (!last || !system_.linearise(equilibrium, u, failure)) return false;
+  const PreconditionerAction precondition = [this](ConstFieldView r, FieldView z) { system_.invert_companion(r, z); };
+  // K = A + B^T W B with W > 0: where A is positive, so is K. The companion stands for A, and conjugate gradients come to their end.
+  const auto A = [&](ConstFieldView w, FieldView Aw) {
+    return system_.multiply_without_volumes([&](ConstFieldView v, FieldView Kv) { return equilibrium.tangent(u, v, Kv); }, w, Aw);
+  };
+  if (curvature_of(equilibrium.problem(), equilibrium.free(), A, precondition) == Curvature::positive) return false;
+  // The companion does not know the bulk moduli: where these are large, conjugate gradients on K hardly ever come to their end. They meet a buckling mode long
+  // before.
   constexpr int most = 200;
-  return last && system_.linearise(equilibrium, u, failure) &&
-         has_negative_curvature(equilibrium, u, [this](ConstFieldView r, FieldView z) { system_.invert_companion(r, z); }, most);
+  return has_negative_curvature(equilibrium, u, precondition, most);
 }
 
 double MixedEquations::accuracy_for_motions(double accuracy) const {

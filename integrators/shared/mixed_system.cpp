@@ -35,6 +35,15 @@ bool MixedSystem::multiply(const Product& K, FieldView x, FieldView y) {
   return true;
 }
 
+bool MixedSystem::multiply_without_volumes(const Product& K, ConstFieldView w, FieldView Aw) {
+  if (!K(w, Aw)) return false;
+  volumes_.rates(w, rate_);
+  mask(volumes_.stiffness(), rate_);
+  volumes_.forces(rate_, force_);
+  combine(1, Aw, -1, force_, Aw);
+  return true;
+}
+
 std::pair<double, double> MixedSystem::correct(ConstFieldView u, FieldView solution, double enough, FieldView du) {
   const ConstFieldView p = pressure(solution), inverse_W = volumes_.compliance();
   combine(1, du, -1, displacement(solution), force_);

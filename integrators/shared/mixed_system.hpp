@@ -46,6 +46,8 @@ class MixedSystem {
   /// As much of it as `correct` needs.
   bool linearise_volumes(Equilibrium& equilibrium, ConstFieldView u, std::string& failure);
   bool multiply(const Product& K, FieldView x, FieldView y);
+  /// Aw <- A w.
+  bool multiply_without_volumes(const Product& K, ConstFieldView w, FieldView Aw);
   void precondition(FieldView r, FieldView z);
   /// Iterations that a solve took to make its residual smaller by the factor `reduction` < 1.
   void took(int iterations, double reduction) { cycle_->took(iterations, reduction); }

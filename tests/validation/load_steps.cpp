@@ -205,6 +205,21 @@ TEST_CASE("an equilibrium that is not stable is told, by every integrator and on
   CHECK_MESSAGE(stable.text.find(told) == std::string::npos, stable.text);
 }
 
+TEST_CASE("an equilibrium of a nearly incompressible body that is not stable is told by mixed systems; one that is stable is not") {
+  registry();
+  const auto column = [](double shortened) {
+    return contract::build(fmt::format(
+        "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [10, 0.5]\n[family]\nhorizon_ratio = 2.015\n"
+        "[kinematics]\ntype = \"selective\"\nbase = \"baqp\"\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = 1000.0\n"
+        "[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[boundary]]\nface = \"+x\"\ndisplacement = [-{}, \"free\"]\n"
+        "[integrator]\ntype = \"jfnk\"\npreconditioner = \"mixed\"\nsteps = 2\n",
+        shortened));
+  };
+  const std::string told = "is not stable";
+  CHECK(run(*column(1.0)).text.find(told) != std::string::npos);
+  CHECK(run(*column(0.03)).text.find(told) == std::string::npos);
+}
+
 TEST_CASE("forces of any size: what a load does is in proportion to it, from numbers without digits to those whose squares are none") {
   registry();
   const auto pulled = [](const std::string& integrator, double force) {
