@@ -30,7 +30,8 @@ struct SaintVenantKirchhoff {
   Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept {
     const auto& [lambda, mu] = k;
     const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
-    const Tensor<T, S> second = add_diagonal(mu * c, (0.5 * lambda) * trace(c));
+    const T mean = (0.5 * lambda) * trace(c);
+    const Tensor<T, S> second = Tensor<T, S>::map([&](int k) { return row<S>(k) == column<S>(k) ? T(mu * c[k] + mean) : T(mu * c[k]); });
     return second + H * second;
   }
 

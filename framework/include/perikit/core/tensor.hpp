@@ -131,12 +131,20 @@ Tensor<T, S> deviator(const Tensor<T, S>& a) noexcept {
 }
 
 namespace detail {
+/// r + a b. Products of numbers with a derivative (core/dual.hpp) are fused with the sum, too, as those of packs are by themselves.
+template <class T, class A, class B>
+auto plus_product(const T& r, const A& a, const B& b) noexcept {
+  if constexpr (requires { a.derivative; b.derivative; })
+    return T(r.value + a.value * b.value, (r.derivative + a.value * b.derivative) + a.derivative * b.value);
+  else
+    return r + a * b;
+}
 /// sum over k of a(i, k) b(k, j), over products that can differ from zero; A and B give the components.
 template <class S, class A, class B>
 auto contract(int i, int j, A&& a, B&& b) noexcept {
   decltype(a(i, i) * b(i, j) + a(i, i) * b(i, j)) r = a(i, i) * b(i, j);
   PERIKIT_UNROLL for (int k = 0; k < 3; ++k) if (k != i && component<S>(i, k) >= 0 && component<S>(k, j) >= 0) r =
-      r + a(i, k) * b(k, j);
+      plus_product(r, a(i, k), b(k, j));
   return r;
 }
 }  // namespace detail
@@ -166,7 +174,9 @@ auto sum_of_components(const Of& of) noexcept {
 /// a : b, the sum of all products of components.
 template <class T, class S>
 T inner(const Tensor<T, S>& a, const Tensor<T, S>& b) noexcept {
-  return sum_of_components<S>([&](int c) -> T { return a[c] * b[c]; });
+  T sum[3] = {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+  PERIKIT_UNROLL for (int c = 3; c < S::components; ++c) sum[c % 3] = detail::plus_product(sum[c % 3], a[c], b[c]);
+  return sum[0] + sum[1] + sum[2];
 }
 
 /// (a + a^T)/2.
