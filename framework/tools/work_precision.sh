@@ -23,7 +23,7 @@ for study in $studies; do
     sed -E -e 's/^(constants\.[nh] = \[[^],]+),.*/\1]/' -e "s|^scene = \"|scene = \"$PWD/configs/work_precision/|" "$file" > "$out/$study.toml"
     file=$out/$study.toml
   fi
-  "$perikit" study "$file" -o "$out/$study" --threads 1 --jobs 2 $resume | tee "$out/$study.log" | grep "^run .* of\|runs done"
+  "$perikit" study "$file" -o "$out/$study" --threads 1 --jobs 2 --keep-going $resume | tee "$out/$study.log" | grep "^run .* of\|runs done"
   done=$(sed -nE 's/^([0-9]+) of ([0-9]+) runs done.*/\1 \2/p' "$out/$study.log")
   [ "${done% *}" = "${done#* }" ] || { echo "work_precision: $study: not every run came to its end"; exit 1; }
   cp "$out/$study/plot.png" "$docs/images/work_precision_$study.png"

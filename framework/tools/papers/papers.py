@@ -100,7 +100,7 @@ class Runs:
         folder = self.folder(row)
         if not self.done(row):
             folder.parent.mkdir(parents=True, exist_ok=True)
-            options = ["--jobs", "1"] if "study" in row else []
+            options = ["--jobs", "1", "--keep-going"] if "study" in row else []
             print("run    ", " ".join(words(row)), flush=True)
             code, errors = self.call([self.program, *words(row), "-o", folder, "--threads", "1", "--quiet", "--resume", *options], folder)
             if code == 2 or code < 0:
