@@ -37,6 +37,7 @@ void add_commands(CLI::App& app, Options& options) {
   CLI::App* check_command =
       add("check", "Check a scene without running it; print it resolved, with sizes, memory and time step", check);
   with_scene(check_command);
+  check_command->add_option("-o,--output", options.output, "Draw the body with its sets, loads and boundaries into this picture (.png, .svg, .pdf)");
   check_command->get_option("scene")->required(false);
   CLI::Option* machine = check_command->add_flag("--machine", options.machine,
                                                  "Instead of a scene: whether this build computes on this machine what it should")

@@ -21,6 +21,7 @@
 #include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/warnings.hpp"
+#include "perikit/output/plot.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/run/simulation.hpp"
 #include "perikit/run/study.hpp"
@@ -177,6 +178,7 @@ void check(const Options& options) {
       if (const double solver = simulation.refuse_memory(); bytes > 0)
         summary += fmt::format("process       about {:.3g} MB at most{}\n", (bytes + solver) / 1e6,
                                solver > 0 ? fmt::format(", {:.3g} MB of them in the solver of {}", solver / 1e6, scene.integrator->type) : "");
+      if (!options.output.empty()) plot_overview(simulation, options.output);   // whose memory is not that of a run
     }
     if (options.ranks > 1) summary += predict_ranks(scene, *registry, options.ranks, false);
   }

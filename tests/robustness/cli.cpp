@@ -448,3 +448,16 @@ TEST_CASE("cli: check says what solvers of load steps take, within half of what 
       CHECK_MESSAGE(measured <= 1.5 * predicted, predicted, " MB, and ", measured);
     }
 }
+
+TEST_CASE("cli: check draws the body of a scene, and shows what it holds") {
+  const Desk desk(replaced(plate, "[integrator]", "[[load]]\nset = \"right\"\nforce = [0, 3]\n\n[integrator]"));
+  const Result checked = desk.perikit("check scene.toml -o body.svg");
+  CHECK_MESSAGE(checked.status == 0, checked.err);
+  const std::string picture = desk.text("body.svg");
+  for (const char* word : {"held", "loaded", "in a set"}) CHECK_MESSAGE(contains(picture, word), word);
+  for (const char* line : {"# box           points at x 0.5 to 7.5, y 0.5 to 4.5 m; 40 m^3", "# set           left: 10 points, 10 m^3, at x 0.5 to 1.5, y 0.5 to 4.5",
+                           "# material      neo_hookean: 40 points, 40 kg", "# held          xy of set left, 10 points by boundary.0 (displacement)",
+                           "# held          x of set right, 10 points by boundary.1 (velocity)", "# loads         together (0, 3) N at the end, moment 21 N m about the origin"})
+    CHECK_MESSAGE(contains(checked.out, line), line, "\n", checked.out);
+  CHECK(desk.perikit("check scene.toml -o body.txt").status == 2);
+}

@@ -31,4 +31,10 @@ struct PlotOptions {
 /// component, column, frame or file type, RunError where gnuplot is missing or fails.
 std::filesystem::path plot(const PlotOptions& options);
 
+class Simulation;
+
+/// The body of a scene before its run, in a plane or in space: what is held, what is loaded and where to at the end, which points sets hold. Throws
+/// InputError for a body on a line and another file type, RunError where gnuplot is missing or fails.
+void plot_overview(Simulation& simulation, const std::filesystem::path& picture);
+
 }  // namespace perikit

@@ -37,13 +37,18 @@ struct Frame {
   Eigen::Vector2d size() const { return upper - lower; }
 };
 
-Frame frame_around(const std::vector<PointCell>& cells) {
+Frame frame_around(const std::vector<PointCell>& cells, const std::vector<BodyArrow>& arrows, const Matrix3d& axes) {
   Frame frame{Eigen::Vector2d::Constant(INFINITY), Eigen::Vector2d::Constant(-INFINITY)};
   for (const PointCell& cell : cells) {
     if (!cell.centre.allFinite() || !cell.half_edge.allFinite()) continue;
     const Eigen::Vector2d reach = cell.half_edge.cwiseAbs().rowwise().sum().head<2>();
     frame.lower = frame.lower.cwiseMin(cell.centre.head<2>() - reach);
     frame.upper = frame.upper.cwiseMax(cell.centre.head<2>() + reach);
+  }
+  for (const BodyArrow& arrow : arrows) {
+    const Eigen::Vector2d tip = (axes * (Vector3d(arrow.from.data()) + Vector3d(arrow.along.data()))).head<2>();
+    frame.lower = frame.lower.cwiseMin(tip);
+    frame.upper = frame.upper.cwiseMax(tip);
   }
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.03 * frame.size().maxCoeff());
   return {frame.lower - margin, frame.upper + margin};
@@ -134,6 +139,23 @@ std::string triad_and_scale(const Matrix3d& axes, const Frame& frame, double pix
   return text;
 }
 
+/// In the plane of the picture.
+std::string arrows_of(const BodyPicture& picture, const Matrix3d& axes) {
+  std::string text;
+  for (const BodyArrow& arrow : picture.arrows) {
+    const Vector3d from = axes * Vector3d(arrow.from.data()), to = from + axes * Vector3d(arrow.along.data());
+    text += fmt::format("set arrow from {},{} to {},{} size screen 0.012,25 filled lw 1.5 lc rgb '#c02020' front\n", from.x(), from.y(), to.x(), to.y());
+  }
+  return text;
+}
+
+/// Values that have names are no numbers.
+std::string names_of(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k) text += fmt::format("{}{} {}", k > 0 ? ", " : "", gnuplot_quoted(names[k]), k);
+  return names.empty() ? text : fmt::format("set cbtics ({})\n", text);
+}
+
 }  // namespace
 
 std::string body_script(const BodyPicture& picture) {
@@ -144,7 +166,7 @@ std::string body_script(const BodyPicture& picture) {
     cell.half_edge = axes * cell.half_edge;
     cell.normal = axes * cell.normal;
   }
-  const Frame frame = picture.window ? Frame{{(*picture.window)[0], (*picture.window)[2]}, {(*picture.window)[1], (*picture.window)[3]}} : frame_around(body.cells);
+  const Frame frame = picture.window ? Frame{{(*picture.window)[0], (*picture.window)[2]}, {(*picture.window)[1], (*picture.window)[3]}} : frame_around(body.cells, picture.arrows, axes);
   const double scale = std::min(1150 / frame.size().x(), 850 / frame.size().y());
   const int columns = std::max(1, static_cast<int>(std::lround(scale * frame.size().x())));
   const int rows = std::max(1, static_cast<int>(std::lround(scale * frame.size().y())));
@@ -183,6 +205,7 @@ std::string body_script(const BodyPicture& picture) {
     script += fmt::format("set xlabel 'x{0}'\nset ylabel 'y{0}'\nset tics out nomirror\n", unit);
     if (wide) script += fmt::format("set ytics {}\n", round_length(0.5 * frame.size().y()));  // a low picture has room for few
   }
+  script += arrows_of(picture, axes) + names_of(picture.value_names);
   // The single point outside the picture makes gnuplot draw the colour bar; the body itself comes as pixels.
   const double pixel = frame.size().x() / columns;
   script +=

@@ -10,6 +10,11 @@
 
 namespace perikit {
 
+/// From a place, in the axes of the body.
+struct BodyArrow {
+  std::array<double, 3> from, along;
+};
+
 struct BodyPicture {
   int dimension = 3;                  ///< 2 or 3
   std::span<const double> reference;  ///< positions, rows of 3
@@ -20,6 +25,8 @@ struct BodyPicture {
   std::array<double, 2> range{};      ///< of the colours
   std::optional<std::array<double, 4>> window;   ///< 2D: from x to x and from y to y
   std::array<double, 3> view{};       ///< 3D: towards the eye
+  std::vector<BodyArrow> arrows;
+  std::vector<std::string> value_names;   ///< of the values 0, 1, ...; empty: they are numbers
   std::string title, value_label, length_unit;
   std::filesystem::path file;
 };
