@@ -14,7 +14,7 @@ namespace perikit {
 
 namespace {
 
-enum Role { free_points, in_a_set, loaded, held, roles };
+enum Role { free_points, in_a_set, loaded, held };
 
 /// By point; what comes later in Role covers what comes before it.
 std::vector<double> roles_of(const Scene& scene, const Body& body) {
@@ -84,7 +84,7 @@ void plot_overview(Simulation& simulation, const std::filesystem::path& picture)
   drawn.reference = drawn.drawn = position;
   drawn.volume = volume;
   drawn.values = values;
-  drawn.range = {0.0, roles - 1.0};
+  drawn.range = {0.0, static_cast<double>(held)};
   drawn.view = {1, -1, 0.6};
   drawn.value_names = {"body", "in a set", "loaded", "held"};
   const ParameterValues& integrator = scene.integrator->values;
