@@ -62,8 +62,10 @@ class OneThread {
 void take_dense_memory() {
   static bool held = false;
   if (held) return;
-  if (const double left = address_space_left(); left < dense_memory)
-    throw RunError(fmt::format("not enough memory: dense products take {:.3g} MB, and the limit of this process leaves {:.3g} MB", dense_memory / 1e6, left / 1e6));
+  // Beside it the factors of a small body: where there are some MB less, libraries below fail without a word.
+  constexpr double beside = 24e6;
+  if (const double left = address_space_left(); left < dense_memory + beside)
+    throw RunError(fmt::format("not enough memory: dense products and factors take {:.3g} MB, and the limit of this process leaves {:.3g} MB", (dense_memory + beside) / 1e6, left / 1e6));
   if (blas_memory_alloc && blas_memory_free) blas_memory_free(blas_memory_alloc(0));
   held = true;
 }
