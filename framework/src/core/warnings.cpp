@@ -10,7 +10,7 @@ std::string_view warning_name(std::string_view warning) noexcept {
   const std::size_t begin = warning.rfind('[');
   if (begin == std::string_view::npos || !warning.ends_with(']')) return {};
   const std::string_view name = warning.substr(begin + 1, warning.size() - begin - 2);
-  return std::ranges::find(warning_kinds, name, &WarningKind::name) == warning_kinds.end() ? std::string_view() : name;
+  return std::ranges::find(warning_kinds, name) == warning_kinds.end() ? std::string_view() : name;
 }
 
 std::vector<std::string> without_silenced(std::vector<std::string> warnings, std::span<const std::string> silence) {

@@ -54,20 +54,12 @@ ColumnExpression::ColumnExpression(const std::string& text, const std::vector<st
     throw refuse(fmt::format("unknown name '{}' at character {}; allowed: {} and the usual functions{}", word.text, word.at + 1, allowed_names,
                              did_you_mean(word.text, all)));
   }
-  if (const std::size_t at = assignment_in(text); at != std::string::npos)
-    throw refuse(fmt::format("'=' at character {}; allowed: comparisons, which are written ==, <=, >= or !=", at + 1));
   parser_->columns.assign(columns_.size(), 1.0);
   for (std::size_t k = 0; k < columns_.size(); ++k) parser.DefineVar(columns_[k], &parser_->columns[k]);
   parser.DefineVar("t", &parser_->t);
   for (const auto& [name, value] : constants)
     if (!has(columns_, name)) parser.DefineConst(name, value);
-  try {
-    parser.SetExpr(text);
-    parser.Eval();
-  } catch (const mu::ParserError& error) {
-    throw refuse(fault_of(error) + "; allowed: + - * / ^, comparisons, && ||, ?:, functions, numbers and " + allowed_names);
-  }
-  if (parser.GetNumResults() != 1) throw refuse("it has several values; allowed: one");
+  if (const std::string fault = parse(parser, text, allowed_names); !fault.empty()) throw refuse(fault);
 }
 
 double ColumnExpression::operator()(std::span<const double> values, double t) const {

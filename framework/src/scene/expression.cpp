@@ -81,16 +81,7 @@ Expression::Expression(const std::string& text, const Constants& constants, bool
     uses_t_ |= name.text == "t";
     uses_position_ |= name.text == "x" || name.text == "y" || name.text == "z";
   }
-  if (const std::size_t at = assignment_in(text); at != std::string::npos) {
-    throw refuse(fmt::format("'=' at character {}; allowed: comparisons, which are written ==, <=, >= or !=", at + 1));
-  }
-  try {
-    parser.SetExpr(text);
-    parser.Eval();
-  } catch (const mu::ParserError& error) {
-    throw refuse(fault_of(error) + "; allowed: + - * / ^, comparisons, && ||, ?:, functions, numbers and " + allowed_names);
-  }
-  if (parser.GetNumResults() != 1) throw refuse("it has several values; allowed: one");
+  if (const std::string fault = parse(parser, text, allowed_names); !fault.empty()) throw refuse(fault);
 }
 
 double Expression::operator()(const std::array<double, 3>& x, double t) const {

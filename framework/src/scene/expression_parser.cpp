@@ -17,6 +17,18 @@ bool digit(char c) {
   return std::isdigit(static_cast<unsigned char>(c));
 }
 
+/// Position of a lone '=', which muParser would take as an assignment; npos where there is none.
+std::size_t assignment_in(const std::string& text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '=') continue;
+    if (i + 1 < text.size() && text[i + 1] == '=')
+      ++i;
+    else if (i == 0 || std::string_view("<>!").find(text[i - 1]) == std::string_view::npos)
+      return i;
+  }
+  return std::string::npos;
+}
+
 }  // namespace
 
 mu::Parser make_parser() {
@@ -50,17 +62,6 @@ std::vector<Word> words_in(const std::string& text) {
   return names;
 }
 
-std::size_t assignment_in(const std::string& text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '=') continue;
-    if (i + 1 < text.size() && text[i + 1] == '=')
-      ++i;
-    else if (i == 0 || std::string_view("<>!").find(text[i - 1]) == std::string_view::npos)
-      return i;
-  }
-  return std::string::npos;
-}
-
 std::string text_of(const mu::Parser& parser) {
   std::string text = parser.GetExpr();
   while (text.ends_with(' ')) text.pop_back();
@@ -91,6 +92,18 @@ std::string fault_of(const mu::ParserError& error) {
     default:
       return error.GetToken().empty() ? "it cannot be read" + where : fmt::format("unexpected '{}'{}", error.GetToken(), where);
   }
+}
+
+std::string parse(mu::Parser& parser, const std::string& text, const std::string& allowed_names) {
+  if (const std::size_t at = assignment_in(text); at != std::string::npos)
+    return fmt::format("'=' at character {}; allowed: comparisons, which are written ==, <=, >= or !=", at + 1);
+  try {
+    parser.SetExpr(text);
+    parser.Eval();
+  } catch (const mu::ParserError& error) {
+    return fault_of(error) + "; allowed: + - * / ^, comparisons, && ||, ?:, functions, numbers and " + allowed_names;
+  }
+  return parser.GetNumResults() == 1 ? "" : "it has several values; allowed: one";
 }
 
 }  // namespace perikit

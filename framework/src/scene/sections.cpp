@@ -250,12 +250,6 @@ ParameterTable derived_column_parameters() {
   return table;
 }
 
-std::vector<std::string> warning_names() {
-  std::vector<std::string> names;
-  for (const WarningKind& kind : warning_kinds) names.emplace_back(kind.name);
-  return names;
-}
-
 ParameterTable run_parameters() {
   ParameterTable table;
   table.boolean("skip", "Leave out work whose result is known: checks of bonds that cannot have failed, parts of the body that no wave has reached. "
@@ -267,7 +261,7 @@ ParameterTable run_parameters() {
                                     "Without it such a piece is refused.").positive().at_most(1.0);
   table.add(ParameterType::texts, "silence", "-", "Kinds of warnings that are not told: the name in brackets at the end of a warning (refusals.md has all).")
       .by_default("[]")
-      .choices = warning_names();
+      .choices.assign(warning_kinds.begin(), warning_kinds.end());
   table.integer("seed", "Seed of what is random in the run, the shift of jittered points, where body.lattice has none of its own.").at_least(0).by_default("1");
   return table;
 }
