@@ -10,7 +10,7 @@ namespace perikit {
 
 namespace {
 
-constexpr std::size_t width = 5;  // of a point: place, volume, material
+constexpr std::size_t values_of_a_row = 5;  // of a point: its place, volume and material
 constexpr auto piece_size = static_cast<std::int64_t>(rows_of_piece);
 
 ReferenceData of_one_rank(const Body& body) {
@@ -66,7 +66,7 @@ ReferenceData WholeReference::of_all() {
       piece_ = points(wanted);
       piece_number_ = wanted;
     }
-    const double* row = &piece_[p % rows_of_piece * width];
+    const double* row = &piece_[p % rows_of_piece * values_of_a_row];
     return {{row[0], row[1], row[2]}, row[3], static_cast<std::int64_t>(row[4])};
   };
   for (std::size_t s = 0; s < sets_.size(); ++s) {
@@ -87,7 +87,7 @@ ReferenceData WholeReference::of_all() {
 std::vector<double> WholeReference::points(std::int64_t piece) {
   const Body& body = problem_.body();
   const std::size_t first = static_cast<std::size_t>(piece) * rows_of_piece;
-  return gather_rows(body, first, std::min(rows_of_piece, body.points_of_all_ranks() - first), width,
+  return gather_rows(body, first, std::min(rows_of_piece, body.points_of_all_ranks() - first), values_of_a_row,
                      [&](std::size_t p, double* row) {
                        const Point x = body.position(p);
                        std::copy(x.begin(), x.end(), row);
