@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <barrier>
+#include <condition_variable>
 #include <cstdlib>
 #include <exception>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <thread>
 #include <utility>
@@ -17,6 +18,35 @@
 
 namespace perikit {
 
+/// A barrier whose threads sleep until the last one comes. Those of std::barrier first give way to others by turns, of which each takes milliseconds where the
+/// machine has more to do than cores: a hundred times as long.
+class Barrier {
+ public:
+  explicit Barrier(int threads) : expected_(threads) {}
+  void arrive_and_wait() {
+    std::unique_lock lock(mutex_);
+    const unsigned round = round_;
+    if (++arrived_ == expected_) next_round();
+    else all_came_.wait(lock, [&] { return round_ != round; });
+  }
+  /// And comes no more.
+  void arrive_and_drop() {
+    const std::scoped_lock lock(mutex_);
+    if (--expected_ == arrived_) next_round();
+  }
+
+ private:
+  void next_round() {
+    arrived_ = 0;
+    ++round_;
+    all_came_.notify_all();
+  }
+  int expected_, arrived_ = 0;
+  unsigned round_ = 0;
+  std::mutex mutex_;
+  std::condition_variable all_came_;
+};
+
 /// What the ranks share: one slot each.
 struct Meeting {
   explicit Meeting(int ranks)
@@ -25,7 +55,7 @@ struct Meeting {
         messages(numbers.size()),
         counts(numbers.size()),
         bytes(numbers.size()) {}
-  std::barrier<> barrier;
+  Barrier barrier;
   std::atomic<bool> failed{false};   ///< whether a rank has thrown, and comes no more
   std::vector<double> numbers;
   std::vector<std::span<const Message>> messages;

@@ -9,15 +9,15 @@
 #include <csignal>
 #include <fstream>
 
+#include "core/threads/loop_times.hpp"
 #include "data_folder.hpp"
 #include "operations.hpp"
+#include "output/machine_limits.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/core/loop_times.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/simd.hpp"
-#include "perikit/output/machine_limits.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit::app {
 

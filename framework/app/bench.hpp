@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 namespace perikit::app {
 

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "core/ranks/messages.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/core/messages.hpp"
 
 namespace perikit::app {
 

@@ -11,21 +11,21 @@
 #include <system_error>
 
 #include "bench.hpp"
+#include "core/ranks/messages.hpp"
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "machine_check.hpp"
 #include "new_project.hpp"
+#include "output/plot.hpp"
 #include "peak_memory.hpp"
-#include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
-#include "perikit/core/messages.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/warnings.hpp"
-#include "perikit/output/plot.hpp"
 #include "perikit/plugin/abi.hpp"
-#include "perikit/run/simulation.hpp"
-#include "perikit/run/study.hpp"
 #include "ranks.hpp"
+#include "run/simulation.hpp"
+#include "setup/body/body.hpp"
+#include "study/study.hpp"
 
 namespace perikit::app {
 

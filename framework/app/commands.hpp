@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bench.hpp"
-#include "perikit/output/plot.hpp"
+#include "output/plot.hpp"
 
 namespace perikit::app {
 

@@ -4,8 +4,8 @@
 
 #include <cstdlib>
 
-#include "perikit/run/study.hpp"
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
+#include "study/study.hpp"
 
 namespace perikit::app {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 namespace perikit::app {
 

@@ -20,11 +20,11 @@
 #include <vector>
 
 #include "data_folder.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/core/parallel.hpp"
-#include "perikit/output/recorder.hpp"
 #include "perikit/plugin/abi.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit::app {
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 namespace perikit::app {
 

@@ -21,11 +21,11 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "core/ranks/messages.hpp"
 #include "machine_check.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/core/messages.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace {
 

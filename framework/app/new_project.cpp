@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "perikit/output/recorder.hpp"
+#include "output/recorder.hpp"
 
 namespace perikit::app {
 

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string>
 
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 namespace perikit::app {
 

@@ -8,13 +8,13 @@
 #include <cstdlib>
 #include <vector>
 
+#include "core/ranks/serial_communicator.hpp"
+#include "output_fields/point_fields.hpp"
 #include "peak_memory.hpp"
-#include "perikit/build/body.hpp"
 #include "perikit/core/communicator.hpp"
-#include "perikit/core/serial_communicator.hpp"
 #include "perikit/core/warnings.hpp"
-#include "perikit/fields/point_fields.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
+#include "setup/body/body.hpp"
 
 namespace perikit::app {
 

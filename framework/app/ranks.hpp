@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
-#include "perikit/scene/scene.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
+#include "scene/scene.hpp"
 
 namespace perikit::app {
 

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include "describe.hpp"
-#include "perikit/run/study.hpp"
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
+#include "study/study.hpp"
 
 namespace perikit::app {
 

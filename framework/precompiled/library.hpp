@@ -34,6 +34,6 @@
 #include "perikit/body/body.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/core/tensor.hpp"
-#include "perikit/plugin/registry.hpp"
 #include "perikit/problem/integrator.hpp"
-#include "perikit/terms/terms.hpp"
+#include "plugin/registry.hpp"
+#include "terms/terms.hpp"

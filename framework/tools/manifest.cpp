@@ -8,7 +8,7 @@
 #include <exception>
 #include <filesystem>
 
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 2) {

@@ -10,8 +10,8 @@
 #include <fstream>
 
 #include "perikit/core/parallel.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 #include "tests/benchmarks/timed_problem.hpp"
 
 using namespace perikit;

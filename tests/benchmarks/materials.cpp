@@ -19,8 +19,8 @@
 #include "materials/mooney_rivlin/law.hpp"
 #include "materials/neo_hookean/law.hpp"
 #include "materials/saint_venant_kirchhoff/law.hpp"
+#include "output/machine_limits.hpp"
 #include "perikit/core/field.hpp"
-#include "perikit/output/machine_limits.hpp"
 #include "perikit/sdk/law_material.hpp"
 #include "tests/benchmarks/counted.hpp"
 

@@ -13,8 +13,8 @@
 #include <fstream>
 
 #include "perikit/core/parallel.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 
 using namespace perikit;
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "perikit/model/formulation.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "model/formulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit::contract {
 

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <limits>
 
-#include "perikit/build/problem.hpp"
 #include "perikit/core/parallel.hpp"
+#include "setup/problem.hpp"
 #include "tests/contract/fixture.hpp"
 
 using namespace perikit;
@@ -268,7 +268,7 @@ TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a b
           all->problem().advance(step);
         }
         CHECK(kept(some->problem()) == kept(all->problem()));
-        CHECK(some->problem().terms().quiet_counts().quiet > 0);
-        CHECK(all->problem().terms().quiet_counts().blocks == 0);
+        CHECK(some->problem().terms().resting_counts().quiet > 0);
+        CHECK(all->problem().terms().resting_counts().blocks == 0);
       }
 }

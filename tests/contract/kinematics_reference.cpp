@@ -1,4 +1,4 @@
-/// The engine against the dense reference (dense_reference.hpp), which shares no code with it: energies and forces of every
+/// The engine against the dense reference (framework/reference), which shares no code with it: energies and forces of every
 /// kinematics that the reference knows, on lattices and clouds, intact and cracked.
 
 #include <doctest/doctest.h>

@@ -77,7 +77,7 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");
-    const QuietCounts before = pair.some().terms().quiet_counts();
+    const RestingCounts before = pair.some().terms().resting_counts();
     for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       Field Kw = problem->make_field();
       REQUIRE(problem->tangent_action(right, left, Kw).ok());
@@ -89,8 +89,8 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     }
     pair.compare(right, "after a sample");
     pair.compare(rest, "back at rest");
-    const QuietCounts after = pair.some().terms().quiet_counts();
-    CHECK(pair.all().terms().quiet_counts().blocks == 0);
+    const RestingCounts after = pair.some().terms().resting_counts();
+    CHECK(pair.all().terms().resting_counts().blocks == 0);
     if (!c.conservative()) continue;
     const std::int64_t blocks = after.blocks - before.blocks, quiet = after.quiet - before.quiet;
     CHECK(blocks > 0);

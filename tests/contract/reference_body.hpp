@@ -5,8 +5,8 @@
 
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
-#include "perikit/scene/scene.hpp"
-#include "tests/contract/dense_reference.hpp"
+#include "scene/scene.hpp"
+#include "framework/reference/reference.hpp"
 
 namespace perikit::contract {
 

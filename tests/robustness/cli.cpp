@@ -9,7 +9,7 @@
 #include <set>
 #include <thread>
 
-#include "perikit/output/recorder.hpp"
+#include "output/recorder.hpp"
 #include "robustness/desk.hpp"
 
 using namespace perikit::test;

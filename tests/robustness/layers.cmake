@@ -1,8 +1,10 @@
 # Includes run downwards: a file reads headers of its own folder and of folders that come before it in `order`, which stands here and
 # nowhere else. What is high may know what is low, never the other way round; so each folder can be read, tested and replaced with nothing
-# but those below it.
+# but those below it. Public headers are those that parts need, and a folder is no longer than a screen.
 # Needs: source (the repository).
 #
+cmake_minimum_required(VERSION 3.25)
+
 # One name for the headers of include/perikit/<folder> and the sources of src/<folder>. "folder/file" places single files apart.
 set(order
     core              # memory, threads, vectors of numbers, errors
@@ -15,16 +17,19 @@ set(order
     maps              # what a scene puts over a kinematics
     operators         # forces, tangents, energies, samples, history
     spaces            # evaluation points; they hand their batches to the operators
+    cloud_balance     # weights and shifts that balance a constant stress on clouds
     assembly          # the tangent as a matrix
     terms             # what adds to forces, energy and tangent
     problem           # state, constraints, loads
-    fields            # fields of points by name
+    output_fields     # fields of points by name
     sdk               # what parts are written with: laws, equilibrium, load steps
     plugin/registry   # makes parts of every kind, so it knows the interfaces of all of them
     scene             # what a file says
     output            # what is written
-    build             # makes bodies, models and problems from scenes
-    run               # runs and studies
+    setup             # makes bodies, models and problems from scenes
+    warnings          # what may be wrong in a scene, a body, a model
+    run               # one run
+    study             # many
     app)              # the command line
 
 file(GLOB_RECURSE files ${source}/framework/src/*.?pp ${source}/framework/include/perikit/*.?pp ${source}/framework/app/*.?pp)
@@ -46,6 +51,43 @@ function(place_of path variable)
   endif()
   set(${variable} ${place} PARENT_SCOPE)
 endfunction()
+
+# A room whose folder is full has sub-folders.
+set(folders "")
+foreach(file IN LISTS files)
+  cmake_path(GET file PARENT_PATH folder)
+  string(MAKE_C_IDENTIFIER ${folder} name)
+  list(APPEND files_of_${name} ${file})
+  list(LENGTH files_of_${name} count)
+  if(file MATCHES "/framework/src/" AND count EQUAL 28)
+    list(APPEND full "${folder}")
+  endif()
+endforeach()
+if(full)
+  message(FATAL_ERROR "more than 27 files, make sub-folders: ${full}")
+endif()
+
+# Public headers are those that parts read, directly or by another one: the id of a build is a hash of them.
+file(GLOB_RECURSE readers ${source}/plugins/*.?pp ${source}/materials/*.?pp ${source}/integrators/*.?pp ${source}/framework/templates/* ${source}/tests/out_of_tree/*.?pp)
+set(read "")
+while(readers)
+  list(POP_FRONT readers reader)
+  file(STRINGS ${reader} includes REGEX "^#include \"perikit/[^\"]+\"")
+  foreach(include IN LISTS includes)
+    string(REGEX REPLACE "^#include \"([^\"]+)\".*" "\\1" header ${include})
+    set(header ${source}/framework/include/${header})
+    if(EXISTS ${header} AND NOT header IN_LIST read)
+      list(APPEND read ${header})
+      list(APPEND readers ${header})
+    endif()
+  endforeach()
+endwhile()
+file(GLOB_RECURSE public ${source}/framework/include/perikit/*.hpp)
+list(REMOVE_ITEM public ${read})
+if(public)
+  list(JOIN public "\n  " lines)
+  message(FATAL_ERROR "no part reads these headers, which belong beside their sources:\n  ${lines}")
+endif()
 
 set(upwards "")
 foreach(file IN LISTS files)

@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "perikit/output/recorder.hpp"
+#include "output/recorder.hpp"
 
 int main(int count, char** arguments) try {
   if (count != 2) return 2;

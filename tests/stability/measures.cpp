@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "framework/src/core/eigen.hpp"
+#include "core/eigen.hpp"
 #include "tests/contract/fixture.hpp"
 
 namespace perikit::stability {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit::stability {
 

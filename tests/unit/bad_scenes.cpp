@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

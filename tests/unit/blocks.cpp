@@ -12,12 +12,12 @@
 #include <random>
 #include <set>
 
-#include "core/following_arrival.hpp"
-#include "core/loop_order.hpp"
-#include "core/loop_shares.hpp"
-#include "families/quiet_blocks.hpp"
+#include "core/ranks/dependent_arrival.hpp"
+#include "core/threads/loop_order.hpp"
+#include "core/threads/loop_times.hpp"
+#include "core/threads/work_stealing.hpp"
+#include "families/resting_blocks.hpp"
 #include "perikit/body/lattice.hpp"
-#include "perikit/core/loop_times.hpp"
 #include "perikit/core/point_motion.hpp"
 
 using namespace perikit;
@@ -119,9 +119,9 @@ TEST_CASE("blocks that read what arrives run after it, those that wait for them 
 
 namespace {
 
-class Follower final : public FollowingArrival {
+class Follower final : public DependentArrival {
  public:
-  explicit Follower(Late* first) : FollowingArrival(first), first_(first) {}
+  explicit Follower(Late* first) : DependentArrival(first), first_(first) {}
   int put_after = 0, put_before = 0;
 
  private:
@@ -160,7 +160,7 @@ TEST_CASE("quiet blocks: what is not here yet is looked at where something rests
   BlockReach reach = row(6);
   reach.elsewhere.assign(reach.units, 0);
   reach.elsewhere[5] = 1;
-  QuietBlocks blocks(reach);
+  RestingBlocks blocks(reach);
   Late arrival;
   std::vector<std::uint8_t> moving(6, 1);
   const auto moves = [&](std::size_t b) { return moving[b] != 0; };
@@ -306,7 +306,7 @@ TEST_CASE("order of a loop: each index once, after all that it waits for, late o
 TEST_CASE("loops begin with the same share of indices on the same thread") {
   for (const std::size_t n : {2, 7, 8, 100})
     for (const int threads : {1, 2, 3, 7, 64}) {
-      detail::LoopShares shares(10, 10 + n, threads, Sharing::help);
+      detail::WorkStealing shares(10, 10 + n, threads, Sharing::help);
       std::vector<int> taken(n, 0);
       // All threads side by side, one index each.
       for (bool any = true; any;) {
@@ -325,7 +325,7 @@ TEST_CASE("loops begin with the same share of indices on the same thread") {
       CHECK(taken == std::vector<int>(n, 1));
       // Fewer threads than were asked for do all of it, even where they do not help each other.
       for (const int team : {1, 2, 3}) {
-        detail::LoopShares kept(0, n, threads, Sharing::keep);
+        detail::WorkStealing kept(0, n, threads, Sharing::keep);
         std::vector<int> done(n, 0);
         for (int t = 0; t < std::min(team, threads); ++t)
           while (const std::optional<std::size_t> i = kept.take(t, std::min(team, threads))) ++done[*i];
@@ -360,7 +360,7 @@ TEST_CASE("times of loops: each index once, and how long they take on more threa
 }
 
 TEST_CASE("quiet blocks: pass k reaches k blocks further than what moves") {
-  QuietBlocks quiet(row(10));
+  RestingBlocks quiet(row(10));
   quiet.look(3, [](std::size_t b) { return b == 2; });
   for (std::size_t b = 0; b < 10; ++b)
     for (int pass = 1; pass <= 3; ++pass) CHECK(quiet.awake(b, pass) == (b <= 2 + static_cast<std::size_t>(pass) && b + static_cast<std::size_t>(pass) >= 2));
@@ -374,16 +374,16 @@ TEST_CASE("quiet blocks: pass k reaches k blocks further than what moves") {
 }
 
 TEST_CASE("quiet blocks: without them, and after waking, everything is awake") {
-  QuietBlocks none;
+  RestingBlocks none;
   none.look(2, [](std::size_t) { return false; });
   CHECK(none.awake(0, 1));
-  QuietBlocks quiet(row(4));
+  RestingBlocks quiet(row(4));
   quiet.wake();
   for (std::size_t b = 0; b < 4; ++b) CHECK(quiet.awake(b, 1));
 }
 
 TEST_CASE("quiet blocks: laws with a history never sleep again") {
-  QuietBlocks quiet(row(10), true);
+  RestingBlocks quiet(row(10), true);
   quiet.look(1, [](std::size_t b) { return b == 5; });
   quiet.look(1, [](std::size_t) { return false; });
   for (std::size_t b = 0; b < 10; ++b) CHECK(quiet.awake(b, 1) == (b >= 4 && b <= 6));
@@ -393,7 +393,7 @@ TEST_CASE("quiet blocks: laws with a history never sleep again") {
 }
 
 TEST_CASE("quiet blocks: where all have moved, none is looked at any more") {
-  QuietBlocks quiet(row(10));
+  RestingBlocks quiet(row(10));
   std::atomic<int> looks = 0;
   const auto moves_to = [&](std::size_t last) {
     quiet.look(1, [&, last](std::size_t b) {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "perikit/build/body.hpp"
+#include "setup/body/body.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "body/points/point_file.hpp"
 #include "files/hdf5_file.hpp"
-#include "perikit/body/point_file.hpp"
 
 namespace perikit::test {
 

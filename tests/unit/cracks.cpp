@@ -7,8 +7,8 @@
 #include "files/atomic_file.hpp"
 #include "output/history_file.hpp"
 #include "output/result_file.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 #include "unit/temporary_folder.hpp"
 
 using namespace perikit;

@@ -1,7 +1,7 @@
 /// What a crack takes by `critical_energy`, summed up without a run: the limits of all bonds that cross a unit of area of a plane, over Gc. On lattices
 /// it is 1 for planes along the lattice, whatever the influence function and its factor; elsewhere within the bounds of framework/docs/fracture.md.
 
-#include "build/crossing_bonds.hpp"
+#include "setup/crossing_bonds.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -12,9 +12,9 @@
 #include <numbers>
 #include <random>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/scene/scene.hpp"
-#include "terms/energy_shares.hpp"
+#include "plugin/registry.hpp"
+#include "scene/scene.hpp"
+#include "terms/bond_energy_split.hpp"
 
 using namespace perikit;
 

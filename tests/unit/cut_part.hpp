@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "body/block_colours.hpp"
-#include "body/cell_mask.hpp"
-#include "body/curve.hpp"
-#include "body/lattice_shares.hpp"
+#include "body/partition/block_colours.hpp"
+#include "body/partition/lattice_shares.hpp"
+#include "body/partition/partition.hpp"
+#include "body/points/cell_mask.hpp"
+#include "body/points/curve.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/images.hpp"
-#include "perikit/body/partition.hpp"
 
 namespace perikit::test {
 

@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "perikit/model/damage.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/scene/scene.hpp"
+#include "plugin/registry.hpp"
+#include "scene/scene.hpp"
 
 using namespace perikit;
 

@@ -1,6 +1,6 @@
 /// Shares of the energy of a family, of every bond of it, however many there are.
 
-#include "terms/energy_shares.hpp"
+#include "terms/bond_energy_split.hpp"
 
 #include <doctest/doctest.h>
 

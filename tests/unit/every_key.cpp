@@ -5,8 +5,8 @@
 
 #include <map>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/scene/scene.hpp"
+#include "plugin/registry.hpp"
+#include "scene/scene.hpp"
 #include "unit/scene_draft.hpp"
 #include "unit/spoiled_values.hpp"
 

@@ -1,4 +1,4 @@
-#include "perikit/scene/expression.hpp"
+#include "scene/expressions/expression.hpp"
 
 #include <doctest/doctest.h>
 
@@ -7,7 +7,7 @@
 #include <regex>
 #include <sstream>
 
-#include "scene/expression_names.hpp"
+#include "scene/expressions/expression_names.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "families/cloud_families.hpp"
-#include "families/lattice_families.hpp"
+#include "families/cloud/cloud_families.hpp"
+#include "families/lattice/lattice_families.hpp"
 
 using namespace perikit;
 
@@ -80,7 +80,7 @@ void check_equal(const Plates& plates) {
     }
     const std::size_t p = Plates::point(*plates.lattice, i), q = Plates::point(*plates.cloud, i);
     CHECK(plates.lattice->damage(p) == doctest::Approx(plates.cloud->damage(q)).epsilon(1e-12));
-    CHECK(plates.lattice->left(p) == doctest::Approx(plates.cloud->left(q)).epsilon(1e-12));
+    CHECK(plates.lattice->remaining_influence(p) == doctest::Approx(plates.cloud->remaining_influence(q)).epsilon(1e-12));
     CHECK(plates.lattice->condition(p) == doctest::Approx(plates.cloud->condition(q)).epsilon(1e-10));
     CHECK(plates.lattice->normaliser(p, BondWeight::volume) == doctest::Approx(plates.cloud->normaliser(q, BondWeight::volume)));
     CHECK(plates.lattice->lost_bonds(p) == plates.cloud->lost_bonds(q));

@@ -1,4 +1,4 @@
-#include "perikit/model/formulation.hpp"
+#include "model/formulation.hpp"
 
 #include <doctest/doctest.h>
 

@@ -13,8 +13,8 @@
 #include <thread>
 
 #include "files/shared_file.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;

@@ -5,12 +5,12 @@
 
 #include <cmath>
 
-#include "perikit/build/problem.hpp"
+#include "core/threads/work_steps.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "perikit/core/work_steps.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/scene/scene.hpp"
+#include "plugin/registry.hpp"
+#include "scene/scene.hpp"
+#include "setup/problem.hpp"
 #include "terms/term.hpp"
 
 using namespace perikit;
@@ -57,7 +57,7 @@ class Foundation final : public Term {
     }
     return -1;
   }
-  int steps() const noexcept override { return 1; }
+  int coupling_reach() const noexcept override { return 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override { return std::make_unique<FoundationAssembly>(rows); }
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum* energy) override {
     return add_forces(u, force, energy);
@@ -73,7 +73,7 @@ class Foundation final : public Term {
   const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
   bool screen(BondScreen*) override { return false; }
   void report(ModelReport& report) const override { report.notes.emplace_back("foundation", "springs at all points"); }
-  QuietCounts quiet_counts() const noexcept override { return {}; }
+  RestingCounts resting_counts() const noexcept override { return {}; }
 
   /// d2E/du_c du_e of a unit of volume.
   static double entry(ConstFieldView u, std::int32_t p, int c, int e) {

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;

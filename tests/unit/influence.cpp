@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/plugin/registry.hpp"
-#include "perikit/scene/scene.hpp"
 #include "perikit/sdk/plugin.hpp"
+#include "plugin/registry.hpp"
+#include "scene/scene.hpp"
 
 using namespace perikit;
 

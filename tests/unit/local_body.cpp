@@ -1,6 +1,6 @@
 /// Parts of a body that ranks place by themselves are those that they cut out of the whole body, to the last number.
 
-#include "build/local_body.hpp"
+#include "setup/body/local_body.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -10,15 +10,15 @@
 #include <fstream>
 #include <mutex>
 
-#include "body/input_numbers.hpp"
-#include "body/point_share.hpp"
-#include "build/cloud_points.hpp"
-#include "build/image_planes.hpp"
-#include "build/scene_lattice.hpp"
-#include "build/several_ranks.hpp"
-#include "perikit/build/body.hpp"
+#include "body/partition/input_order.hpp"
+#include "body/partition/point_share.hpp"
+#include "core/ranks/serial_communicator.hpp"
 #include "perikit/core/memory.hpp"
-#include "perikit/core/serial_communicator.hpp"
+#include "setup/body/body.hpp"
+#include "setup/body/points_of_cloud.hpp"
+#include "setup/body/scene_lattice.hpp"
+#include "setup/body/several_ranks.hpp"
+#include "setup/surfaces/image_planes.hpp"
 #include "unit/cloud_files.hpp"
 #include "unit/part_comparison.hpp"
 #include "unit/temporary_folder.hpp"

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "body/voronoi.hpp"
+#include "body/voronoi/voronoi.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "unit/cloud_files.hpp"
 #include "unit/part_comparison.hpp"

@@ -1,4 +1,4 @@
-#include "perikit/output/machine_limits.hpp"
+#include "output/machine_limits.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,6 +1,6 @@
 /// Keyed rows of several ranks come in the order of their keys, and no rank ever has more than a piece of them.
 
-#include "core/merged_rows.hpp"
+#include "core/ranks/merged_rows.hpp"
 
 #include <doctest/doctest.h>
 

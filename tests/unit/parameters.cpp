@@ -2,7 +2,7 @@
 
 #include <doctest/doctest.h>
 
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

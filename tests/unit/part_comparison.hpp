@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "body/block_colours.hpp"
-#include "build/image_planes.hpp"
-#include "build/local_body.hpp"
-#include "build/several_ranks.hpp"
-#include "perikit/build/body.hpp"
+#include "body/partition/block_colours.hpp"
+#include "setup/body/body.hpp"
+#include "setup/body/local_body.hpp"
+#include "setup/body/several_ranks.hpp"
+#include "setup/surfaces/image_planes.hpp"
 #include "tests/thread_ranks.hpp"
 #include "unit/cut_part.hpp"
 #include "unit/fake_catalogue.hpp"

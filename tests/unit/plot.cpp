@@ -1,4 +1,4 @@
-#include "perikit/output/plot.hpp"
+#include "output/plot.hpp"
 
 #include <doctest/doctest.h>
 
@@ -7,8 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;

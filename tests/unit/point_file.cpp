@@ -1,13 +1,13 @@
-#include "perikit/body/point_file.hpp"
+#include "body/points/point_file.hpp"
 
 #include <doctest/doctest.h>
 
 #include <ctime>
 #include <fstream>
 
-#include "framework/src/files/hdf5_file.hpp"
+#include "files/hdf5_file.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <random>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 #include "unit/part_comparison.hpp"
 #include "unit/temporary_folder.hpp"
 

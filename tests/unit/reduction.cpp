@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

@@ -1,4 +1,4 @@
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 /// Rows of points in packs, as loops over the bonds of clouds use them.
 
-#include "families/row_packs.hpp"
+#include "families/cloud/cloud_row_simd.hpp"
 
 #include <doctest/doctest.h>
 

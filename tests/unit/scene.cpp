@@ -1,4 +1,4 @@
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 
 #include <doctest/doctest.h>
 

@@ -7,13 +7,13 @@
 #include <memory>
 #include <random>
 
-#include "build/materials.hpp"
 #include "materials/hencky/law.hpp"
 #include "materials/mooney_rivlin/law.hpp"
 #include "materials/neo_hookean/law.hpp"
 #include "materials/saint_venant_kirchhoff/law.hpp"
 #include "operators/batch.hpp"
 #include "perikit/sdk/law_material.hpp"
+#include "setup/materials.hpp"
 
 using namespace perikit;
 
@@ -225,7 +225,7 @@ TEST_CASE("selective map: a bond gives the same bits in any company") {
   const auto green = std::make_shared<LawMaterial<SaintVenantKirchhoff>>();
   const auto other = std::make_shared<Undeclared>(soft);
   MaterialRecord silent = silent_record(), far = silent;
-  far.far = true;
+  far.incomplete = true;
   const std::vector<MaterialRecord> known{record_of(soft, {1.0, 50.0}), record_of(green, {30.0, 1.0}), record_of(soft, {2.0, 90.0}), record_of(other, {1.5, 70.0})};
   std::vector<MaterialRecord> records = known, undeclared = known;
   for (MaterialRecord& record : undeclared) record.material = std::make_shared<Undeclared>(record.material), record.traits.green_linear = false;

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "perikit/build/body.hpp"
+#include "setup/body/body.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;

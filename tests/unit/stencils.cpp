@@ -1,6 +1,6 @@
 /// Stencils: exact for affine motion, their adjoint, and the bond formula that packs and numbers share.
 
-#include "spaces/local_stencil.hpp"
+#include "spaces/weighted/local_stencil.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,4 +1,4 @@
-#include "perikit/run/study.hpp"
+#include "study/study.hpp"
 
 #include <doctest/doctest.h>
 
@@ -9,8 +9,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "perikit/plugin/registry.hpp"
-#include "run/study_axes.hpp"
+#include "plugin/registry.hpp"
+#include "study/axes.hpp"
 #include "unit/fake_catalogue.hpp"
 #include "unit/temporary_folder.hpp"
 

@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "perikit/plugin/registry.hpp"
-#include "perikit/run/simulation.hpp"
+#include "plugin/registry.hpp"
+#include "run/simulation.hpp"
 #include "unit/temporary_folder.hpp"
 
 using namespace perikit;

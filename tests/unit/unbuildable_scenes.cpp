@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 #include "unit/scene_draft.hpp"
 #include "unit/temporary_folder.hpp"
 

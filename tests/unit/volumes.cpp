@@ -8,8 +8,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "framework/src/body/voronoi.hpp"
-#include "perikit/build/body.hpp"
+#include "body/voronoi/voronoi.hpp"
+#include "setup/body/body.hpp"
 #include "unit/fake_catalogue.hpp"
 #include "unit/temporary_folder.hpp"
 

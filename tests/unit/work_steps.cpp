@@ -1,4 +1,4 @@
-#include "perikit/core/work_steps.hpp"
+#include "core/threads/work_steps.hpp"
 
 #include <doctest/doctest.h>
 

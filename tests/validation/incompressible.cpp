@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "framework/src/core/eigen.hpp"
+#include "core/eigen.hpp"
 #include "tests/validation/quasi_static.hpp"
 
 using namespace perikit;

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "perikit/core/parallel.hpp"
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/validation/scenes.hpp"
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "framework/src/core/eigen.hpp"
+#include "core/eigen.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;

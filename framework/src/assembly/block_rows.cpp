@@ -1,7 +1,7 @@
 #include "assembly/block_rows.hpp"
 
-#include "families/cloud_families.hpp"
-#include "families/lattice_families.hpp"
+#include "families/cloud/cloud_families.hpp"
+#include "families/lattice/lattice_families.hpp"
 
 namespace perikit {
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "families/cloud_rows.hpp"
+#include "cloud_balance/shift.hpp"
+#include "families/cloud/cloud_rows.hpp"
 #include "operators/laminates.hpp"
 #include "spaces/bond_shape.hpp"
-#include "spaces/shift.hpp"
 
 namespace perikit {
 
@@ -58,7 +58,7 @@ void BondAssembly<D>::read_bonds() {
     point_gradient(s.family, rows_.body().horizon(), formulation_.order, s.gradient);
     if (shift_.data) shift_gradient(s.family, shift_, s.gradient);
     const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
-    volume_share_[i] = regular ? rows_.families().left(rows_.point(i)) : 0.0;
+    volume_share_[i] = regular ? rows_.families().remaining_influence(rows_.point(i)) : 0.0;
     const auto neighbours = rows_.neighbours(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Bond& bond = bond_[rows_.first(i) + k];

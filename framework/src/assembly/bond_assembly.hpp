@@ -3,7 +3,7 @@
 #include "assembly/block_pattern.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "body/interfaces.hpp"
-#include "families/cloud_rows.hpp"
+#include "families/cloud/cloud_rows.hpp"
 #include "spaces/bond_ends.hpp"
 #include "spaces/evaluation_space.hpp"
 

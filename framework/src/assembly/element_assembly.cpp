@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "families/cloud_rows.hpp"
+#include "families/cloud/cloud_rows.hpp"
 #include "operators/laminates.hpp"
 #include "perikit/core/simd.hpp"
 
@@ -46,7 +46,7 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
   for (int q = 0; q < element.points; ++q) {
     const int lane =
-        m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().left(p));
+        m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().remaining_influence(p));
     const auto of_value = [&](const auto& value, double* to) {
       const double own = value(p);
       for (std::size_t k = 0; k < m.nodes.size(); ++k) {

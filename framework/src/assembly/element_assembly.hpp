@@ -5,7 +5,7 @@
 #include "assembly/point_element.hpp"
 #include "assembly/tangent_batch.hpp"
 #include "body/interfaces.hpp"
-#include "families/cloud_rows.hpp"
+#include "families/cloud/cloud_rows.hpp"
 #include "spaces/evaluation_space.hpp"
 
 namespace perikit {

@@ -1,6 +1,6 @@
 #include "assembly/volumetric_state.hpp"
-#include "spaces/chunk_roles.hpp"
-#include "spaces/lattice_gradient.hpp"
+#include "spaces/lattice/lattice_gradient.hpp"
+#include "spaces/lattice/work_of_groups.hpp"
 
 namespace perikit {
 

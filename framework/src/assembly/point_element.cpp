@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "cloud_balance/shift.hpp"
 #include "perikit/core/simd.hpp"
-#include "spaces/shift.hpp"
 
 namespace perikit {
 

@@ -6,9 +6,9 @@
 
 #include "assembly/block_rows.hpp"
 #include "assembly/tangent_batch.hpp"
+#include "model/formulation.hpp"
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/model/formulation.hpp"
-#include "spaces/local_stencil.hpp"
+#include "spaces/weighted/local_stencil.hpp"
 
 namespace perikit {
 

@@ -2,7 +2,7 @@
 
 #include <numeric>
 
-#include "spaces/chunk_roles.hpp"
+#include "spaces/lattice/work_of_groups.hpp"
 
 namespace perikit {
 
@@ -21,13 +21,13 @@ RowRoles::RowRoles(const BlockRows& rows, const Laws& laws) {
     if (here[rows.point(r)]) complete.push_back(static_cast<std::int32_t>(r));
   }
   if (const LatticeFamilies* lattice = rows.families().lattice()) {
-    here = felt_here(*lattice);
+    here = affects_owned_points(*lattice);
   } else {
     for (const std::int32_t r : complete)
       for (const std::int32_t j : rows.neighbours(static_cast<std::size_t>(r))) here[rows.point(static_cast<std::size_t>(j))] = 1;
   }
   for (std::size_t r = 0; r < rows.size(); ++r)
-    if (here[rows.point(r)] && !(laws.any_far() && laws.far(rows.point(r)))) felt.push_back(static_cast<std::int32_t>(r));
+    if (here[rows.point(r)] && !(laws.has_incomplete_points() && laws.incomplete(rows.point(r)))) felt.push_back(static_cast<std::int32_t>(r));
 }
 
 }  // namespace perikit

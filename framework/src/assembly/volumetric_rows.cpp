@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "assembly/volumetric_state.hpp"
-#include "perikit/core/dimension.hpp"
+#include "cloud_balance/shift.hpp"
+#include "core/dimension.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "spaces/shift.hpp"
 
 namespace perikit {
 
@@ -102,7 +102,7 @@ class StoredRows final : public VolumetricState<D> {
         for (int e = 0; e < D; ++e) H(c, e) += (u.component(c)[q] - u.component(c)[p]) * m.g[k * D + static_cast<std::size_t>(e)];
       for (std::size_t e = 0; e < D; ++e) regular |= m.g[k * D + e] != 0;
     }
-    const std::optional<T> inverse_transpose = this->keep(p, H, regular ? this->parts_.families.left(p) : 0.0);
+    const std::optional<T> inverse_transpose = this->keep(p, H, regular ? this->parts_.families.remaining_influence(p) : 0.0);
     if (!inverse_transpose) return false;
     own_[i] = Vector{};
     for (std::size_t k = 0; k < neighbours.size(); ++k) {

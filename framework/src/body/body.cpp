@@ -8,7 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "body/curve.hpp"
+#include "body/points/curve.hpp"
 #include "perikit/body/images.hpp"
 
 namespace perikit {

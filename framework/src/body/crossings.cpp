@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "body/family_limit.hpp"
 #include "perikit/core/spectral.hpp"
 
 namespace perikit {
@@ -29,7 +30,7 @@ const Nearest* nearest_of(const std::vector<Nearest>& all, std::uint16_t materia
 }  // namespace
 
 std::vector<Crossing> find_crossings(double longest, const Boxes& boxes, std::span<const std::uint16_t> material) {
-  const double horizon = longest * (1 + 1e-10);
+  const double horizon = family_limit(longest);
   const std::vector<std::uint8_t> differing = boxes.differing(material);
   std::vector<std::vector<Nearest>> nearest(boxes.size());
   parallel_for(boxes.size(), [&](std::size_t n) {

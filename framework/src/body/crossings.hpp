@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "body/boxes.hpp"
+#include "body/points/boxes.hpp"
 
 namespace perikit {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "body/crossings.hpp"
+#include "body/family_limit.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
@@ -21,7 +22,7 @@ Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> mate
   for (const std::int32_t p : body.internal()) places.push_back(body.position(static_cast<std::size_t>(p)));
   const std::size_t real = places.size() - sources.size();
   const auto source = [&](std::size_t n) { return n < real ? n : static_cast<std::size_t>(sources[n - real]); };
-  const Boxes boxes(std::move(places), body.horizon() * (1 + 1e-9));
+  const Boxes boxes(std::move(places), search_radius(body.horizon()));
   const std::vector<Crossing> crossings = find_crossings(body.horizon(), boxes, material);
   found.length = body.horizon();
   found.material.assign(body.stride(), 0);

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "body/family_limit.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
@@ -73,7 +74,7 @@ void set_cells(Lattice& lattice, const std::array<std::int64_t, 3>& cells) {
 void lay_out(Lattice& lattice, double horizon) {
   std::array<std::int64_t, 3> reach{};
   for (int k = 0; k < lattice.dimension; ++k)
-    reach[k] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(horizon / lattice.spacing * (1 + 1e-10))), 0,
+    reach[k] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(family_limit(horizon / lattice.spacing))), 0,
                                         lattice.extent[k] - 1);
   lattice.pitch[0] = static_cast<std::int64_t>(padded(static_cast<std::size_t>(lattice.extent[0] + reach[0])));
   lattice.pitch[1] = lattice.extent[1] + reach[1];
@@ -190,7 +191,7 @@ std::int32_t TileColours::of(std::int64_t number) const noexcept {
 }
 
 std::vector<std::array<int, 3>> family_offsets(const Lattice& lattice, double horizon) {
-  const double m = horizon / lattice.spacing * (1 + 1e-10);
+  const double m = family_limit(horizon / lattice.spacing);
   std::array<int, 3> reach{};
   for (int k = 0; k < lattice.dimension; ++k) {
     reach[k] = static_cast<int>(std::min<std::int64_t>(static_cast<std::int64_t>(std::floor(m)), lattice.extent[k] - 1));

@@ -4,8 +4,9 @@
 #include <tuple>
 
 #include "body/crossings.hpp"
+#include "body/family_limit.hpp"
 #include "body/interfaces.hpp"
-#include "body/near_ranks.hpp"
+#include "body/partition/near_ranks.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/rank_values.hpp"
 
@@ -79,7 +80,7 @@ std::vector<MeetingPoint> meeting_points(const Body& part, std::span<const std::
                                          double reach) {
   std::vector<Point> places;
   for (const std::int32_t p : part.internal()) places.push_back(part.position(static_cast<std::size_t>(p)));
-  const std::vector<MeetingPoint> own = own_meeting_points(part, material, source, Boxes(std::move(places), part.horizon() * (1 + 1e-9)));
+  const std::vector<MeetingPoint> own = own_meeting_points(part, material, source, Boxes(std::move(places), search_radius(part.horizon())));
   std::vector<MeetingPoint> all = of_ranks_near(part, own, surroundings(part, reach));
   std::ranges::sort(all, {}, &MeetingPoint::number);
   return all;
@@ -104,7 +105,7 @@ Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t
     of_meeting.push_back(static_cast<std::uint16_t>(point.material));
   }
   std::vector<Crossing> crossings =
-      find_crossings(part.horizon(), Boxes(std::move(places), part.horizon() * (1 + 1e-9)), of_meeting);
+      find_crossings(part.horizon(), Boxes(std::move(places), search_radius(part.horizon())), of_meeting);
   // Farther ones may not be what they are in the whole body.
   std::erase_if(crossings, [&](const Crossing& c) { return !bounds.near(c.middle, reach_of_midpoints(part, reach)); });
   std::vector<Crossing> own;

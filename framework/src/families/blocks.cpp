@@ -4,7 +4,7 @@
 #include <numeric>
 #include <utility>
 
-#include "body/block_colours.hpp"
+#include "body/partition/block_colours.hpp"
 #include "perikit/body/body.hpp"
 
 namespace perikit {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/group_marks.hpp"
-#include "core/loop_order.hpp"
+#include "core/threads/loop_order.hpp"
 
 namespace perikit {
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "families/cloud_families.hpp"
-#include "families/lattice_families.hpp"
+#include "families/cloud/cloud_families.hpp"
+#include "families/lattice/lattice_families.hpp"
 #include "families/normalised_influence.hpp"
 #include "families/shape_tensor.hpp"
 

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "families/family_arrays.hpp"
 #include "families/blocks.hpp"
+#include "families/bonds.hpp"
+#include "families/family_arrays.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/body/influence.hpp"
-#include "perikit/families/bonds.hpp"
 
 namespace perikit {
 
@@ -51,7 +51,7 @@ class Families {
 
   // By point.
   virtual double damage(std::size_t p) const noexcept = 0;      ///< D_i: lost share of the uncut family's influence
-  virtual double left(std::size_t p) const noexcept = 0;        ///< share of the influence at the set-up that is left
+  virtual double remaining_influence(std::size_t p) const noexcept = 0;        ///< share of the influence at the set-up that is left
   virtual double condition(std::size_t p) const noexcept = 0;   ///< of K_i; infinite where singular
   virtual double normaliser(std::size_t p, BondWeight kind) const noexcept = 0;   ///< N_i over the uncut family: sum V_j or sum omega V_j
   /// Whether bonds of the point have failed or weakened since the set-up.

@@ -1,5 +1,5 @@
 #pragma once
-#include "perikit/model/formulation.hpp"
+#include "model/formulation.hpp"
 
 namespace perikit {
 

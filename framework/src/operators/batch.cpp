@@ -204,11 +204,11 @@ int BatchWork::balance_pass(int n, BatchScratch& s, bool both_ends) const noexce
 }
 
 /// Bonds with a far end: no point of this rank feels them, and their gradients are anything.
-void BatchWork::leave_out_far(int n, BatchScratch& s) const noexcept {
+void BatchWork::leave_out_incomplete(int n, BatchScratch& s) const noexcept {
   for (int l = 0; l < n; ++l) {
-    if (laws_.far(static_cast<std::size_t>(s.owner[l])))
+    if (laws_.incomplete(static_cast<std::size_t>(s.owner[l])))
       s.far[l] = s.owner[l];
-    else if (laws_.far(static_cast<std::size_t>(s.far[l])))
+    else if (laws_.incomplete(static_cast<std::size_t>(s.far[l])))
       s.owner[l] = s.far[l];
   }
 }
@@ -220,7 +220,7 @@ int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* ene
     return -1;
   }
   if (balance_) return balance_pass(n, s, both_ends);
-  if (both_ends && s.one_law < 0 && laws_.any_far()) leave_out_far(n, s);
+  if (both_ends && s.one_law < 0 && laws_.has_incomplete_points()) leave_out_incomplete(n, s);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
   if (selective_) return selective_pass(n, s, both_ends ? 2 : 1, energy);
   if (!laminates_ || s.one_law >= 0) return evaluate_plain(n, s, both_ends, energy, nullptr);

@@ -11,9 +11,9 @@
 #include "maps/selective_map.hpp"
 #include "operators/bond_screen.hpp"
 #include "operators/laminates.hpp"
+#include "operators/law_history.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/point_motion.hpp"
-#include "perikit/operators/law_history.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
@@ -203,7 +203,7 @@ class BatchWork {
   void add_energies(int n, const double* weight, const BatchScratch& s, int first, GroupEnergy* energy) const noexcept;
   void add_samples(int n, const BatchScratch& s, const double* weight, const SampleSums& sums, bool both_ends) const noexcept;
   int balance_pass(int n, BatchScratch& s, bool both_ends) const noexcept;
-  void leave_out_far(int n, BatchScratch& s) const noexcept;
+  void leave_out_incomplete(int n, BatchScratch& s) const noexcept;
   int selective_pass(int n, BatchScratch& s, int ends, GroupEnergy* energy) const noexcept;
   int mapped_pass(int n, BatchScratch& s, int ends) const noexcept;
   int once_pass(int n, BatchScratch& s, int ends, std::size_t law, const double* counted) const noexcept;
@@ -261,10 +261,10 @@ struct Pass {
   /// The lanes of a batch after an evaluation with Work::sample; their far ends in s.far, -1 where evaluation points belong to
   /// points. both_ends: sums of far ends, too.
   void add_samples(int n, const BatchScratch& s, bool both_ends = false);
-  /// Evaluation points are taken one by one and nothing is scattered.
-  bool alone() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
+  /// The pass reads stresses and energies, point by point, and adds nothing to forces.
+  bool gathers_only() const noexcept { return work.work() == Work::sample || (work.balance() && work.balance()->factors); }
   /// Every block has something to do, whether its points move or not.
-  bool everywhere() const noexcept { return only || alone() || work.samples() || work.tangent() || work.balance(); }
+  bool everywhere() const noexcept { return only || gathers_only() || work.samples() || work.tangent() || work.balance(); }
   bool wanted(std::int64_t point) const noexcept { return !only || marked(only, static_cast<std::size_t>(point)); }
   bool gradient_wanted(std::int64_t point) const noexcept { return !near || marked(near, static_cast<std::size_t>(point)); }
   /// Of any of the eight points from here on.

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "families/bonds.hpp"
 #include "perikit/core/field.hpp"
 #include "perikit/core/parallel.hpp"
-#include "perikit/families/bonds.hpp"
 
 namespace perikit {
 

@@ -1,4 +1,4 @@
-#include "perikit/operators/report.hpp"
+#include "operators/report.hpp"
 
 #include <fmt/format.h>
 

@@ -2,9 +2,9 @@
 
 #include <numeric>
 
+#include "output/recorder.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 namespace perikit {
 

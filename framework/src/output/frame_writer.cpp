@@ -9,10 +9,10 @@
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
+#include "output/recorder.hpp"
 #include "output/result_file.hpp"
 #include "output/xdmf.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 namespace perikit {
 

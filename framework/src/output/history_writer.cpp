@@ -9,8 +9,8 @@
 #include <iterator>
 
 #include "files/atomic_file.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 namespace perikit {
 

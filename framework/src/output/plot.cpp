@@ -1,4 +1,4 @@
-#include "perikit/output/plot.hpp"
+#include "output/plot.hpp"
 
 #include <fmt/format.h>
 
@@ -15,8 +15,8 @@
 #include "output/picture/field_values.hpp"
 #include "output/picture/gnuplot.hpp"
 #include "output/result_file.hpp"
+#include "output_fields/point_field.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/fields/point_field.hpp"
 
 namespace perikit {
 

@@ -1,4 +1,4 @@
-#include "perikit/plugin/registry.hpp"
+#include "plugin/registry.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,9 +11,9 @@
 #include <set>
 #include <sstream>
 
+#include "model/kinematics_class.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/sdk/plugin.hpp"
-#include "model/kinematics_class.hpp"
 #include "plugin/library.hpp"
 #include "plugin/manifest.hpp"
 #include "plugin/registrar.hpp"

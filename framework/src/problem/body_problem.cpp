@@ -1,4 +1,4 @@
-#include "perikit/problem/body_problem.hpp"
+#include "problem/body_problem.hpp"
 
 #include <fmt/format.h>
 
@@ -6,26 +6,26 @@
 #include <limits>
 
 #include "core/fingerprint.hpp"
-#include "core/following_arrival.hpp"
+#include "core/ranks/dependent_arrival.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
 #include "problem/crossed_faces.hpp"
 #include "problem/history_record.hpp"
+#include "problem/loose/loose_points.hpp"
+#include "problem/loose/weak_springs.hpp"
 #include "problem/near_bonds.hpp"
-#include "problem/loose_points.hpp"
 #include "problem/snapshot.hpp"
-#include "problem/weak_springs.hpp"
 
 namespace perikit {
 
 namespace {
 
 /// Images follow their sources, some of which are ghosts.
-class Extension final : public FollowingArrival {
+class Extension final : public DependentArrival {
  public:
-  Extension(Arrival& ghosts, const ImageMap& images, FieldView u) : FollowingArrival(&ghosts), images_(images), u_(u) {}
+  Extension(Arrival& ghosts, const ImageMap& images, FieldView u) : DependentArrival(&ghosts), images_(images), u_(u) {}
 
  private:
   void put() override { images_.extend(u_); }

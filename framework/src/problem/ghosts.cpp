@@ -1,4 +1,4 @@
-#include "perikit/problem/ghosts.hpp"
+#include "problem/ghosts.hpp"
 
 #include <chrono>
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/merged_rows.hpp"
+#include "core/ranks/merged_rows.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "perikit/operators/law_history.hpp"
-#include "perikit/terms/terms.hpp"
+#include "operators/law_history.hpp"
 #include "problem/snapshot.hpp"
+#include "terms/terms.hpp"
 
 namespace perikit {
 

@@ -4,12 +4,13 @@
 #include <array>
 #include <cmath>
 
-#include "families/cloud_families.hpp"
-#include "families/lattice_families.hpp"
+#include "body/family_limit.hpp"
+#include "families/cloud/cloud_families.hpp"
+#include "families/lattice/lattice_families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/simd.hpp"
-#include "perikit/problem/body_problem.hpp"
+#include "problem/body_problem.hpp"
 
 namespace perikit {
 
@@ -30,7 +31,7 @@ NearBonds::NearBonds(const Families& families) : families_(families) {
   const Body& body = families.body();
   // Bonds between points of other ranks are theirs, too, and images have no displacement of their own.
   all_intact_ = !families.fails() && families.cut() == 0 && body.owned().size() == body.internal().size();
-  const double reach = std::min(neighbours_within * body.spacing(), body.horizon() * (1 + 1e-9));
+  const double reach = std::min(neighbours_within * body.spacing(), search_radius(body.horizon()));
   if (families.lattice()) {
     const int d = body.dimension();
     for (int c = d > 2 ? -1 : 0; c <= (d > 2 ? 1 : 0); ++c)

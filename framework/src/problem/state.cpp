@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/numbered_rows.hpp"
+#include "core/ranks/numbered_rows.hpp"
 #include "perikit/core/errors.hpp"
 #include "problem/snapshot.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "body/near_ranks.hpp"
+#include "body/partition/near_ranks.hpp"
 
 namespace perikit {
 

@@ -1,7 +1,7 @@
 #include "perikit/problem/volumetric_part.hpp"
 
 #include "assembly/volumetric_rows.hpp"
-#include "perikit/problem/body_problem.hpp"
+#include "problem/body_problem.hpp"
 
 namespace perikit {
 

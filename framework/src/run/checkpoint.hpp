@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "perikit/run/simulation.hpp"
 #include "problem/snapshot.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

@@ -1,8 +1,8 @@
 #pragma once
 #include <string>
 
-#include "perikit/problem/body_problem.hpp"
-#include "perikit/scene/scene.hpp"
+#include "problem/body_problem.hpp"
+#include "scene/scene.hpp"
 
 namespace perikit {
 

@@ -10,7 +10,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/warnings.hpp"
 #include "perikit/problem/motion.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

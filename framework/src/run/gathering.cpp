@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "core/merged_rows.hpp"
+#include "core/ranks/merged_rows.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {

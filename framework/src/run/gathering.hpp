@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "perikit/problem/body_problem.hpp"
+#include "problem/body_problem.hpp"
 
 namespace perikit {
 

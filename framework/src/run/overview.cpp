@@ -8,7 +8,7 @@
 #include <map>
 
 #include "perikit/body/lattice.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

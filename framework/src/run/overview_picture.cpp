@@ -7,8 +7,8 @@
 
 #include "output/picture/body_picture.hpp"
 #include "output/picture/gnuplot.hpp"
-#include "perikit/output/plot.hpp"
-#include "perikit/run/simulation.hpp"
+#include "output/plot.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

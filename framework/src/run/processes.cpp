@@ -10,7 +10,7 @@
 #include <cstring>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

@@ -11,22 +11,22 @@
 #include <sstream>
 
 #include "core/fingerprint.hpp"
+#include "core/ranks/messages.hpp"
 #include "files/atomic_file.hpp"
 #include "files/shared_file.hpp"
 #include "output/history_file.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/communicator.hpp"
-#include "perikit/core/messages.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "perikit/core/warnings.hpp"
-#include "perikit/run/simulation.hpp"
 #include "problem/snapshot.hpp"
 #include "run/checkpoint.hpp"
+#include "run/gathered_reference_configuration.hpp"
 #include "run/gathering.hpp"
 #include "run/reduction.hpp"
 #include "run/run_folder.hpp"
-#include "run/small_strains.hpp"
-#include "run/whole_reference.hpp"
+#include "run/simulation.hpp"
+#include "warnings/small_strains.hpp"
 
 namespace perikit {
 
@@ -101,7 +101,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
   columns_ = perikit::history_columns(scene, simulation.problem().laws().dissipates());
-  WholeReference reference(simulation.problem());
+  GatheredReferenceConfiguration reference(simulation.problem());
   reference.use([&](const ReferenceData& data) { body_ = body_fingerprint(data); });
   if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
   const bool earlier = communicator().largest(first_ && start == RunStart::resume && std::filesystem::exists(checkpoint_file(folder_)) ? 1 : 0) > 0;

@@ -1,9 +1,9 @@
 #pragma once
 /// What a history column says of a set of points.
 
-#include "perikit/fields/point_fields.hpp"
-#include "perikit/problem/body_problem.hpp"
-#include "perikit/scene/scene.hpp"
+#include "output_fields/point_fields.hpp"
+#include "problem/body_problem.hpp"
+#include "scene/scene.hpp"
 
 namespace perikit {
 

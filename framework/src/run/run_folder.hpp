@@ -1,8 +1,8 @@
 #pragma once
 /// What a run finds in its folder, and may do to it.
 
-#include "perikit/run/simulation.hpp"
 #include "run/output_folder.hpp"
+#include "run/simulation.hpp"
 
 namespace perikit {
 

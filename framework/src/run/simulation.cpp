@@ -1,4 +1,4 @@
-#include "perikit/run/simulation.hpp"
+#include "run/simulation.hpp"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,14 @@
 #include <span>
 #include <string_view>
 
-#include "perikit/build/problem.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/memory.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/warnings.hpp"
-#include "run/doubts.hpp"
 #include "run/earlier_results.hpp"
-#include "run/small_strains.hpp"
+#include "setup/problem.hpp"
+#include "warnings/doubts.hpp"
+#include "warnings/small_strains.hpp"
 
 namespace perikit {
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 
 namespace perikit {
 

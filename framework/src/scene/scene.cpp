@@ -1,4 +1,4 @@
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "files/toml_limits.hpp"
-#include "scene/overrides.hpp"
 #include "scene/scene_reader.hpp"
+#include "scene/toml/overrides.hpp"
 
 namespace perikit {
 

@@ -6,7 +6,7 @@
 #include "scene/geometry_checks.hpp"
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
-#include "scene/toml_text.hpp"
+#include "scene/toml/toml_text.hpp"
 
 namespace perikit {
 

@@ -7,7 +7,7 @@
 
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
-#include "scene/toml_text.hpp"
+#include "scene/toml/toml_text.hpp"
 
 namespace perikit {
 

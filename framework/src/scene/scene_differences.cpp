@@ -7,8 +7,8 @@
 #include <toml++/toml.h>
 
 #include "scene/scene_differences.hpp"
-#include "scene/toml_reader.hpp"
-#include "scene/toml_text.hpp"
+#include "scene/toml/toml_reader.hpp"
+#include "scene/toml/toml_text.hpp"
 
 namespace perikit {
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "perikit/fields/point_field.hpp"
+#include "output_fields/point_field.hpp"
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
-#include "scene/toml_text.hpp"
+#include "scene/toml/toml_text.hpp"
 
 namespace perikit {
 

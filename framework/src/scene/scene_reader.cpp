@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cctype>
 
+#include "model/formulation.hpp"
 #include "perikit/core/warnings.hpp"
-#include "perikit/model/formulation.hpp"
-#include "scene/expression_names.hpp"
+#include "scene/expressions/expression_names.hpp"
 #include "scene/sections.hpp"
-#include "scene/toml_text.hpp"
+#include "scene/toml/toml_text.hpp"
 #include "terms/failure_energy.hpp"
 
 namespace perikit {

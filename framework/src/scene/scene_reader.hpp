@@ -3,9 +3,9 @@
 
 #include <set>
 
-#include "perikit/scene/scene.hpp"
-#include "scene/resolved.hpp"
-#include "scene/toml_reader.hpp"
+#include "scene/scene.hpp"
+#include "scene/toml/resolved.hpp"
+#include "scene/toml/toml_reader.hpp"
 
 namespace perikit {
 

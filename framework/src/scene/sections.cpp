@@ -1,8 +1,8 @@
 #include "scene/sections.hpp"
 
+#include "output_fields/point_field.hpp"
 #include "perikit/core/warnings.hpp"
-#include "perikit/fields/point_field.hpp"
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 
 namespace perikit {
 

@@ -11,11 +11,11 @@
 #include <span>
 
 #include "families/families.hpp"
-#include "families/quiet_blocks.hpp"
+#include "families/resting_blocks.hpp"
+#include "model/formulation.hpp"
 #include "operators/batch.hpp"
 #include "operators/point_flux.hpp"
-#include "perikit/model/formulation.hpp"
-#include "perikit/operators/report.hpp"
+#include "operators/report.hpp"
 
 namespace perikit {
 
@@ -48,10 +48,10 @@ class EvaluationSpace {
   virtual void report(ModelReport& report) const = 0;
   /// The history of laws was replaced.
   void history_restored() { quiet_.stay_awake(); }
-  QuietCounts quiet_counts() const noexcept { return quiet_.counts(); }
+  RestingCounts resting_counts() const noexcept { return quiet_.counts(); }
 
  protected:
-  QuietBlocks quiet_;
+  RestingBlocks quiet_;
 };
 
 /// What a space is made of. All but the kinematics must outlive it.
@@ -68,7 +68,7 @@ struct SpaceParts {
   bool history() const noexcept { return laws.state_components() > 0; }
   /// Evaluation points need numbers.
   bool numbered() const noexcept { return history() || interfaces; }
-  QuietBlocks quiet_blocks(const BlockReach& reach) const { return skip ? QuietBlocks(reach, history()) : QuietBlocks(); }
+  RestingBlocks quiet_blocks(const BlockReach& reach) const { return skip ? RestingBlocks(reach, history()) : RestingBlocks(); }
 };
 
 /// The space of these parts on a body of D dimensions.

@@ -1,8 +1,8 @@
-#include "spaces/cloud_bonds.hpp"
-#include "spaces/cloud_points.hpp"
-#include "spaces/lattice_bonds.hpp"
-#include "spaces/lattice_points.hpp"
-#include "spaces/weighted.hpp"
+#include "spaces/cloud/cloud_bonds.hpp"
+#include "spaces/cloud/cloud_points.hpp"
+#include "spaces/lattice/lattice_bonds.hpp"
+#include "spaces/lattice/lattice_points.hpp"
+#include "spaces/weighted/weighted.hpp"
 
 namespace perikit {
 

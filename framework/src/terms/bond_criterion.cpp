@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "families/cloud_families.hpp"
+#include "families/cloud/cloud_families.hpp"
 #include "perikit/core/parallel.hpp"
-#include "terms/energy_shares.hpp"
+#include "terms/bond_energy_split.hpp"
 
 namespace perikit {
 

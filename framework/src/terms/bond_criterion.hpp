@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "families/bond_finder.hpp"
 #include "families/families.hpp"
+#include "families/fracture/bond_finder.hpp"
+#include "model/formulation.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/bond_screen.hpp"
-#include "perikit/model/formulation.hpp"
 #include "terms/bond_release.hpp"
 #include "terms/term.hpp"
 

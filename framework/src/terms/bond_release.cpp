@@ -3,19 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "families/cloud_families.hpp"
-#include "families/lattice_families.hpp"
+#include "cloud_balance/shift.hpp"
+#include "core/dimension.hpp"
+#include "families/cloud/cloud_families.hpp"
+#include "families/lattice/lattice_families.hpp"
 #include "families/reproducing_kernel.hpp"
 #include "families/shape_tensor.hpp"
 #include "maps/selective_map.hpp"
-#include "perikit/core/dimension.hpp"
 #include "perikit/core/parallel.hpp"
 #include "spaces/bond_ends.hpp"
-#include "spaces/local_stencil.hpp"
-#include "spaces/shift.hpp"
-#include "spaces/stencil_shift.hpp"
+#include "spaces/weighted/local_stencil.hpp"
+#include "spaces/weighted/stencil_shift.hpp"
 #include "terms/family_point.hpp"
-#include "terms/penalty_matrix.hpp"
+#include "terms/penalty/penalty_matrix.hpp"
 
 namespace perikit {
 
@@ -363,7 +363,7 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
 
 template <int D>
 void BondRelease::release_shares(Owner& owner, const BondSamples& samples, const Memory& m, double* S) const {
-  const double left = parts_.families.left(static_cast<std::size_t>(owner.point));
+  const double left = parts_.families.remaining_influence(static_cast<std::size_t>(owner.point));
   double pressure = 0, by_share = 0;
   EntriesOf entries(samples, owner.point);
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
@@ -389,7 +389,7 @@ void BondRelease::release_volume(Owner& owner, double pressure, double by_share,
   for (std::size_t k = 0; k < owner.far.size(); ++k) influence += m.family.omega[k] * m.family.volume[k];
   if (!std::isfinite(parts_.families.condition(p)) || !(influence > 0)) return;
   for (std::size_t k = 0; k < owner.far.size(); ++k)
-    owner.released[k] += by_share * m.family.whole_omega(k) * m.family.volume[k] * parts_.families.left(p) / influence;
+    owner.released[k] += by_share * m.family.whole_omega(k) * m.family.volume[k] * parts_.families.remaining_influence(p) / influence;
 }
 
 /// Corrections that follow from the shape tensor and the influence of the bonds.

@@ -13,11 +13,11 @@
 #include <span>
 #include <vector>
 
+#include "families/bonds.hpp"
 #include "families/families.hpp"
+#include "model/formulation.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/point_flux.hpp"
-#include "perikit/families/bonds.hpp"
-#include "perikit/model/formulation.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
 

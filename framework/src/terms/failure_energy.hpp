@@ -1,7 +1,7 @@
 #pragma once
 /// Whether bonds that fail create energy under a formulation (framework/docs/fracture.md, "Every kinematics and kernel").
 
-#include "perikit/model/formulation.hpp"
+#include "model/formulation.hpp"
 
 namespace perikit {
 

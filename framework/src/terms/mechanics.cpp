@@ -7,7 +7,7 @@
 
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
-#include "perikit/core/dimension.hpp"
+#include "core/dimension.hpp"
 
 namespace perikit {
 
@@ -257,7 +257,7 @@ std::int64_t Mechanics::add_forces_and_samples(ConstFieldView u, FieldView force
   return bad;
 }
 
-int Mechanics::steps() const noexcept {
+int Mechanics::coupling_reach() const noexcept {
   return parts_.formulation.bond && parts_.formulation.far_share > 0 ? 3 : 2;
 }
 
@@ -280,7 +280,7 @@ std::int64_t Mechanics::stiffness_near_laminates(ConstFieldView u, FieldView sti
   space_->run(pass);
   for (const std::int32_t index : body.owned()) {
     const auto p = static_cast<std::size_t>(index);
-    const double share = parts_.families.left(p);
+    const double share = parts_.families.remaining_influence(p);
     if (laminates_->near(index) && stiffness.data[p] > 0) stiffness.data[p] = share * share * sums.data()[p];
   }
   return pass.bad;

@@ -1,7 +1,7 @@
 #pragma once
 #include "assembly/volumetric_rows.hpp"
-#include "perikit/operators/law_history.hpp"
-#include "spaces/consistency.hpp"
+#include "cloud_balance/consistency.hpp"
+#include "operators/law_history.hpp"
 #include "spaces/evaluation_space.hpp"
 #include "terms/term.hpp"
 
@@ -27,7 +27,7 @@ class Mechanics final : public Term {
     return tangent_of(u, w, Kw, nullptr, nullptr);
   }
   std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override;
-  int steps() const noexcept override;
+  int coupling_reach() const noexcept override;
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
   std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                              ExactSum* energy) override;
@@ -47,7 +47,7 @@ class Mechanics final : public Term {
     return true;
   }
   void report(ModelReport& report) const override;
-  QuietCounts quiet_counts() const noexcept override { return space_->quiet_counts(); }
+  RestingCounts resting_counts() const noexcept override { return space_->resting_counts(); }
 
   /// Of the laws; null where none has one.
   LawHistory* history() noexcept { return history_.get(); }

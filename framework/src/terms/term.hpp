@@ -7,14 +7,14 @@
 
 #include "assembly/assembly.hpp"
 #include "families/families.hpp"
+#include "families/resting_counts.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/point_flux.hpp"
+#include "operators/report.hpp"
+#include "operators/samples.hpp"
 #include "perikit/core/exact_sum.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/point_motion.hpp"
-#include "perikit/families/quiet_counts.hpp"
-#include "perikit/operators/report.hpp"
-#include "perikit/operators/samples.hpp"
 
 namespace perikit {
 
@@ -43,15 +43,15 @@ class Term {
   /// Adds to the energy density, and sets what else it knows.
   virtual std::int64_t add_samples(ConstFieldView u, PointSamples& samples) = 0;
 
-  /// Rows of the tangent that it couples are at most so many bonds apart.
-  virtual int steps() const noexcept = 0;
+  /// The tangent couples two points only where a chain of at most so many bonds joins them.
+  virtual int coupling_reach() const noexcept = 0;
   /// The rows outlive the assembly.
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
 
   // Where bonds fail.
-  /// force += the forces of the evaluation points that belong to the points `only`, and of some others, the same ones whichever
-  /// bonds are left. `near`: those points and everything in their families. On points whose families of order steps() - 1, and at
-  /// least 1, lie in `only`, all that add_forces adds, bit for bit.
+  /// Evaluates the evaluation points of the points `only`, and the same few others whichever bonds have failed. `near`: those points and everything in
+  /// their families. Forces are complete, and bit for bit those of add_forces, at points all of whose evaluation points lie in `only`: those with a whole
+  /// neighbourhood of max(coupling_reach() - 1, 1) families there. Elsewhere they are partial sums, which callers ignore.
   /// *energy += their E, of what this rank owns [J], where wanted.
   virtual std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
                                      ExactSum* energy) = 0;
@@ -79,7 +79,7 @@ class Term {
 
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
-  virtual QuietCounts quiet_counts() const noexcept = 0;
+  virtual RestingCounts resting_counts() const noexcept = 0;
 };
 
 /// What a term sums up by group of eight points [J], of which each is one rank's.

@@ -1,4 +1,4 @@
-#include "perikit/terms/terms.hpp"
+#include "terms/terms.hpp"
 
 #include <fmt/format.h>
 
@@ -9,18 +9,18 @@
 
 #include "assembly/block_pattern.hpp"
 #include "body/interfaces.hpp"
-#include "families/fracture.hpp"
-#include "families/lattice_families.hpp"
-#include "families/shared_bonds.hpp"
+#include "cloud_balance/consistency.hpp"
+#include "families/fracture/fracture.hpp"
+#include "families/fracture/shared_bonds.hpp"
+#include "families/lattice/lattice_families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/warnings.hpp"
-#include "spaces/consistency.hpp"
 #include "terms/bond_criterion.hpp"
 #include "terms/failure_energy.hpp"
 #include "terms/mechanics.hpp"
-#include "terms/pair_forces.hpp"
-#include "terms/zero_energy_penalty.hpp"
+#include "terms/pairs/pair_forces.hpp"
+#include "terms/penalty/zero_energy_penalty.hpp"
 
 namespace perikit {
 
@@ -199,7 +199,7 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
   const Families& families = *parts_.families;
   const Body& body = families.body();
   int steps = 1;
-  for (const auto& term : terms_) steps = std::max(steps, term->steps());
+  for (const auto& term : terms_) steps = std::max(steps, term->coupling_reach());
   const auto around = [&](GroupMarks marks, int times) {
     for (int k = 0; k < times; ++k) marks = families.around(marks);
     return marks;
@@ -246,7 +246,7 @@ constexpr double enough_left = 0.4, round_enough = 4.0;
 bool may_be_stiff(const TermParts& parts, std::size_t p) {
   const Formulation& f = parts.formulation;
   if (f.weighted || f.order > 1) return true;   // parts of the family and moments of higher order degenerate before the shape tensor does
-  return !(parts.families->left(p) > enough_left && parts.families->condition(p) < round_enough);
+  return !(parts.families->remaining_influence(p) > enough_left && parts.families->condition(p) < round_enough);
 }
 
 }  // namespace
@@ -266,7 +266,7 @@ GroupRings Terms::near_failed_bonds() const {
     if (rings.inside[p]) points.push_back(static_cast<std::int32_t>(p));
   rings.only = families.marks_of(points);
   int steps = 2;
-  for (const auto& term : terms_) steps = std::max(steps, term->steps());
+  for (const auto& term : terms_) steps = std::max(steps, term->coupling_reach());
   for (int k = 1; k < steps; ++k) rings.only = families.around(rings.only);
   rings.near = families.around(rings.only);
   return rings;
@@ -294,7 +294,7 @@ Terms::Assemblies& Terms::assemblies() {
     assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});
     for (const auto& term : terms_) {
       assemblies_->all.push_back(term->make_assembly(assemblies_->rows));
-      assemblies_->steps = std::max(assemblies_->steps, term->steps());
+      assemblies_->steps = std::max(assemblies_->steps, term->coupling_reach());
     }
   }
   return *assemblies_;
@@ -328,10 +328,10 @@ Field Terms::shape_tensor_condition() const {
 
 Field Terms::damage() const { return damage_field(*parts_.families); }
 
-QuietCounts Terms::quiet_counts() const {
-  QuietCounts counts;
+RestingCounts Terms::resting_counts() const {
+  RestingCounts counts;
   for (const auto& term : terms_) {
-    const QuietCounts of_term = term->quiet_counts();
+    const RestingCounts of_term = term->resting_counts();
     counts.blocks += of_term.blocks;
     counts.quiet += of_term.quiet;
   }
@@ -363,7 +363,7 @@ BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepIns
 
 bool Terms::settling() const noexcept { return failing_ && failing_->fracture.settling(); }
 
-void Terms::leave_forecasts(bool to_others) { failing_->fracture.leave_forecasts(to_others); }
+void Terms::let_others_forecast(bool to_others) { failing_->fracture.let_others_forecast(to_others); }
 
 EvaluationStatus Terms::weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force) {
   if (failing_->fracture.add_weakening(u, w, force, failing_->body(*this))) return {};

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 #include "unit/fake_catalogue.hpp"
 
 namespace perikit::app {

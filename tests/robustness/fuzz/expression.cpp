@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "perikit/scene/expression.hpp"
+#include "scene/expressions/expression.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
   using namespace perikit;

@@ -2,10 +2,10 @@
 
 #include <cmath>
 
+#include "body/points/point_file.hpp"
 #include "file.hpp"
-#include "perikit/body/point_file.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
   using namespace perikit;

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "body/points/point_file.hpp"
 #include "file.hpp"
-#include "perikit/body/point_file.hpp"
 #include "perikit/core/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "perikit/scene/scene.hpp"
+#include "scene/scene.hpp"
 #include "unit/fake_catalogue.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

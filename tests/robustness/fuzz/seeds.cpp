@@ -5,7 +5,7 @@
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
-#include "perikit/output/recorder.hpp"
+#include "output/recorder.hpp"
 #include "run/checkpoint.hpp"
 
 using namespace perikit;

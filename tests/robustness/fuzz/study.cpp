@@ -2,7 +2,7 @@
 
 #include "file.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/run/study.hpp"
+#include "study/study.hpp"
 #include "unit/fake_catalogue.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

@@ -3,11 +3,13 @@
 /// points. A kinematics states its *stencil*; the engine applies it and its exact adjoint, so that force = -dE/du, the tangent and the
 /// momentum balances hold for every formulation without further code. A library implements one of four small classes:
 ///
+// clang-format off
 ///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
-///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0 or 1/2
-///   (projection, baqp) or any other share WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k)
-///   K_q^-1 (non_spherical, sub_horizon, ...) PairKinematics      no gradients and no material evaluations: central forces along
-///   the bonds (bond_based, ordinary)
+///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0, 1/2
+///                       (projection, baqp) or any other share
+///   WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1 (non_spherical, sub_horizon, ...)
+///   PairKinematics      no gradients and no material evaluations: central forces along the bonds (bond_based, ordinary)
+// clang-format on
 ///
 /// or puts a map of the gradients over one with evaluation points at bonds or parts of families: MappedKinematics (selective).
 ///

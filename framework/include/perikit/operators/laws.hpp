@@ -24,7 +24,7 @@ struct MaterialRecord {
   double density = 0;                    ///< [kg/m^3]; 0: not given. Where it varies, see `densities`
   AlignedVector<double> densities;       ///< by point; empty where uniform
   bool silent = false;                   ///< stores nothing: of ghosts and images. At most two, the last
-  bool far = false;                      ///< of points whose families are incomplete on this rank: their bonds store nothing either
+  bool incomplete = false;               ///< of points whose families are incomplete on this rank: their bonds store nothing either
 };
 
 /// Memory for the pieces of mixed batches; one per thread.
@@ -81,9 +81,9 @@ class Laws {
   bool same(std::size_t p, std::size_t q) const noexcept {
     return ids_.empty() ? records_[0].uniform : ids_[p] == ids_[q] && records_[ids_[p]].uniform;
   }
-  /// Some points are `far`, and whether this one is.
-  bool any_far() const noexcept { return records_.back().far; }
-  bool far(std::size_t p) const noexcept { return ids_[p] + std::size_t{1} == records_.size(); }
+  /// True if this rank stores points whose families are incomplete, and if this one is: their bonds store no energy here.
+  bool has_incomplete_points() const noexcept { return records_.back().incomplete; }
+  bool incomplete(std::size_t p) const noexcept { return ids_[p] + std::size_t{1} == records_.size(); }
   std::size_t id_of(std::size_t p) const noexcept { return ids_.empty() ? 0 : ids_[p]; }
   const MaterialRecord& record_of(std::size_t p) const noexcept { return records_[id_of(p)]; }
   const std::vector<MaterialRecord>& records() const noexcept { return records_; }

@@ -7,7 +7,7 @@
 
 #include "output/picture/field_values.hpp"
 #include "perikit/core/errors.hpp"
-#include "scene/toml_reader.hpp"
+#include "scene/toml/toml_reader.hpp"
 
 namespace perikit {
 

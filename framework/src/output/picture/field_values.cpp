@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "output_fields/point_field.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/fields/point_field.hpp"
 
 namespace perikit {
 

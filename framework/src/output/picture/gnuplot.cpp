@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "files/atomic_file.hpp"
+#include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
-#include "perikit/output/recorder.hpp"
 
 namespace perikit {
 

@@ -1,0 +1,36 @@
+#pragma once
+/// Finds the bonds that a criterion lets fail.
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "families/bonds.hpp"
+#include "families/family_arrays.hpp"
+#include "perikit/body/body.hpp"
+#include "perikit/core/field.hpp"
+
+namespace perikit {
+
+class BondFinder {
+ public:
+  virtual ~BondFinder() = default;
+  /// Bonds whose integrity is lower at u than it is now, in a fixed order. To be called in every step.
+  virtual std::vector<BondChange> find(ConstFieldView u) = 0;
+  /// values[k] <- what the criterion compares with the limits of bonds[k], which are as they are now. u: any displacement; with
+  /// the very field of the last `find`, unchanged since, they are known.
+  virtual void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) = 0;
+  /// Forgets what it knows of bonds that are far from failing: bonds were restored.
+  virtual void forget() noexcept = 0;
+  /// Groups of eight points that could be looked at in each step, and how many were in all of them.
+  virtual std::size_t groups() const noexcept = 0;
+  virtual std::size_t checked() const noexcept = 0;
+  virtual std::size_t bytes() const noexcept = 0;
+};
+
+/// The stretch of a bond of a body at u.
+double bond_stretch(const Body& body, ConstFieldView u, BondId bond) noexcept;
+/// The same of bond k in the family of a point; equal bits from both ends.
+double bond_stretch(const FamilyArrays& family, std::size_t k, std::size_t point, ConstFieldView u) noexcept;
+
+}  // namespace perikit

@@ -1,0 +1,85 @@
+#include "families/fracture/bond_monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perikit {
+
+double bond_stretch(const Body& body, ConstFieldView u, BondId bond) noexcept {
+  const auto p = static_cast<std::size_t>(bond.point), q = static_cast<std::size_t>(bond.far);
+  const Point x = body.position(p), y = body.position(q);
+  double square = 0, change = 0;  // as in Stretch: e = (|y|^2 - |xi|^2)/(|y| + |xi|)
+  for (int c = 0; c < u.components; ++c) {
+    const double xi = y[static_cast<std::size_t>(c)] - x[static_cast<std::size_t>(c)], du = u.component(c)[q] - u.component(c)[p];
+    square += xi * xi;
+    change += du * (xi + xi + du);
+  }
+  const double length = std::sqrt(square);
+  return change / (std::sqrt(square + change) + length) / length;
+}
+
+double bond_stretch(const FamilyArrays& family, std::size_t k, std::size_t point, ConstFieldView u) noexcept {
+  const auto far = static_cast<std::size_t>(family.far[k]);
+  double change = 0;
+  for (int c = 0; c < u.components; ++c) {
+    const double xi = family.xi[c][k], du = u.component(c)[far] - u.component(c)[point];
+    change += du * (xi + xi + du);
+  }
+  const double length = family.length[k];
+  return change / (std::sqrt(length * length + change) + length) / length;
+}
+
+void BondMonitor::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+  for (std::size_t k = 0; k < bonds.size(); ++k) values[k] = bond_stretch(body_, u, bonds[k]);
+}
+
+void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> cell_first) {
+  groups_ = std::move(groups);
+  cell_first_ = std::move(cell_first);
+  margin_.assign(groups_.size(), 0.0);
+  offset_.assign(groups_.size(), 0.0);
+  moved_.assign(cells(), 0.0);
+  found_.resize(cells());
+  checks_.assign(cells(), 0);
+}
+
+std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
+  const bool known = begin(u) && skip_, all_groups = !skip_ || (renew_ && !known);
+  if (all_groups) {
+    std::copy_n(u.data, u.size(), reference_.data());
+    std::fill(moved_.begin(), moved_.end(), 0.0);
+  } else if (!known) {
+    bound_motion(u, moved_);
+  }
+  over_cells([&](std::size_t c) {
+    checks_[c] = 0;
+    for (std::size_t g = cell_first_[c]; g < cell_first_[c + 1]; ++g) {
+      // Margins are used up a little early: rounding must never hide a bond. What is not a number is checked.
+      if (known ? !near_failure(groups_[g]) : !all_groups && (moved_[c] + offset_[g]) * (1 + 1e-9) < margin_[g]) continue;
+      const double margin = check(groups_[g], u, found_[c]);
+      ++checks_[c];
+      if (known) continue;  // margins of earlier checks hold on
+      margin_[g] = margin;
+      offset_[g] = moved_[c];
+    }
+  });
+  std::size_t checks = 0;
+  std::vector<BondChange> all;
+  for (std::size_t c = 0; c < cells(); ++c) {
+    checks += checks_[c];
+    all.insert(all.end(), found_[c].begin(), found_[c].end());
+    found_[c].clear();
+  }
+  checked_ += checks;
+  if (known) return all;
+  since_ = all_groups ? 0 : since_ + checks;
+  renew_ = since_ >= groups_.size();
+  return all;
+}
+
+std::size_t BondMonitor::bytes() const noexcept {
+  return reference_.bytes() + groups_.size() * (sizeof(Group) + 2 * sizeof(double)) +
+         cells() * (3 * sizeof(std::size_t) + sizeof(found_[0]));
+}
+
+}  // namespace perikit

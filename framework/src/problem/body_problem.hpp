@@ -1,0 +1,178 @@
+#pragma once
+/// The Problem of one body: its families, its terms, and what holds and loads it.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "body/partition/partition.hpp"
+#include "operators/samples.hpp"
+#include "perikit/problem/problem.hpp"
+#include "problem/fracture/fracture_record.hpp"
+#include "problem/ghosts.hpp"
+
+namespace perikit {
+
+class ByteReader;
+class Companion;
+class Families;
+class NearBonds;
+class WeakSprings;
+
+/// Everything behind the operations of a problem; later members refer to earlier ones.
+struct ProblemParts {
+  ProblemParts();
+  ProblemParts(ProblemParts&&) noexcept;
+  ~ProblemParts();
+  std::unique_ptr<Partition> partition;         ///< null where one rank has the whole body
+  std::unique_ptr<const Body> body;             ///< of this rank, with the images of its points
+  std::unique_ptr<const ImageMap> images;       ///< null without
+  std::unique_ptr<Laws> laws;
+  std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
+  FractureRecord fracture;
+  std::unique_ptr<Terms> terms;
+  std::string kinematics;                       ///< names, for messages
+  std::vector<std::string> materials;           ///< by material of the body
+  std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
+  std::vector<std::string> notes;               ///< where sides were found to lie
+};
+
+class BodyProblem final : public Problem {
+ public:
+  /// `values` are of the body and the laws of `parts`. Where the communicator has several ranks: of this rank's part of the body,
+  /// with fields that are zero at ghosts.
+  BodyProblem(ProblemParts parts, ProblemValues values);
+  ~BodyProblem() override;
+
+  void share(FieldView field) override;
+  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override {
+    return forces(nullptr, u, force, energy, time_step);
+  }
+  EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) override {
+    return forces(&motion, u, force, energy, time_step);
+  }
+  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override;
+  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
+  AssembledSize assembled_size() override;
+  void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override;
+  std::unique_ptr<VolumetricPart> volumetric_part() override;
+  /// Of the present state.
+  EvaluationStatus sample(PointSamples& samples);
+  /// The next evaluation of forces takes these samples along where it can, for a `sample` of the same displacements that asks for the same: most
+  /// of what either does is what the other does, too.
+  void sample_along(Sampling asked) noexcept { along_ = asked; }
+  bool constant_stiffness() const noexcept override;
+  bool advance(double time_step, FieldView velocity = {}) override;
+  std::int64_t failed_bonds() const override;
+  std::unique_ptr<WeakeningBonds> weakening_bonds() override;
+  std::unique_ptr<DamagedPart> damaged_part() override;
+  StretchRange stretches(ConstFieldView u) override;
+  std::vector<std::byte> bonds() const override;
+  void restore_bonds(std::span<const std::byte> bonds) override;
+
+  /// What a snapshot of another run of this body holds of its bonds and of the history of its laws: bonds that are not as they were at its
+  /// set-up, and numbers of history.
+  struct Carried {
+    std::size_t bonds = 0, history = 0;
+  };
+  static Carried carried_by(ByteReader& snapshot);
+  /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
+  void carry(ByteReader& snapshot);
+
+  /// Quasi-static runs: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
+  /// the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness. Returns what is
+  /// loose now, in words; empty: nothing. All ranks must call it.
+  std::string watch_pieces(double weak_springs);
+
+  /// Everything that a run continues from of this rank, as bytes; restore is bitwise. All ranks must call restore, which throws
+  /// InputError for what belongs to another problem.
+  std::vector<std::byte> snapshot() const;
+  void restore(std::span<const std::byte> bytes);
+  /// That of all ranks, on rank 0: begin(how many bytes), then next(some of them) until all are out. Nobody has all points of all
+  /// ranks at once, and any number of ranks may restore them. All ranks must call both.
+  void write_snapshot(const std::function<void(std::uint64_t size)>& begin,
+                      const std::function<void(std::span<const std::byte>)>& next) const;
+  void restore(ByteReader& in);
+
+  Terms& terms() noexcept { return *parts_.terms; }
+  const Terms& terms() const noexcept { return *parts_.terms; }
+  const Families& families() const noexcept { return *parts_.families; }
+  /// Null where one rank has the whole body.
+  const Partition* partition() const noexcept { return parts_.partition.get(); }
+  const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
+  std::string fracture_summary() const {
+    const Energies& e = values_.state.energies;
+    return parts_.fracture.summary(terms().bond_checks(), e.dissipated - e.dissipated_by_laws);
+  }
+  const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
+  /// Faces of cracks that have passed through each other, in words; empty: none. All ranks must call it.
+  std::string crossed_faces();
+  const std::vector<std::string>& notes() const noexcept { return parts_.notes; }
+  /// Bytes held by body, terms and state.
+  std::size_t bytes() const noexcept;
+
+ private:
+  class Damaged;
+  class Volumes;
+  class Weakening;
+
+  ProblemParts parts_;
+  ProblemValues values_;
+  std::optional<Ghosts> ghosts_;
+  /// A field as the terms see it, as long as this lives. Values of ghosts lie in the field itself meanwhile, and are zero again, as they
+  /// are in all fields of a problem, after it; none of an owner changes, so that a field that its caller may only read is taken as well.
+  class Seen {
+   public:
+    Seen(ConstFieldView field, const Ghosts* ghosts) : field_(field), ghosts_(ghosts) {}
+    Seen(const Seen&) = delete;
+    Seen& operator=(const Seen&) = delete;
+    ~Seen() {
+      if (ghosts_) ghosts_->clear(writable(field_));
+    }
+    operator ConstFieldView() const noexcept { return field_; }
+    static FieldView writable(ConstFieldView u) noexcept { return {const_cast<double*>(u.data), u.stride, u.components}; }
+
+   private:
+    ConstFieldView field_;
+    const Ghosts* ghosts_;   ///< null where there is nothing to clear
+  };
+
+  /// motion: of u; null: it is there.
+  EvaluationStatus forces(PointMotion* motion, ConstFieldView u, FieldView force, double* energy, double time_step);
+  /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
+  Seen seen(ConstFieldView u, Field& memory);
+  /// A field with the values of ghosts, without images.
+  Seen shared(ConstFieldView field);
+  /// Forces of the terms -> those of the problem: of images they go to where they belong, those on ghosts are nobody's.
+  void settle(FieldView force) const;
+  /// Ends an evaluation: one status for all ranks, and forces of the problem.
+  void finish(FieldView force, EvaluationStatus& status);
+  /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
+  template <class Fill>
+  void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
+
+  /// What evaluations of forces say of inadmissible deformation.
+  void describe(EvaluationStatus& status) const;
+  /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
+  void find_pieces(bool fresh);
+  /// See StepInside::act. since: of the end of the step [s].
+  double push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved);
+  /// Forces and strain energy become those of the bonds that are left, where the points are.
+  void renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
+
+  Field seen_, seen_direction_;
+  bool energy_wanted_ = false;   ///< by the last evaluation of forces
+  Sampling along_ = Sampling::nothing;   ///< with the next one
+  std::optional<PointSamples> kept_;     ///< with the last one
+  std::uint64_t kept_at_ = 0;            ///< fingerprint of their displacements
+  BlockMatrix tangent_of_terms_, companion_of_terms_;   ///< with images
+  std::unique_ptr<Companion> companion_;        ///< made when asked for
+  std::unique_ptr<NearBonds> near_bonds_;       ///< made when asked for
+  std::unique_ptr<WeakSprings> weak_springs_;   ///< null unless pieces are watched
+};
+
+}  // namespace perikit

@@ -1,0 +1,43 @@
+#include "perikit/problem/damaged_part.hpp"
+
+#include "perikit/core/communicator.hpp"
+#include "perikit/core/field_operations.hpp"
+#include "problem/body_problem.hpp"
+
+namespace perikit {
+
+class BodyProblem::Damaged final : public DamagedPart {
+ public:
+  /// whole: the part is the whole body, whatever the rings.
+  Damaged(BodyProblem& problem, GroupRings rings, bool whole) : problem_(problem), rings_(std::move(rings)), whole_(whole), inside_(problem.make_field()) {
+    for (const std::int32_t p : problem_.body().owned())
+      for (int c = 0; c < inside_.components(); ++c) inside_.component(c)[p] = whole || rings_.inside[static_cast<std::size_t>(p)] ? 1 : 0;
+  }
+
+  ConstFieldView inside() const override { return inside_; }
+
+  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    if (whole_) return problem_.tangent_action(u, w, Kw);
+    EvaluationStatus status =
+        problem_.terms().tangent_of(rings_, problem_.seen(u, problem_.seen_), problem_.seen(w, problem_.seen_direction_), Kw);
+    problem_.describe(status);
+    problem_.finish(Kw, status);
+    return status;
+  }
+
+ private:
+  BodyProblem& problem_;
+  GroupRings rings_;
+  bool whole_;
+  Field inside_;
+};
+
+std::unique_ptr<DamagedPart> BodyProblem::damaged_part() {
+  if (!parts_.fracture.damage()) return nullptr;
+  GroupRings rings = terms().near_failed_bonds();
+  if (communicator().largest(rings.inside.empty() ? 0 : 1) == 0) return nullptr;
+  // Forces on images go to sources elsewhere: the tangent of a part would lack them.
+  return std::make_unique<Damaged>(*this, std::move(rings), images() != nullptr);
+}
+
+}  // namespace perikit

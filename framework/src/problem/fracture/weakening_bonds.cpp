@@ -1,0 +1,45 @@
+#include "perikit/problem/weakening_bonds.hpp"
+
+#include "perikit/core/field_operations.hpp"
+#include "problem/body_problem.hpp"
+
+namespace perikit {
+
+class BodyProblem::Weakening final : public WeakeningBonds {
+ public:
+  explicit Weakening(BodyProblem& problem) : problem_(problem), direction_(problem.make_field()), change_(problem.make_field()) {
+    problem_.terms().let_others_forecast(true);
+  }
+  ~Weakening() override { problem_.terms().let_others_forecast(false); }
+
+  bool any() const override { return problem_.terms().settling(); }
+
+  EvaluationStatus add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+    fill(0.0, change_);
+    EvaluationStatus status =
+        problem_.terms().weakening_forces(problem_.seen(u, problem_.seen_), problem_.seen(w, direction_), change_);
+    problem_.describe(status);
+    problem_.finish(change_, status);
+    if (status.ok()) combine(1, Kw, -1, change_, Kw);
+    return status;
+  }
+
+  bool weaken(ConstFieldView u, ConstFieldView du) override {
+    combine(1, u, 1, du, change_);
+    const bool weakened = problem_.parts_.fracture.weaken(problem_.terms(), problem_.seen(u, problem_.seen_),
+                                                          problem_.seen(change_, direction_), problem_.state());
+    if (weakened) problem_.find_pieces(true);   // fragments may have come off
+    return weakened;
+  }
+
+ private:
+  BodyProblem& problem_;
+  Field direction_, change_;
+};
+
+std::unique_ptr<WeakeningBonds> BodyProblem::weakening_bonds() {
+  if (parts_.partition || !parts_.fracture.damage() || parts_.fracture.damage()->law->traits().bits) return nullptr;
+  return std::make_unique<Weakening>(*this);
+}
+
+}  // namespace perikit

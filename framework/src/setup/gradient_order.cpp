@@ -1,0 +1,42 @@
+#include "setup/gradient_order.hpp"
+
+#include <fmt/format.h>
+
+#include "families/family_arrays.hpp"
+#include "perikit/core/communicator.hpp"
+
+namespace perikit {
+
+namespace {
+
+/// Number of monomials of degree 1 ... order: as many bonds, at least, must a family have.
+int monomials(int dimension, int order) {
+  int count = 1;
+  for (int c = 1; c <= dimension; ++c) count = count * (order + c) / c;
+  return count - 1;
+}
+
+}  // namespace
+
+void refuse_order(const Scene& scene, const Formulation& formulation, const Families& families) {
+  if (formulation.order < 2) return;
+  const Body& body = families.body();
+  FamilyArrays family, largest;
+  families.each_class([&](std::span<const std::int32_t> points) {
+    families.load(static_cast<std::size_t>(points.front()), BondsOf::set_up, family);
+    if (family.bonds > largest.bonds) std::swap(family, largest);
+  });
+  std::vector<double> g;
+  const int supported = largest.bonds > 0 ? point_gradient(largest, body.horizon(), formulation.order, g) : 0;
+  const int highest = static_cast<int>(communicator().largest(supported));
+  const int bonds = static_cast<int>(communicator().largest(largest.bonds));
+  if (highest >= formulation.order || highest == 0) return;  // 0: bodies without gradients have their own warning
+  const ParameterValues* values = &scene.kinematics->values;
+  if (!values->has("order") && values->has("base")) values = &values->part("base").values;
+  throw InputError(values->position("order"), values->path() + ".order",
+                   fmt::format("found {}, for which a family needs {} bonds and more; the largest one here has {} and supports "
+                               "order {}; allowed: 1 to {}, or a wider horizon",
+                               formulation.order, monomials(body.dimension(), formulation.order), bonds, highest, highest));
+}
+
+}  // namespace perikit

@@ -1,0 +1,153 @@
+#include "setup/materials.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+namespace perikit {
+
+namespace {
+
+/// Ghosts and images store nothing: the energy of their evaluation points is that of the rank that owns them, or of their sources.
+class SilentMaterial final : public Material {
+ public:
+  MaterialTraits traits() const noexcept override { return {.constant_tangent = true}; }
+  void constants(const MaterialInput&, double*) const override {}
+  Moduli small_strain(const double*) const noexcept override { return {}; }
+  Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
+    const auto zero = [&](double* x, int components) {
+      for (int c = 0; x && c < components; ++c) std::fill_n(x + static_cast<std::size_t>(c) * batch.stride, batch.n, 0.0);
+    };
+    const int n = tensor_components(space);
+    zero(batch.psi, 1);
+    zero(batch.P, n);
+    zero(batch.dP, n);
+    zero(batch.A, n * n);
+    zero(batch.lateral, 1);
+    return {};
+  }
+};
+
+/// The numbers and expressions of a part by key.
+using Values = std::map<std::string, Expression, std::less<>>;
+
+Values numeric_values(const PartValues& part, const Constants& constants) {
+  Values values;
+  for (const std::string& key : part.values.keys()) {
+    const ParameterValue* value = part.values.find(key);
+    if (const auto* number = std::get_if<double>(value))
+      values.emplace(key, Expression(*number));
+    else if (const auto* text = std::get_if<std::string>(value); text && part.values.is_expression(key))
+      values.emplace(key, Expression(*text, constants, false, part.values.position(key), part.values.path() + "." + key));
+  }
+  return values;
+}
+
+/// out <- the constants of the law at x. Throws InputError.
+void constants_at(const Point& x, const PartValues& part, const Values& values, const MaterialRecord& record, double* out) {
+  const MaterialInput input{[&](std::string_view key) { return values.contains(key); },
+                            [&](std::string_view key) { return values.find(key)->second(x); }};
+  try {
+    record.material->constants(input, out);
+  } catch (const std::domain_error& error) {
+    // The law speaks of the parameter as it knows it: "found NAME = ...".
+    const std::string text = record.uniform ? std::string(error.what())
+                                            : fmt::format("{}, at ({:.6g}, {:.6g}, {:.6g})", error.what(), x[0], x[1], x[2]);
+    for (const auto& [key, value] : values)
+      if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
+    throw InputError(part.values.position(""), part.values.path(), text);
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: {}", part.type, error.what()));
+  } catch (...) {
+    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: it threw something that is no std::exception", part.type));
+  }
+}
+
+void fill_varying(MaterialRecord& record, const PartValues& part, const Values& values, const Body& body, std::size_t id) {
+  const auto count = static_cast<std::size_t>(record.traits.constants);
+  const std::size_t stride = body.stride();
+  const auto ids = body.material_ids();
+  const auto density = values.find("density");
+  record.constants.assign(count * stride, 0.0);
+  if (density != values.end()) record.densities.assign(stride, 0.0);
+  std::vector<double> one(std::max<std::size_t>(count, 1));
+  auto any = static_cast<std::size_t>(body.internal().front());
+  for (const std::int32_t index : body.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    if (!ids.empty() && ids[p] != id) continue;
+    constants_at(body.position(p), part, values, record, one.data());
+    any = p;
+    for (std::size_t k = 0; k < count; ++k) record.constants[k * stride + p] = one[k];
+    if (density != values.end()) record.densities[p] = density->second(body.position(p));
+  }
+  // Padding and points of other materials see admissible constants too.
+  for (std::size_t p = 0; p < stride; ++p) {
+    if (body.alive(p) && (ids.empty() || ids[p] == id)) continue;
+    for (std::size_t k = 0; k < count; ++k) record.constants[k * stride + p] = record.constants[k * stride + any];
+  }
+}
+
+MaterialRecord build_record(const PartValues& part, const Scene& scene, const PartFactory& factory, const Body& body,
+                            std::size_t id) {
+  MaterialRecord record;
+  record.material = factory.material(part);
+  record.traits = record.material->traits();
+  const Values values = numeric_values(part, scene.constants);
+  record.uniform = std::ranges::none_of(values, [](const auto& entry) { return entry.second.depends_on_position(); });
+  if (!record.uniform) {
+    fill_varying(record, part, values, body, id);
+    return record;
+  }
+  record.constants.resize(std::max<std::size_t>(static_cast<std::size_t>(record.traits.constants), 1));
+  constants_at({}, part, values, record, record.constants.data());
+  if (const auto density = values.find("density"); density != values.end()) record.density = density->second({});
+  return record;
+}
+
+}  // namespace
+
+std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene) {
+  std::vector<std::shared_ptr<const PartValues>> parts{scene.material};
+  for (const RegionDescription& region : scene.regions) parts.push_back(region.material);
+  return parts;
+}
+
+MaterialRecord silent_record() {
+  MaterialRecord record;
+  record.material = std::make_shared<SilentMaterial>();
+  record.silent = true;
+  record.traits = record.material->traits();
+  record.constants.resize(1);
+  return record;
+}
+
+std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory, const Body& body, bool images) {
+  std::vector<MaterialRecord> records;
+  for (const auto& part : materials(scene)) records.push_back(build_record(*part, scene, factory, body, records.size()));
+  if (images) records.push_back(silent_record());
+  if (!body.places().place.empty()) {
+    records.push_back(silent_record());
+    records.back().incomplete = true;
+  }
+  return std::make_unique<Laws>(body.space(), std::move(records), body.material_ids(), body.stride());
+}
+
+std::optional<InputError> missing_density(const Scene& scene, const Body& body, const Laws& laws) {
+  for (const std::int32_t index : body.owned()) {
+    const auto p = static_cast<std::size_t>(index);
+    const double density = laws.density(p);
+    if (density > 0) continue;
+    const ParameterValues& values = materials(scene)[body.material_ids().empty() ? 0 : body.material_ids()[p]]->values;
+    if (!values.has("density"))
+      return values.error("density", "found nothing; allowed: a density > 0 [kg/m^3], which dynamic runs and columns of masses need");
+    const Point x = body.position(p);
+    return values.error("density", fmt::format("found {} at ({:.6g}, {:.6g}, {:.6g}); allowed: a density > 0 [kg/m^3]", density,
+                                               x[0], x[1], x[2]));
+  }
+  return std::nullopt;
+}
+
+}  // namespace perikit

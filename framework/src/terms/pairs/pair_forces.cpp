@@ -1,0 +1,344 @@
+#include "terms/pairs/pair_forces.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/dimension.hpp"
+#include "families/fracture/bond_finder.hpp"
+#include "perikit/core/warnings.hpp"
+#include "terms/family_point.hpp"
+#include "terms/pairs/pair_assembly.hpp"
+#include "terms/pairs/surface_correction.hpp"
+
+namespace perikit {
+
+template <int D>
+PairForces<D>::PairForces(const PairParts& parts)
+    : families_(parts.families), body_(families_.body()), laws_(parts.laws), interfaces_(parts.interfaces), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
+  const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
+  loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
+  if (formulation_.dilatation) {
+    for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
+  }
+  Field modulus = body_.make_field(1);
+  FamilyArrays family;
+  families_.each_class([&](std::span<const std::int32_t> points) {
+    families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
+    set_moduli(family, points, modulus);
+  });
+  // Points with incomplete families have a record of their own, and no bond that anybody feels.
+  const std::vector<MaterialRecord>& records = laws_.records();
+  const bool one_law = laws_.single() || (records.size() == 2 && records[0].uniform && records[1].incomplete);
+  if (share_ && one_law && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
+    fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.owned().front()))).bond;
+  } else {
+    fields_.modulus = std::move(modulus);
+  }
+  if (formulation_.pair_traits.surface_correction) fields_.correction = surface_correction<D>(families_, law_, laws_);
+  if (interfaces_) set_sides();
+}
+
+template <int D>
+void PairForces<D>::set_sides() {
+  fields_.near.assign(body_.stride() / padding, 0);
+  fields_.sides = body_.make_field(PairFields::side_components);
+  for (const std::int32_t index : body_.internal()) {
+    const auto p = static_cast<std::size_t>(index);
+    fields_.sides.component(PairFields::material)[p] = interfaces_->material[p];
+    fields_.sides.component(PairFields::stores)[p] = laws_.record_of(p).silent ? 0.0 : 1.0;
+  }
+  for (const Interface& interface : interfaces_->all)
+    for (std::size_t k = 0; k < interface.point.size(); ++k) {
+      const auto p = static_cast<std::size_t>(interface.point[k]);
+      // Of several interfaces the nearest one.
+      double& distance = fields_.sides.component(PairFields::distance)[p];
+      const double found = std::abs(interface.distance[k]);
+      distance = distance > 0 ? std::min(distance, found) : found;
+      fields_.near[p / padding] = 1;
+      // Of the material, which a point far from this rank's does not have; laws that vary in space have none.
+      const MaterialRecord& record = laws_.records()[interfaces_->material[p]];
+      if (!record.uniform) continue;
+      PairPoint whole = point(p);
+      whole.moduli = record.material->small_strain(record.constants.data());
+      whole.weighted_volume = 1;
+      fields_.sides.component(PairFields::of_material)[p] = law_.moduli(whole).bond;
+    }
+  renew_sides();
+}
+
+/// Moduli have changed.
+template <int D>
+void PairForces<D>::renew_sides() {
+  double* const stiffness = fields_.sides.component(PairFields::stiffness);
+  for (const Interface& interface : interfaces_->all)
+    for (const std::int32_t p : interface.point) stiffness[p] = fields_.modulus.data()[interfaces_->source[static_cast<std::size_t>(p)]];
+}
+
+template <int D>
+PairPoint PairForces<D>::point(std::size_t p) const {
+  return {family_point(body_, laws_, p), 0, 1};
+}
+
+template <int D>
+void PairForces<D>::warn(const PairPoint& x, const MaterialRecord& record) {
+  if (std::find(warned_.begin(), warned_.end(), &record) != warned_.end()) return;
+  const std::string told = law_.warning(x);
+  if (told.empty()) return;
+  const std::string warning = warning_name(told).empty() ? named("pair_law", told) : told;
+  warned_.push_back(&record);
+  if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
+}
+
+template <int D>
+void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus) {
+  const double m = weighted_volume(family, false), intact = 1 - families_.damage(static_cast<std::size_t>(points[0]));
+  PairModuli moduli;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto p = static_cast<std::size_t>(points[k]);
+    if (m > 0 && (k == 0 || !laws_.single())) {
+      PairPoint x = point(p);
+      x.weighted_volume = m;
+      x.intact = intact;
+      moduli = law_.moduli(x);
+      if (x.bulk() > 0) warn(x, laws_.record_of(p));   // not of ghosts and images
+    }
+    // A point without bonds is a free mass: nothing to divide by, nothing stored.
+    if (modulus.size() > 0) modulus.data()[p] = moduli.bond;
+    if (!formulation_.dilatation) continue;
+    scale_.data()[p] = m > 0 ? D / m : 0.0;
+    dilatation_modulus_.data()[p] = moduli.dilatation;
+  }
+}
+
+template <int D>
+void PairForces<D>::bonds_changed(std::span<const std::int32_t> points) {
+  FamilyArrays family;
+  for (const std::int32_t p : points) {
+    families_.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
+    set_moduli(family, {&p, 1}, fields_.modulus);
+  }
+  if (interfaces_) renew_sides();
+}
+
+template <int D>
+const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
+  if (!damage.by_stretch()) return nullptr;
+  double least = std::numeric_limits<double>::max();
+  for (const std::int32_t p : body_.internal()) least = std::min(least, damage.onset.data()[p]);
+  for (const InterfaceDamage& i : damage.interfaces) least = std::min(least, i.least());
+  return loop_->watch(least);
+}
+
+template <int D>
+std::int64_t PairForces<D>::forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                      std::vector<double>* energies) {
+  if (energies) energies->assign(body_.stride() / padding, 0.0);
+  if (formulation_.dilatation) {
+    // At the rim of `near` dilatations are not complete, and not the same on several ranks.
+    const std::int64_t bad = dilatation(u, {}, energies ? energies->data() : nullptr, nullptr, near.data(), only.data());
+    if (bad >= 0) return bad;
+  }
+  return loop_->run({PairWork::force, u, {}, q_, {}, force, energies ? energies->data() : nullptr, only.data(), true});
+}
+
+template <int D>
+std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
+                                          ExactSum* energy) {
+  std::vector<double> energies;
+  const std::int64_t bad = forces_of(u, only, near, force, energy ? &energies : nullptr);
+  if (energy) add_owned(body_, energies, *energy);
+  return bad;
+}
+
+template <int D>
+std::int64_t PairForces<D>::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
+                                         ExactSum& energy) {
+  std::vector<double> renewed;
+  const std::int64_t bad = forces_of(u, only, near, force, &renewed);
+  replace(complete, renewed, energies_);
+  add_owned(body_, energies_, energy);
+  return bad;
+}
+
+template <int D>
+void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
+  FamilyArrays& family = bonds.family;
+  families_.load(p, BondsOf::intact, family);
+  for (auto* array : {&bonds.extension, &bonds.modulus, &bonds.omega, &bonds.energy, &bonds.force}) array->assign(family.size, 0.0);
+  for (std::size_t k = 0; k < family.far.size(); ++k) {
+    const auto far = static_cast<std::size_t>(family.far[k]);
+    bonds.omega[k] = family.whole_omega(k);
+    bonds.extension[k] = bond_stretch(family, k, p, u) * family.length[k];
+    double& modulus = bonds.modulus[k];
+    modulus = fields_.of_bond(p, far);
+    if (fields_.correction.size() == 0) continue;
+    double factor = 0;
+    for (int a = 0; a < D; ++a) {
+      const double cosine = family.xi[a][k] / family.length[k];
+      factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
+    }
+    modulus *= factor;
+  }
+  law_.bond_law({family.bonds, family.length.data(), bonds.omega.data(), bonds.extension.data(), bonds.modulus.data(),
+                 bonds.energy.data(), bonds.force.data(), nullptr});
+}
+
+template <int D>
+void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
+  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+    Bonds bonds;
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body_.alive(p)) continue;
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
+      const double q = formulation_.dilatation ? q_.data()[p] : 0.0;
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * fields_.own_strain(p, far) * q,
+                     factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
+        for (int a = 0; a < D; ++a) {
+          const double y = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
+          for (int e = 0; e < D; ++e) P.component(a * D + e)[p] += factor * y * family.xi[e][k];
+        }
+      }
+    }
+  });
+}
+
+/// b V_i V_j w, and what the bond adds to V_i phi and V_j phi: these are shared as bonds make up theta, phi_i/theta_i d theta_i.
+template <int D>
+void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+  const bool dilates = formulation_.dilatation != nullptr;
+  if (dilates) {
+    if (density_.size() == 0) density_ = body_.make_field(1);
+    dilatation(u, {}, nullptr, density_.data(), near.data());
+  }
+  const auto by_theta = [&](std::size_t p) {
+    const double theta = scale_.data()[p] * theta_.data()[p];
+    return theta != 0 ? density_.data()[p] / theta * scale_.data()[p] : 0.0;
+  };
+  samples.take_both_ways();
+  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+    if (!marks[g] || !samples.keeps_group(g)) return;
+    Bonds bonds;
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body_.alive(p) || !samples.wants(p)) continue;
+      load_bonds(p, u, bonds);
+      const FamilyArrays& family = bonds.family;
+      const double of_own = dilates ? by_theta(p) : 0.0;
+      for (std::size_t k = 0; k < family.far.size(); ++k) {
+        const auto far = static_cast<std::size_t>(family.far[k]);
+        double w = bonds.energy[k];
+        if (dilates)
+          w += (of_own * fields_.own_strain(p, far) + by_theta(far) * fields_.own_strain(far, p)) * bonds.omega[k] * family.length[k] * bonds.extension[k];
+        samples.add({static_cast<std::int32_t>(p), family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w});
+      }
+    }
+  });
+}
+
+template <int D>
+std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
+                                       const std::uint8_t* only, const std::uint8_t* local, Arrival* arrival, PointMotion* motion) {
+  PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local != nullptr};
+  pass.arrival = arrival;
+  pass.motion = motion;
+  const std::int64_t bad = loop_->run(pass);
+  if (bad >= 0) return bad;
+  const bool rates = w.data != nullptr;
+  if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
+  if (rates) {
+    if (rate_.size() == 0) rate_ = body_.make_field(1);
+    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr, only, local != nullptr});
+  }
+  // Points in batches; padding has d/m = 0.
+  const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
+  parallel_for(batches, [&](std::size_t b) {
+    const std::size_t first = b * batch_points;
+    const int n = static_cast<int>(std::min<std::size_t>(batch_points, stride - first));
+    if (only && std::none_of(only + first / padding, only + (first + static_cast<std::size_t>(n)) / padding, [](std::uint8_t m) { return m != 0; })) return;
+    alignas(64) double theta[batch_points], phi[batch_points], pressure[batch_points], stiffness[batch_points];
+    const double* scale = scale_.data() + first;
+    for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
+    formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
+                                       energies || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+    for (int l = 0; l < n; ++l) {
+      const std::size_t p = first + static_cast<std::size_t>(l);
+      q_.data()[p] = scale[l] * pressure[l];
+      if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
+      if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
+      if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
+      if (energies && body_.alive(p) && (!local || marked(local, p))) energies[p / padding] += body_.volume(p) * phi[l];
+    }
+  });
+  return -1;
+}
+
+template <int D>
+std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, PointMotion* motion) {
+  if (energy) energies_.assign(body_.stride() / padding, 0.0);
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, nullptr, arrival, motion);
+    if (bad >= 0) return bad;
+  }
+  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
+  pass.arrival = arrival;
+  if (!formulation_.dilatation) pass.motion = motion;   // else all have moved
+  pass.screen = screen_;
+  if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
+  const std::int64_t bad = loop_->run(pass);
+  if (energy) add_owned(body_, energies_, *energy);
+  return bad;
+}
+
+template <int D>
+std::int64_t PairForces<D>::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only,
+                                       const std::uint8_t* near) {
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, w, nullptr, nullptr, near, only);
+    if (bad >= 0) return bad;
+  }
+  return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr, only, only != nullptr});
+}
+
+template <int D>
+std::unique_ptr<Assembly> PairForces<D>::make_assembly(const BlockRows& rows) const {
+  return std::make_unique<PairAssembly<D>>(formulation_, PairPoints{fields_, scale_, dilatation_modulus_}, rows);
+}
+
+template <int D>
+std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples) {
+  Field volumetric = body_.make_field(1), bonds = body_.make_field(1);
+  if (formulation_.dilatation) {
+    const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
+    if (bad >= 0) return bad;
+  }
+  if (any_of(samples.asked, Sampling::virial)) {
+    samples.P = body_.make_field(D * D);
+    add_virial(u, samples.P);
+  }
+  const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
+  for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
+  return bad;
+}
+
+template <int D>
+void PairForces<D>::report(ModelReport& report) const {
+  report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
+  report.bytes += loop_->bytes();
+  for (const Field* field :
+       {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
+    report.bytes += field->bytes();
+  report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
+  report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
+  if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
+  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
+}
+
+std::unique_ptr<Term> make_pair_forces(const PairParts& parts) {
+  return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<Term> { return std::make_unique<PairForces<d>>(parts); });
+}
+
+}  // namespace perikit

@@ -1,0 +1,154 @@
+#pragma once
+/// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to them. Their sum
+/// as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds that fail.
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "families/bonds.hpp"
+#include "families/resting_counts.hpp"
+#include "families/step_inside.hpp"
+#include "model/formulation.hpp"
+#include "operators/law_history.hpp"
+#include "operators/report.hpp"
+#include "operators/samples.hpp"
+#include "perikit/core/block_matrix.hpp"
+#include "perikit/core/evaluation_status.hpp"
+#include "perikit/model/stabilization.hpp"
+#include "perikit/operators/laws.hpp"
+
+namespace perikit {
+
+class Arrival;
+class BondCriterion;
+class Families;
+class Mechanics;
+class PointMotion;
+struct CloudConsistency;
+struct Interfaces;
+class Term;
+class VolumetricRows;
+
+struct TermParts;
+/// Makes a term (terms/term.hpp) of what those of the formulation are made of.
+using TermMaker = std::function<std::unique_ptr<Term>(const TermParts&)>;
+
+/// What the terms of a formulation are made of. families, laws and damage must outlive them.
+struct TermParts {
+  Families* families = nullptr;
+  Formulation formulation;
+  const Laws* laws = nullptr;
+  std::shared_ptr<const Stabilization> stabilization;  ///< null: none. Only over point gradients
+  bool skip = true;                                    ///< leave out work whose result is known; changes no bit
+  bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
+  const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
+  std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
+  std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
+  std::vector<TermMaker> further;                      ///< what acts beside the formulation
+};
+
+/// The points that are meant, by point; and by group of eight points (internal index / 8) those whose evaluation points act on these, and where
+/// these need point gradients.
+struct GroupRings {
+  std::vector<std::uint8_t> inside, only, near;
+};
+
+class Terms {
+ public:
+  explicit Terms(TermParts parts);
+  ~Terms();
+
+  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. arrival: of u at the
+  /// points of other ranks, which has come when it returns; null: it is there. motion: of u, which leaves force zero.
+  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
+  /// `forces` and `sample` of the same displacements, bit for bit; where evaluation points are those of both, each is visited once.
+  EvaluationStatus forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples);
+  /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds:
+  /// what has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs.
+  /// On one rank.
+  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
+                                FieldView force, double* energy);
+  /// The points whose bonds failed or weakened in the last update, on any number of ranks the same; empty where none did, or where
+  /// their families are left with so much that their gradients are no stiffer than before.
+  GroupRings near_failed_bonds() const;
+  /// The tangent of those points alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
+  /// anything elsewhere.
+  EvaluationStatus tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw);
+  /// Kw <- -d(force)/du w [N], fully overwritten.
+  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
+  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
+  /// from these terms and stays as it is. Values are overwritten; undefined after a failure.
+  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K);
+  /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
+  /// no more points.
+  AssembledSize assembled_size();
+  EvaluationStatus sample(ConstFieldView u, PointSamples& samples);
+  /// The volumetric part of the tangent where the map is selective, else null. The terms must outlive it.
+  std::unique_ptr<VolumetricRows> volumetric_rows() const;
+  /// That evaluation met this inadmissible point (field index), or none (-1).
+  EvaluationStatus status(std::int64_t bad) const;
+
+  /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
+  bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
+  /// Whether forces are -dE/du, so that the tangent is symmetric.
+  bool conservative() const noexcept { return parts_.formulation.force_state == ForceState::variational; }
+  /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).
+  Field shape_tensor_condition() const;
+  /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
+  Field damage() const;
+  ModelReport report() const;
+  RestingCounts resting_counts() const;
+  /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
+  LawHistory* history() const noexcept;
+  void history_restored();
+  /// Its evaluation points, ascending. Failed bonds have none.
+  std::vector<HistoryPlace> history_points() const;
+  /// What laws dissipate in the step that the last evaluation of forces ended, over all ranks [J]; once, then 0 until the next.
+  double take_dissipated();
+
+  // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
+  /// Lowers the integrity of bonds that are beyond their limit at u, and recomputes what depends on them. To be called after
+  /// every step, with its length [s] (0 in quasi-static runs). Where `step` is given, bonds fail inside of it, and u follows what it does.
+  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepInside& step = {});
+  // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
+  /// Whether some of them may be forecast.
+  bool settling() const noexcept;
+  /// Whether somebody else forecasts how far bonds weaken; else updates do.
+  void let_others_forecast(bool to_others);
+  /// force <- force + df/db (db/du . w) at u, the displacement of that update.
+  EvaluationStatus weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force);
+  /// Lowers them to what they are at `forecast`, and not by more than half; energies are those at u.
+  BondUpdate weaken_bonds(ConstFieldView u, ConstFieldView forecast);
+  /// The shares of all bonds in the energy at u: they add up to it. Ascending. Not where laws have a history.
+  std::vector<BondEnergy> bond_energies(ConstFieldView u);
+  /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
+  /// DamageTraits::released).
+  std::vector<BondEnergy> released_energies(ConstFieldView u);
+  /// Every bond here that is not as it was at the set-up.
+  std::vector<BondChange> changed_bonds() const;
+  void restore_bonds(std::span<const BondChange> changes);
+  /// Those that no other rank owns, as all ranks name them: run state, for checkpoints. Ascending.
+  std::vector<NamedChange> own_changed_bonds() const;
+  /// Of changes in the whole body those of bonds with both ends here.
+  std::vector<BondChange> bonds_here(std::span<const NamedChange> changes) const;
+  BondChecks bond_checks() const;
+
+ private:
+  template <class Add>
+  EvaluationStatus forces_by(Add&& add, ConstFieldView u, double* energy);
+  struct Assemblies;
+  struct Failing;
+  void bonds_changed(std::span<const std::int32_t> points);
+  Assemblies& assemblies();
+
+  TermParts parts_;
+  std::vector<std::unique_ptr<Term>> terms_;
+  Mechanics* mechanics_ = nullptr;          ///< one of them, but for pair laws
+  std::unique_ptr<Assemblies> assemblies_;  ///< made when asked for
+  std::unique_ptr<Failing> failing_;        ///< null without [damage]
+  BondCriterion* criterion_ = nullptr;      ///< of failing_, where evaluations of forces tell it which bonds need a look
+};
+
+}  // namespace perikit
