@@ -10,6 +10,7 @@
 
 #include "output_fields/crack_areas.hpp"
 #include "output_fields/point_field.hpp"
+#include "perikit/problem/motion.hpp"
 #include "problem/body_problem.hpp"
 
 namespace perikit {
@@ -34,6 +35,10 @@ class PointFields {
   void expect(std::span<const std::string> names);
   /// They are asked for at the end of the step whose forces are evaluated next.
   void expect_after_step(std::span<const std::string> names) { problem_.sample_along(samples_of(names)); }
+  /// See perikit/problem/motion.hpp. All ranks must call it.
+  const Field& reaction_couples() {
+    return once("reaction couples", [&](Field before) { return perikit::reaction_couples(problem_, std::move(before)); });
+  }
   /// What broken bonds stand for.
   const CrackAreas& crack_areas();
   /// Frees its memory until it is asked for again.

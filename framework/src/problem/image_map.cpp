@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "perikit/core/rank_values.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/core/rank_values.hpp"
 
 namespace perikit {
 
@@ -17,7 +17,7 @@ ImageMap::ImageMap(const Body& body, const Images& images) : body_(&body), map_(
   }
   for (const ImageTerm& term : images.terms) {
     const std::int32_t image = image_[static_cast<std::size_t>(term.image)];
-    if (body.owns(static_cast<std::size_t>(image))) shares_.push_back({image, term.surface, term.component, term.factor});
+    if (body.owns(static_cast<std::size_t>(image))) shares_.push_back({image, term.surface, term.component, term.factor, term.at});
   }
 }
 
@@ -59,27 +59,87 @@ void ImageMap::append_images(std::vector<std::int32_t>& points) const {
     if (chosen[static_cast<std::size_t>(source_[k])]) points.push_back(image_[k]);
 }
 
-/// Of all ranks. The point at a plane may be another rank's than the image, and others add to it.
-std::vector<ImageMap::Part> ImageMap::parts_of_all(ConstFieldView reaction) const {
+std::vector<ImageMap::Part> ImageMap::parts(ConstFieldView reaction) const {
   std::vector<Part> parts;
   for (const Share& share : shares_)
     parts.push_back({body_->number(static_cast<std::size_t>(share.image)), share.surface, share.component,
                      share.factor * reaction.component(share.component)[share.image]});
-  if (body_->places().place.empty()) return parts;
+  return parts;
+}
+
+/// Of all ranks. The point at a plane may be another rank's than the image, and others add to it.
+std::vector<ImageMap::Part> ImageMap::of_all(std::vector<Part> parts, const Body& body) {
+  if (body.places().place.empty()) return parts;
   parts = told_to_all(gathered<Part>(parts));
   std::ranges::stable_sort(parts, {}, &Part::image);
   return parts;
 }
 
-void ImageMap::gather(FieldView reaction) const {
+void ImageMap::hand_out(const std::vector<Part>& parts, const std::function<void(std::int32_t, const Part&)>& add) const {
   const std::vector<std::int32_t>& own = body_->owned();
   const auto number = [&](std::int32_t p) { return body_->number(static_cast<std::size_t>(p)); };
-  for (const Part& part : parts_of_all(reaction)) {
+  for (const Part& part : of_all(parts, *body_)) {
     const auto at = std::ranges::lower_bound(own, part.surface, {}, number);
-    if (at != own.end() && number(*at) == part.surface) reaction.component(static_cast<int>(part.component))[*at] += part.value;
+    if (at != own.end() && number(*at) == part.surface) add(*at, part);
   }
+}
+
+void ImageMap::gather(FieldView reaction) const {
+  hand_out(parts(reaction), [&](std::int32_t p, const Part& part) { reaction.component(static_cast<int>(part.component))[p] += part.value; });
   for (int c = 0; c < reaction.components; ++c)
     for (const std::int32_t p : image_) reaction.component(c)[p] = 0;
+}
+
+namespace {
+
+Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+Point at_point(ConstFieldView field, std::int32_t p) {
+  Point value{};
+  for (int c = 0; c < field.components; ++c) value[static_cast<std::size_t>(c)] = field.component(c)[p];
+  return value;
+}
+
+}  // namespace
+
+void ImageMap::add_couples(ConstFieldView reaction, ConstFieldView u, FieldView couple) const {
+  const auto now = [&](std::int32_t p) {
+    Point y = at_point(u, p);
+    for (std::size_t c = 0; c < 3; ++c) y[c] += body_->position(static_cast<std::size_t>(p))[c];
+    return y;
+  };
+  const bool plane = couple.components == 1;
+  const auto axis_of = [&](int row) { return static_cast<std::size_t>(plane ? 2 : row); };
+  // Moments about the origin. Beyond a corner an image has parts at several planes: these have their levers at rest, and the last one what remains.
+  const std::vector<Part> forces = parts(reaction);
+  std::vector<Part> moments;
+  for (std::size_t first = 0, last; first < shares_.size(); first = last) {
+    const std::int32_t image = shares_[first].image;
+    const auto k = static_cast<std::size_t>(map_[static_cast<std::size_t>(image)]);
+    const Point force = at_point(reaction, image);
+    Point on_source = force;
+    for (std::size_t c = 0; c < 3; ++c) on_source[c] *= sign_[k][c];
+    const Point of_image = cross(now(image), force), of_source = cross(now(source_[k]), on_source);
+    Point left;
+    for (std::size_t c = 0; c < 3; ++c) left[c] = of_image[c] - of_source[c];
+    for (last = first; last < shares_.size() && shares_[last].image == image; ++last) {
+      Point part{};
+      part[static_cast<std::size_t>(shares_[last].component)] = forces[last].value;
+      const bool ends = last + 1 == shares_.size() || shares_[last + 1].image != image;
+      const Point moment = ends ? left : cross(shares_[last].at, part);
+      for (int row = 0; row < couple.components; ++row) moments.push_back({forces[last].image, forces[last].surface, row, moment[axis_of(row)]});
+      for (std::size_t c = 0; c < 3; ++c) left[c] -= moment[c];
+    }
+  }
+  hand_out(moments, [&](std::int32_t p, const Part& part) { couple.component(static_cast<int>(part.component))[p] += part.value; });
+  hand_out(forces, [&](std::int32_t p, const Part& part) {
+    Point force{};
+    force[static_cast<std::size_t>(part.component)] = part.value;
+    const Point moment = cross(now(p), force);
+    for (int row = 0; row < couple.components; ++row) couple.component(row)[p] -= moment[axis_of(row)];
+  });
 }
 
 void ImageMap::fold(const BlockMatrix& full, BlockMatrix& K) const {

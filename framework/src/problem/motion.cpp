@@ -68,6 +68,29 @@ Field reactions(Problem& problem, bool dynamic, double t, Field memory) {
   return r;
 }
 
+Field reaction_couples(Problem& problem, Field memory) {
+  const Body& body = problem.body();
+  Field couples = std::move(memory);
+  if (couples.size() == 0)
+    couples = body.make_field(body.dimension() == 3 ? 3 : 1);
+  else
+    couples.fill(0.0);
+  if (!problem.images()) return couples;
+  // Images have no mass: what acts on them goes to their plane.
+  Field u = problem.make_field(), on_images = problem.make_field();
+  const ConstFieldView internal = problem.state().internal_force(), displacement = problem.state().displacement();
+  const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < body.dimension(); ++c) {
+      u.component(c)[p] = displacement.component(c)[p];
+      if (body.image(static_cast<std::size_t>(p))) on_images.component(c)[p] = -internal.component(c)[p] - (external.data ? external.component(c)[p] : 0.0);
+    }
+  problem.share(u);
+  problem.images()->extend(u);
+  problem.images()->add_couples(on_images, u, couples);
+  return couples;
+}
+
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
   const int d = body.dimension();
   Point middle{};

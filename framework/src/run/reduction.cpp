@@ -39,13 +39,15 @@ std::vector<double> values_of(const HistoryDescription& record, BodyProblem& pro
   const auto width = static_cast<std::size_t>(field.width);
   const bool moment = record.reduce == "moment", area = record.reduce == "area", mass = record.reduce == "mass";
   const bool density = record.quantity != "reaction";   // a force over the volume of its point
+  const Field* const couples = moment && !density ? &fields.reaction_couples() : nullptr;
+  const double* const couple = couples ? couples->component(couples->components() == 3 ? record.component[0] - 'x' : 0) : nullptr;
   const int column = moment ? 0 : PointFields::column(record.quantity, record.component);
   std::vector<double> values;
   for (std::size_t n = 0; n < points.size(); ++n) {
     const double* const row = &field.data[n * width];
     const auto p = static_cast<std::size_t>(points[n]);
     if (moment)
-      values.push_back(moment_of(record, problem, p, row) * (density ? body.volume(p) : 1.0));
+      values.push_back(moment_of(record, problem, p, row) * (density ? body.volume(p) : 1.0) + (couple ? couple[p] : 0.0));
     else if (area)
       values.push_back(fields.crack_areas().of(p));
     else if (mass)

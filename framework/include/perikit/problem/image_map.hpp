@@ -4,6 +4,7 @@
 /// the source gets sign * force, and the image keeps its own, from which reactions follow.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "perikit/body/images.hpp"
@@ -32,6 +33,10 @@ class ImageMap {
   void append_images(std::vector<std::int32_t>& points) const;
   /// Reactions of images, by component, go to the points at the planes: what holds the planes in place [N]. All ranks must call it.
   void gather(FieldView reaction) const;
+  /// What `gather` leaves out: reactions of images act on the planes, and not at the points that get them. couple += their moment about
+  /// where these points are [N m]: about z in 2D, about x, y and z in 3D. reaction: of images in all components; u: as the terms see
+  /// it. The couples and the reactions together have the moment that balances what loads the body, about any place. All ranks must call it.
+  void add_couples(ConstFieldView reaction, ConstFieldView u, FieldView couple) const;
 
  private:
   struct Share {
@@ -39,6 +44,7 @@ class ImageMap {
     std::int64_t surface;                      ///< input number in the whole body
     std::int32_t component;
     double factor;
+    Point at;                                  ///< on the plane
   };
   /// What goes to the points at the planes, in the order of their images.
   struct Part {
@@ -46,7 +52,10 @@ class ImageMap {
     std::int64_t component;
     double value;
   };
-  std::vector<Part> parts_of_all(ConstFieldView reaction) const;
+  std::vector<Part> parts(ConstFieldView reaction) const;
+  static std::vector<Part> of_all(std::vector<Part> parts, const Body& body);
+  /// add(point, part) for the parts that points of this rank get.
+  void hand_out(const std::vector<Part>& parts, const std::function<void(std::int32_t, const Part&)>& add) const;
 
   const Body* body_;
   std::vector<std::int32_t> image_, source_;   ///< internal indices

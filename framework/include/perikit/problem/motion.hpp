@@ -14,6 +14,9 @@ Field accelerations(Problem& problem, double t);
 /// Force that the constraints exert, 0 at free components: mass a - internal - external [N]; a only for dynamic runs. memory: of
 /// an earlier call, to be used again.
 Field reactions(Problem& problem, bool dynamic, double t, Field memory = {});
+/// What holds a side of the body acts beyond the points that `reactions` gives it to. Its moment about where these points are [N m]: about z in
+/// 2D, about x, y and z in 3D. memory: of an earlier call, to be used again. All ranks must call it.
+Field reaction_couples(Problem& problem, Field memory = {});
 /// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its
 /// middle.
 std::vector<Field> rigid_motions(const Body& body, ConstFieldView u);
