@@ -409,21 +409,23 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
   const OutputDescription& output = simulation_.scene().output;
   for (const HistoryDescription& record : output.history)
     row.push_back(record.value ? 0 : reduced(record, problem, fields_, report.time));
-  for (const std::size_t k : output.derived) row[columns_.size() - output.history.size() + k] = derived_value(output.history[k], row, report.time);
+  for (const std::size_t k : output.derived) row[columns_.size() - output.history.size() + k] = derived_value(output.history[k], row, report);
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;
   if (first_) history_->row(row);
 }
 
-double RunRecorder::derived_value(const HistoryDescription& record, std::span<const double> row, double time) {
+double RunRecorder::derived_value(const HistoryDescription& record, std::span<const double> row, const StepReport& report) {
   std::vector<double> values;
   for (const std::string& name : record.value->columns()) values.push_back(row[static_cast<std::size_t>(std::ranges::find(columns_, name) - columns_.begin())]);
-  const double value = (*record.value)(values, time);
+  const double value = (*record.value)(values, report.time);
   const bool follows = std::ranges::any_of(values, [](double given) { return std::isnan(given); });   // from a column that is missing itself
-  if (!std::isnan(value) || follows || !undefined_.insert(record.name).second) return value;
+  if (!std::isnan(value) || follows) return value;
+  const bool at_start = report.step == 0 && !last(report.step, report.time);   // where nothing has happened 0/0 is as it should be
+  if (at_start || !undefined_.insert(record.name).second) return value;
   std::string given;
   for (std::size_t k = 0; k < values.size(); ++k) given += fmt::format("{}{} = {:.6g}", k == 0 ? "" : ", ", record.value->columns()[k], values[k]);
-  log(named("not_finite", fmt::format("warning: history column {}: {} is no finite number at t = {:.6g}, where {}; nan stands in its place", record.name, record.value->text(), time, given)));
+  log(named("not_finite", fmt::format("warning: history column {}: {} is no finite number at t = {:.6g}, where {}; nan stands in its place", record.name, record.value->text(), report.time, given)));
   return value;
 }
 

@@ -175,8 +175,8 @@ class RunRecorder final : public Observer {
   std::string energy_warning() const;
   /// counts: not a row of a stop alone.
   void write_history(const StepReport& report, bool counts);
-  /// The first value of a column that is NaN is a warning.
-  double derived_value(const HistoryDescription& record, std::span<const double> row, double time);
+  /// The first value of a column that is NaN after the start of the run is a warning.
+  double derived_value(const HistoryDescription& record, std::span<const double> row, const StepReport& report);
   void progress(const StepReport& report);
   /// Whether a line of progress is due, which is then taken to be shown.
   bool line_due();
