@@ -92,6 +92,8 @@ class Terms {
 
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
+  /// Whether the body is springs between points and nothing else, which have one modulus: Poisson's ratio is theirs.
+  bool springs_alone() const noexcept { return parts_.formulation.pairs && !parts_.formulation.dilatation; }
   /// Whether forces are -dE/du, so that the tangent is symmetric.
   bool conservative() const noexcept { return parts_.formulation.force_state == ForceState::variational; }
   /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).

@@ -91,7 +91,7 @@ void find_small_horizon(const Scene& scene, const Body& body, std::vector<std::s
 
 }  // namespace
 
-std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) {
+std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
   std::vector<std::string> lines;
   const Body& body = problem.body();
   if (scene.random_points() && !scene.consistent.value_or(true) && problem.terms().has_gradients())
@@ -131,3 +131,4 @@ std::vector<std::string> doubts(const Scene& scene, const BodyProblem& problem) 
 }
 
 }  // namespace perikit
+  find_doubts_of_stiffness(scene, problem, lines);
