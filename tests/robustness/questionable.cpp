@@ -341,3 +341,13 @@ TEST_CASE("questionable: thin bodies, by how much they are off in bending") {
   silent(strip("[12, 4]"));   // nothing that bends
   silent(strip("[40, 4]") + "[[symmetry]]\naxis = \"y\"\n");   // half of a body of 8
 }
+
+TEST_CASE("questionable: surfaces that are stairs on a lattice") {
+  const auto with = [](const std::string& inside) { return replaced(plate, "upper = [8, 5]", "upper = [30, 20]\ninside = \"" + inside + "\""); };
+  for (const std::string inside : {"(x - 15)^2 + (y - 10)^2 > 25", "y < 12 + 0.2*x", "x + y < 40.3"}) warned(with(inside), "", "a surface of [body.lattice] inside cuts cells obliquely");
+  silent(with("(x - 15)^2 + (y - 10)^2 > 25"), "--set family.partial_volume=true");
+  silent(with("(x - 15)^2 + (y - 10)^2 > 25"), "--set body.lattice.jitter=0.1");
+  silent(with("(x - 15)^2 + (y - 10)^2 > 25"), "--set 'run.silence=[\"stairs\"]'");
+  silent(with("x < 25 || y < 10"));
+  silent(with("abs(x - 15) > 4.2 || abs(y - 10) > 3.3"));
+}

@@ -80,6 +80,47 @@ void find_cut_cells(const Scene& scene, const Body& body, std::vector<std::strin
                               sizes(cells), sizes(got), sizes(asked), remedy)));
 }
 
+/// How the surface of the body cuts a cell of its lattice: not at all, along the axes, or obliquely.
+enum class Cut { none, along_axes, oblique };
+
+Cut cut_of(const Expression& inside, const Point& centre, double spacing, int d) {
+  constexpr double within = 1 - 1e-6;   // surfaces that lie on sides of cells cut none
+  unsigned kept = 0;   // by corner
+  const unsigned corners = 1u << d, all = (1u << corners) - 1;
+  for (unsigned corner = 0; corner < corners; ++corner) {
+    Point x = centre;
+    for (int a = 0; a < d; ++a) x[static_cast<std::size_t>(a)] += (corner >> a & 1 ? 0.5 : -0.5) * within * spacing;
+    if (inside(x) != 0) kept |= 1u << corner;
+  }
+  if (kept == all) return Cut::none;
+  for (int a = 0; a < d; ++a) {   // whether one coordinate says which corners are kept
+    unsigned upper = 0;
+    for (unsigned corner = 0; corner < corners; ++corner)
+      if (corner >> a & 1) upper |= 1u << corner;
+    if (kept == upper || kept == (all & ~upper)) return Cut::along_axes;
+  }
+  return Cut::oblique;
+}
+
+/// Cells of a lattice are there or not: oblique and curved surfaces are stairs.
+void find_stairs(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  if (!scene.body.lattice || !scene.body.lattice->inside || scene.body.lattice->jitter > 0 || scene.partial_volume) return;
+  constexpr std::int64_t most_cells = 300000;   // that are looked at, evenly among all
+  const std::int64_t every = body.points_of_all_ranks() / most_cells + 1;
+  std::int64_t counts[2] = {};
+  for (const std::int32_t p : body.owned()) {
+    const auto point = static_cast<std::size_t>(p);
+    if (body.image(point) || body.number(point) % every != 0) continue;
+    const Cut cut = cut_of(*scene.body.lattice->inside, body.position(point), body.spacing(), body.dimension());
+    if (cut != Cut::none) ++counts[cut == Cut::oblique];
+  }
+  communicator().sum(counts);
+  // Corners of cuts along the axes look oblique, and are few.
+  if (counts[1] < 0.15 * static_cast<double>(counts[0] + counts[1]) || counts[1] <= 4) return;
+  lines.push_back(named("stairs", "a surface of [body.lattice] inside cuts cells obliquely, and a cell is there or not: the surface is made of stairs, beside which stresses are off by 10 % "
+                                  "and more; partial_volume = true in [family], or a cloud ([body.points])"));
+}
+
 /// Families within two spacings are the nearest neighbours and hardly more.
 void find_small_horizon(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
   const double ratio = body.horizon() / body.spacing();
@@ -99,8 +140,10 @@ std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
         named("balance", "a cloud with consistent = false in [family]: a constant stress is not in equilibrium on points that lie at random, and "
                          "the body is too soft by 1 to 12 %, however fine it is"));
   find_cut_cells(scene, body, lines);
+  find_stairs(scene, body, lines);
   find_small_horizon(scene, body, lines);
   find_doubts_of_model(scene, problem, lines);
+  find_doubts_of_stiffness(scene, problem, lines);
   double farthest = 0;
   for (const std::int32_t p : body.internal())
     for (const double x : body.position(static_cast<std::size_t>(p))) farthest = std::max(farthest, std::abs(x));
@@ -131,4 +174,3 @@ std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
 }
 
 }  // namespace perikit
-  find_doubts_of_stiffness(scene, problem, lines);
