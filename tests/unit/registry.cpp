@@ -119,7 +119,7 @@ TEST_CASE("what the loader refuses carries its reason") {
 }
 
 TEST_CASE("ABI, build and symbols are compared before any object crosses") {
-  check_refused(built("missing_symbol"), "symbol perikit_register missing");
+  check_refused(built("missing_symbol"), "symbol perikit_register missing: PERIKIT_PLUGIN(registrar) {");
   check_refused(built("other_abi"), fmt::format("ABI version {}, this program has {}", PERIKIT_ABI_VERSION + 6, PERIKIT_ABI_VERSION));
   check_refused(built("other_build"), "built as 'msvc19 abacus'");
   check_refused(built("other_headers"),
@@ -177,6 +177,8 @@ TEST_CASE("without a process to try it in, a library is refused") {
 }
 
 TEST_CASE("bad descriptions are refused with part and reason") {
+  check_refused(built("nameless"), "influence '': it has no name: {.name = \"its_name\", ...}");
+  check_refused(built("nameless_parameter"), "influence 'bell': the parameter \"Width of the bell.\" has no name: table.number(\"its_name\", ...)");
   check_refused(built("bad_names"), "influence 'CamelCase': the name must be snake_case");
   check_refused(built("bad_underscores"), "influence 'two__lines': the name must be snake_case");
   check_refused(built("trailing_underscore"), "influence 'private_': the name must be snake_case");

@@ -107,6 +107,9 @@ TEST_CASE("exponentials over the whole range, and near zero") {
   PERIKIT_COMPARE(expm1, between(-60, 715));
   PERIKIT_COMPARE(expm1, between(-2, 2));
   PERIKIT_COMPARE(expm1, arguments(-60, 3));
+  const auto packed = [](Pack x) { return tanh(x); };
+  const auto exact = [](long double x) { return std::tanh(x); };
+  for (const auto& some : {arguments(-1074, 1024), between(-25, 25), between(-1, 1)}) compare("tanh", packed, exact, some, 3.0);
 }
 
 TEST_CASE("roots and rational powers") {
@@ -183,6 +186,9 @@ TEST_CASE("duals differentiate every function, and twice") {
       "exp", [](auto x) { return exp(x); }, [](double x) { return std::exp(x); }, [](double x) { return std::exp(x); });
   check(
       "expm1", [](auto x) { return expm1(x); }, [](double x) { return std::exp(x); }, [](double x) { return std::exp(x); });
+  check(
+      "tanh", [](auto x) { return tanh(x); }, [](double x) { return 1 - std::tanh(x) * std::tanh(x); },
+      [](double x) { return -2 * std::tanh(x) * (1 - std::tanh(x) * std::tanh(x)); });
   check(
       "quotient", [](auto x) { return (1.0 + x) / (2.0 - x * x); },
       [](double x) { return (x * x + 2 * x + 2) / ((2 - x * x) * (2 - x * x)); },

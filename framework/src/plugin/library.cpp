@@ -234,7 +234,7 @@ void load_library(const fs::path& file, Registrar& registrar) {
   check_file(file);
   const dll::shared_library library = load(file);
   for (const char* symbol : {"perikit_abi_version", "perikit_build_id", "perikit_register"}) {
-    if (!library.has(symbol)) throw Refusal(fmt::format("symbol {} missing (PERIKIT_PLUGIN defines it)", symbol));
+    if (!library.has(symbol)) throw Refusal(fmt::format("symbol {} missing: PERIKIT_PLUGIN(registrar) {{ registrar.material({{.name = ...}}, ...); }} defines it, at the end of the source", symbol));
   }
   try {
     const char* build_id = library.get<const char*()>("perikit_build_id")();

@@ -20,7 +20,7 @@ namespace {
 std::string fault(const ParameterTable& table) {
   std::set<std::string_view> names;
   for (const Parameter& parameter : table.parameters()) {
-    if (parameter.name.empty()) return "a parameter has no name";
+    if (parameter.name.empty()) return fmt::format("the parameter \"{}\" has no name: table.number(\"its_name\", ...)", parameter.text);
     if (parameter.name == "type") return "a parameter cannot be named 'type', which names the part";
     if (!names.insert(parameter.name).second) return fmt::format("parameter '{}' is declared twice", parameter.name);
   }
@@ -40,6 +40,7 @@ std::string fault(const std::string& example) try {
 }
 
 std::string fault(const PartDescription& description) {
+  if (description.name.empty()) return "it has no name: {.name = \"its_name\", ...}";
   if (!is_snake_case(description.name)) return fmt::format("the name must be {}", snake_case_rule);
   if (description.summary.empty() || description.summary.find('\n') != std::string::npos) return "the summary must be one line of text";
   if (description.examples.empty()) return "at least one example is needed (\"\" where nothing is required)";

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "perikit/core/simd_math.hpp"
+#include "perikit/core/standard_functions.hpp"
 
 namespace perikit {
 
@@ -69,20 +70,63 @@ Dual<T> operator/(Dual<T> a, U b) noexcept {
   return {a.value / b, a.derivative / b};
 }
 
-// Comparisons look at the value.
-template <class T, class U>
-auto operator<(Dual<T> a, U b) noexcept {
-  return a.value < b;
-}
-template <class T, class U>
-auto operator>(Dual<T> a, U b) noexcept {
-  return a.value > b;
-}
+namespace detail {
+template <class T>
+inline constexpr bool is_dual = false;
+template <class T>
+inline constexpr bool is_dual<Dual<T>> = true;
 
-template <class M, class T>
-Dual<T> select(M mask, Dual<T> a, Dual<T> b) noexcept {
-  return {select(mask, a.value, b.value), select(mask, a.derivative, b.derivative)};
+/// The number without its derivatives.
+template <class T>
+const T& value(const T& x) noexcept {
+  return x;
 }
+template <class T>
+decltype(auto) value(const Dual<T>& x) noexcept {
+  return value(x.value);
+}
+}  // namespace detail
+
+/// Two scalars, at least one of them a Dual, the other one its like or a constant for it.
+template <class A, class B>
+concept DualWith = (detail::is_dual<A> || detail::is_dual<B>) && (std::convertible_to<A, B> || std::convertible_to<B, A>);
+/// That of both which the other one can be made to.
+template <class A, class B>
+using Joint = std::conditional_t<std::convertible_to<B, A>, A, B>;
+
+// Comparisons look at the value. They give what those of the values give: a bool, or a mask of packs.
+template <class A, class B>
+requires DualWith<A, B>
+auto operator<(const A& a, const B& b) noexcept { return detail::value(a) < detail::value(b); }
+template <class A, class B>
+requires DualWith<A, B>
+auto operator<=(const A& a, const B& b) noexcept { return detail::value(a) <= detail::value(b); }
+template <class A, class B>
+requires DualWith<A, B>
+auto operator>(const A& a, const B& b) noexcept { return detail::value(a) > detail::value(b); }
+template <class A, class B>
+requires DualWith<A, B>
+auto operator>=(const A& a, const B& b) noexcept { return detail::value(a) >= detail::value(b); }
+template <class A, class B>
+requires DualWith<A, B>
+auto operator==(const A& a, const B& b) noexcept { return detail::value(a) == detail::value(b); }
+template <class A, class B>
+requires DualWith<A, B>
+auto operator!=(const A& a, const B& b) noexcept { return detail::value(a) != detail::value(b); }
+
+template <class M, class A, class B>
+requires DualWith<A, B>
+Joint<A, B> select(M mask, const A& a, const B& b) noexcept {
+  const Joint<A, B> x = a, y = b;
+  return {select(mask, x.value, y.value), select(mask, x.derivative, y.derivative)};
+}
+// Where both are equal: the second, with its derivative.
+template <class A, class B>
+requires DualWith<A, B>
+Joint<A, B> min(const A& a, const B& b) noexcept { return select(a < b, a, b); }
+template <class A, class B>
+requires DualWith<A, B>
+Joint<A, B> max(const A& a, const B& b) noexcept { return select(a > b, a, b); }
 
 template <class T>
 Dual<T> sqrt(Dual<T> x) noexcept {
@@ -123,8 +167,28 @@ Dual<T> expm1(Dual<T> x) noexcept {
   return {e, x.derivative * (e + 1.0)};
 }
 template <class T>
+Dual<T> tanh(Dual<T> x) noexcept {
+  const T t = tanh(x.value);
+  return {t, x.derivative * (1.0 - t * t)};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> pow(Dual<T> x, U exponent) noexcept {
+  return {pow(x.value, exponent), x.derivative * (exponent * pow(x.value, exponent - 1))};
+}
+template <class T, ConstantFor<T> U>
+Dual<T> pow(U x, Dual<T> exponent) noexcept {
+  const T power = pow(T(x), exponent.value);
+  return {power, exponent.derivative * (power * log(T(x)))};
+}
+/// x > 0
+template <class T>
+Dual<T> pow(Dual<T> x, Dual<T> exponent) noexcept {
+  const T power = pow(x.value, exponent.value);
+  return {power, power * (exponent.derivative * log(x.value) + x.derivative * (exponent.value / x.value))};
+}
+template <class T>
 Dual<T> abs(Dual<T> x) noexcept {
-  return select(x.value < T(0.0), -x, x);
+  return select(x < 0.0, -x, x);
 }
 
 }  // namespace perikit

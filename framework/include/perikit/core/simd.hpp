@@ -3,8 +3,10 @@
 /// GCC/Clang vector extensions underneath; width 8 (AVX-512), 4 (AVX) or 2 (SSE2, NEON).
 
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 
 #if defined(__SSE2__)
@@ -54,7 +56,7 @@ inline constexpr bool counts_operations = false;
 /// Operations so far; 0 where they are not counted.
 inline std::uint64_t counted_operations() noexcept { return detail::operations; }
 
-/// Result of a lane-wise comparison: in each lane, whether it holds.
+/// Result of a lane-wise comparison: in each lane, whether it holds. Masks are joined by & and | and negated by !; select(mask, a, b) chooses.
 struct PackMask {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   __mmask8 v;
@@ -70,6 +72,24 @@ struct PackMask {
   friend PackMask operator!(PackMask a) noexcept { return {static_cast<decltype(v)>(a.v ^ everywhere)}; }
   PackMask& operator&=(PackMask b) noexcept { return *this = *this & b; }
   PackMask& operator|=(PackMask b) noexcept { return *this = *this | b; }
+  // Conditions that are the same in all lanes.
+  template <std::same_as<bool> B>
+  friend PackMask operator&(PackMask a, B b) noexcept { return b ? a : PackMask{}; }
+  template <std::same_as<bool> B>
+  friend PackMask operator&(B a, PackMask b) noexcept { return b & a; }
+  template <std::same_as<bool> B>
+  friend PackMask operator|(PackMask a, B b) noexcept { return b ? !PackMask{} : a; }
+  template <std::same_as<bool> B>
+  friend PackMask operator|(B a, PackMask b) noexcept { return b | a; }
+
+  /// There is none: the points of a pack may answer differently. Says so where a mask stands in `if`, `?:`, `&&`, `||` or a bool.
+  template <std::same_as<bool> B>
+  operator B() const noexcept {
+    static_assert(!std::same_as<B, bool>,
+                  "a comparison of packs has an answer for each point: instead of if, ?:, && and || write select(a < b, x, y), & and |; "
+                  "any(mask) and all(mask) are bools");
+    return false;
+  }
 };
 
 struct Product;
@@ -205,6 +225,7 @@ inline PackMask operator==(Pack a, Pack b) noexcept { return {a.v == b.v}; }
 #endif
 inline PackMask operator>(Pack a, Pack b) noexcept { return b < a; }
 inline PackMask operator>=(Pack a, Pack b) noexcept { return b <= a; }
+inline PackMask operator!=(Pack a, Pack b) noexcept { return !(a == b); }
 
 inline Pack select(PackMask m, Pack a, Pack b) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -213,7 +234,15 @@ inline Pack select(PackMask m, Pack a, Pack b) noexcept {
   return {m.v ? a.v : b.v};
 #endif
 }
-inline double select(bool m, double a, double b) noexcept { return m ? a : b; }
+// Numbers with a mask are packs. (Without these two, a mask and a number would be as far from the one as from the other overload.)
+inline Pack select(PackMask m, double a, double b) noexcept { return select(m, Pack(a), Pack(b)); }
+inline Pack select(bool m, Pack a, Pack b) noexcept { return m ? a : b; }
+
+/// Numbers of the language, of which two have a common type.
+template <class T>
+concept Number = std::is_arithmetic_v<T>;
+template <std::integral M, Number A, Number B>
+std::common_type_t<A, B> select(M m, A a, B b) noexcept { return m ? std::common_type_t<A, B>(a) : std::common_type_t<A, B>(b); }
 
 inline bool any(PackMask m) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
@@ -229,6 +258,7 @@ inline bool any(PackMask m) noexcept {
 #endif
 }
 inline bool any(bool m) noexcept { return m; }
+inline bool all(bool m) noexcept { return m; }
 inline bool all(PackMask m) noexcept {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
   return m.v == PackMask::everywhere;

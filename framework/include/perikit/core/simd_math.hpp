@@ -1,7 +1,7 @@
 #pragma once
-/// Elementary functions of a Pack: log, log1p, exp, expm1, cbrt and rational powers, to 2 units in the last place over the whole
-/// range of double, with the IEEE results for 0, infinity, NaN, subnormal and inadmissible arguments. No branches and no loops
-/// that depend on the data, so that a lane never sees its neighbours. The same names for scalars: laws are written once.
+/// Elementary functions of a Pack: log, log1p, exp, expm1, cbrt and rational powers to 2 units in the last place, and tanh to 3, over the whole
+/// range of double, with the IEEE results for 0, infinity, NaN, subnormal and inadmissible arguments; and pow, which is less exact. No branches
+/// and no loops that depend on the data, so that a lane never sees its neighbours. The same names for scalars: laws are written once.
 
 #include <cmath>
 #include <concepts>
@@ -21,13 +21,13 @@ template <std::floating_point T>
 T abs(T x) noexcept {
   return std::abs(x);
 }
-template <std::floating_point T>
-T min(T a, T b) noexcept {
-  return a < b ? a : b;
+template <Number A, Number B>
+std::common_type_t<A, B> min(A a, B b) noexcept {
+  return select(a < b, a, b);
 }
-template <std::floating_point T>
-T max(T a, T b) noexcept {
-  return a > b ? a : b;
+template <Number A, Number B>
+std::common_type_t<A, B> max(A a, B b) noexcept {
+  return select(a > b, a, b);
 }
 template <std::floating_point T>
 T log(T x) noexcept {
@@ -50,6 +50,14 @@ T cbrt(T x) noexcept {
   return std::cbrt(x);
 }
 template <std::floating_point T>
+T tanh(T x) noexcept {
+  return std::tanh(x);
+}
+template <Number A, Number B>
+auto pow(A x, B exponent) noexcept {
+  return std::pow(x, exponent);
+}
+template <std::floating_point T>
 T reciprocal(T x) noexcept {
   return T(1) / x;
 }
@@ -57,11 +65,6 @@ template <std::floating_point T>
 T reciprocal_cbrt(T x) noexcept {
   return T(1) / std::cbrt(x);
 }
-template <std::floating_point T>
-T select(bool m, T a, T b) noexcept {
-  return m ? a : b;
-}
-
 namespace detail {
 
 inline Bits bits(Pack a) noexcept {
@@ -215,6 +218,28 @@ inline Pack cbrt(Pack x) noexcept {
   return select((magnitude > 0.0) & (magnitude < detail::infinity), signed_result, x);
 }
 
+inline Pack tanh(Pack x) noexcept {
+  const Pack e = expm1(2.0 * min(abs(x), Pack(20.0))), size = e / (e + 2.0);
+  return select(abs(x) > 0.0, select(x < 0.0, -size, size), x);   // else x is 0 or not a number
+}
+
+/// x^exponent for |exponent| < 2^51; of x < 0 with whole exponents alone. Its relative error is |ln(x^exponent)| + 2 units in the last place: where
+/// the exponent is known when compiling, rational_power below is more exact and quicker.
+inline Pack pow(Pack x, Pack exponent) noexcept {
+  const Pack size = exp(exponent * log(abs(x))), half = 0.5 * exponent;
+  const PackMask whole = detail::nearest_integer(exponent) == exponent, odd = detail::nearest_integer(half) != half;
+  const Pack of_negative = select(whole, select(odd, -size, size), Pack(detail::not_a_number));
+  return select((exponent == 0.0) | (x == 1.0), Pack(1.0), select(x < 0.0, of_negative, size));
+}
+/// x^n for a whole number n, by multiplication.
+template <std::integral N>
+Pack pow(Pack x, N n) noexcept {
+  Pack power = 1.0;
+  for (auto left = n < 0 ? -static_cast<long long>(n) : static_cast<long long>(n); left != 0; left /= 2, x *= x)
+    if (left % 2 != 0) power *= x;
+  return n < 0 ? Pack(1.0) / power : power;
+}
+
 /// x^N for a constant integer N.
 template <int N, class T>
 T integer_power(const T& x) noexcept {
@@ -228,6 +253,10 @@ T integer_power(const T& x) noexcept {
     return integer_power<N / 2>(T(x * x));
   else
     return x * integer_power<N - 1>(x);
+}
+template <int N>
+Pack integer_power(const Product& x) noexcept {
+  return integer_power<N>(Pack(x));
 }
 
 /// x^(N/D) for a constant exponent, D = 1, 2 or 3; x > 0 unless D = 1. To 2 units in the last place for exponents in [-1, 1], 3
@@ -258,6 +287,11 @@ T rational_power(const T& x) noexcept {
     else
       return T(1.0) / (root * integer_power<-q>(x));
   }
+}
+
+template <int N, int D>
+Pack rational_power(const Product& x) noexcept {
+  return rational_power<N, D>(Pack(x));
 }
 
 }  // namespace perikit

@@ -83,6 +83,17 @@ struct Tensor {
   friend Tensor operator*(const U& s, const Tensor& a) noexcept {
     return map([&](int k) { return s * a[k]; });
   }
+  template <std::convertible_to<T> U>
+  friend Tensor operator*(const Tensor& a, const U& s) noexcept {
+    return s * a;
+  }
+  template <std::convertible_to<T> U>
+  friend Tensor operator/(const Tensor& a, const U& s) noexcept {
+    return map([&](int k) { return a[k] / s; });
+  }
+  friend Tensor operator-(const Tensor& a) noexcept {
+    return map([&](int k) { return -a[k]; });
+  }
 
   /// Components f(k). (Not a loop over a default-constructed tensor: that one would be cleared in memory first.)
   template <class F>

@@ -97,6 +97,26 @@ class ParameterTable {
   /// A material parameter: a number, or an expression in x, y, z that is evaluated at every point at set-up.
   Parameter& material(std::string name, std::string unit, std::string text);
 
+  // Texts that are missing, or too many.
+  template <class... Texts>
+  requires(sizeof...(Texts) != 3)
+  Parameter& number(const Texts&...) { return misdeclared<sizeof...(Texts) == 3>(); }
+  template <class... Texts>
+  requires(sizeof...(Texts) != 3)
+  Parameter& material(const Texts&...) { return misdeclared<sizeof...(Texts) == 3>(); }
+  template <class... Texts>
+  requires(sizeof...(Texts) != 3)
+  Parameter& expression(const Texts&...) { return misdeclared<sizeof...(Texts) == 3>(); }
+  template <class... Texts>
+  requires(sizeof...(Texts) != 2)
+  Parameter& integer(const Texts&...) { return misdeclared<true, sizeof...(Texts) == 2>(); }
+  template <class... Texts>
+  requires(sizeof...(Texts) != 2)
+  Parameter& boolean(const Texts&...) { return misdeclared<true, sizeof...(Texts) == 2>(); }
+  template <class... Texts>
+  requires(sizeof...(Texts) != 2)
+  Parameter& string(const Texts&...) { return misdeclared<true, sizeof...(Texts) == 2>(); }
+
   ParameterTable& exactly(int count, std::vector<std::string> names);
   ParameterTable& at_most_of(int count, std::vector<std::string> names);
 
@@ -105,6 +125,13 @@ class ParameterTable {
   const Parameter* find(std::string_view name) const noexcept;
 
  private:
+  template <bool with_unit, bool without_unit = true>
+  Parameter& misdeclared() {
+    static_assert(with_unit, "a parameter is declared by its name, its unit and what it is: table.number(\"width\", \"m\", \"Width of the bell.\"); "
+                             "\"-\" is no unit");
+    static_assert(without_unit, "a parameter without unit is declared by its name and what it is: table.integer(\"order\", \"Order of the gradient.\")");
+    return parameters_.front();
+  }
   std::vector<Parameter> parameters_;
   std::vector<ParameterGroup> groups_;
 };

@@ -6,18 +6,13 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "perikit/plugin/parameters.hpp"
+#include "perikit/plugin/part_checks.hpp"
 
 namespace perikit {
-
-class Kinematics;
-class Stabilization;
-class Material;
-class Damage;
-class InfluenceFunction;
-class Integrator;
 
 /// Creates the nested parts of a part (the base of `selective`, the influence function of a family).
 class PartFactory {
@@ -43,7 +38,25 @@ struct PartDescription {
 };
 
 template <class Interface>
-using Factory = std::function<std::unique_ptr<Interface>(const ParameterValues&, const PartFactory&)>;
+class Factory;
+namespace detail {
+template <class Function>
+inline constexpr bool is_factory = false;
+template <class Interface>
+inline constexpr bool is_factory<Factory<Interface>> = true;
+}  // namespace detail
+
+/// The function that makes a part: [](const ParameterValues& values, const PartFactory& parts) { return std::make_unique<PartName>(...); }
+template <class Interface>
+class Factory final : public std::function<std::unique_ptr<Interface>(const ParameterValues&, const PartFactory&)> {
+  using Base = std::function<std::unique_ptr<Interface>(const ParameterValues&, const PartFactory&)>;
+
+ public:
+  Factory() = default;
+  template <class Function>
+  requires(!detail::is_factory<Function> && detail::CheckedFunction<Interface, Function>::checked)
+  Factory(Function function) : Base(std::move(function)) {}
+};
 
 /// Where the scene reader looks parts up. Implemented by Registry.
 class PartCatalogue {

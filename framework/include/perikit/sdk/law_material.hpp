@@ -37,6 +37,7 @@
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/free_stretch.hpp"
 #include "perikit/sdk/history.hpp"
+#include "perikit/sdk/law_checks.hpp"
 #include "perikit/sdk/volumetric.hpp"
 
 // Everything of one point is inlined: its tensors live in registers only where nothing is called. Not in sanitized builds, where the
@@ -58,6 +59,8 @@ concept HasVolume = requires(const Law& law, const std::array<double, Law::trait
 
 template <class Law>
 class LawMaterial final : public Material {
+  static_assert(detail::check_law<Law>());
+
  public:
   explicit LawMaterial(Law law = {}) : law_(std::move(law)) {}
 

@@ -1,0 +1,6 @@
+#include "perikit/sdk/plugin.hpp"
+
+PERIKIT_PLUGIN(registrar) {
+  registrar.influence({.summary = "a part without a name", .examples = {""}},
+                      [](const perikit::ParameterValues&, const perikit::PartFactory&) { return nullptr; });
+}
