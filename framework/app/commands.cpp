@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <limits>
 #include <sstream>
@@ -250,20 +249,6 @@ void bench(const Options& options) {
 void start_project(const Options& options) {
   const auto registry = open_registry(options);
   fmt::print("{}", new_project(*registry, options.kind, options.part, options.history));
-}
-
-/// Becomes the program of the contract suites, which lies beside this one.
-void contract(const Options& options) {
-  const std::filesystem::path program = contract_program();
-  if (!std::filesystem::exists(program))
-    throw InputError({program.string()}, "", fmt::format("the contract suites are not built yet: {}", how_to_build_contract()));
-  std::vector<std::string> words{program.string(), "--library=" + options.library.string()};
-  for (const auto& folder : options.plugin_path) words.push_back("--plugin-path=" + folder.string());
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  execv(program.c_str(), arguments.data());
-  throw InputError({program.string()}, "", fmt::format("the contract suites cannot be run: {}", std::generic_category().message(errno)));
 }
 
 }  // namespace perikit::app

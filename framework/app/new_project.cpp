@@ -93,7 +93,8 @@ std::string new_project(const Registry& registry, const std::string& kind, const
     for (const auto& entry : fs::directory_iterator(source))
       if (entry.is_regular_file()) write_file_atomically(folder / entry.path().filename(), filled(entry.path(), words));
   }
-  const std::string first = fs::exists(contract_program()) ? "" : fmt::format("  {}\n", how_to_build_contract());   // its ctest runs them
+  // Its ctest runs the contract suites; a build folder builds them by itself where they are missing.
+  const std::string first = fs::exists(contract_program()) || in_build_folder() ? "" : fmt::format("  {}\n", how_to_build_contract());
   return fmt::format("wrote {0}/: replace the default in {0}/plugin.cpp by your physics\n{1}"
                      "  cmake -S {0} -B {0}/build && cmake --build {0}/build && ctest --test-dir {0}/build --output-on-failure\n"
                      "  perikit run {0}/scene.toml --plugin-path {0}/build -o {0}/out\n", part, first);

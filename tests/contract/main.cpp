@@ -9,12 +9,16 @@
 
 #include <string_view>
 
+#include "perikit/plugin/abi.hpp"
 #include "tests/contract/fixture.hpp"
 #include "tests/contract/library.hpp"
 
 namespace {
 
 using namespace perikit;
+
+/// Of which build of perikit these suites are: `perikit contract` looks for it in the file.
+[[gnu::used]] constexpr char build_id[] = PERIKIT_BUILD_ID;
 
 struct Arguments {
   std::string parts;
