@@ -74,12 +74,14 @@ def main():
 
     wrong = []
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        sound = {kind: pool.submit(compile_part, command, f"sound {kind}", text) for kind, text in templates.items()}
+        final = templates["material"].replace("struct PartName {", "struct PartName final {")
+        assert final != templates["material"]
+        sound = {kind: pool.submit(compile_part, command, f"sound {kind}", text) for kind, text in (templates | {"final law": final}).items()}
         found = {}
         for name, (kind, text, instead) in MISTAKES.items():
             assert templates[kind].count(text) == 1, f"{name}: '{text}' stands {templates[kind].count(text)} times in the template"
             found[name] = pool.submit(compile_part, command, name, templates[kind].replace(text, instead))
-        wrong += [f"the template of a {kind} does not compile: {job.result()}" for kind, job in sound.items() if job.result()]
+        wrong += [f"the template ({kind}) does not compile: {job.result()}" for kind, job in sound.items() if job.result()]
         found = {name: job.result() for name, job in found.items()}
 
     # A library without PERIKIT_PLUGIN.

@@ -21,9 +21,15 @@ struct NamedP {
 template <class Law, class Name>
 struct Beside : Law, Name {};
 template <class Law>
-concept NamesPsi = !requires { &Beside<Law, NamedPsi>::psi; };
+consteval bool names_psi() {
+  if constexpr (std::is_final_v<Law>) return false;   // no base of anything: not known
+  else return !requires { &Beside<Law, NamedPsi>::psi; };
+}
 template <class Law>
-concept NamesP = !requires { &Beside<Law, NamedP>::P; };
+consteval bool names_P() {
+  if constexpr (std::is_final_v<Law>) return false;
+  else return !requires { &Beside<Law, NamedP>::P; };
+}
 
 template <class Law>
 concept HasTraits = requires {
@@ -37,14 +43,14 @@ consteval void check_energy_and_stress() {
   using T = Pack;
   using H = Tensor<T, Solid>;
   constexpr bool energy = HasEnergy<Law, T, Solid, K>, stress = HasStress<Law, T, Solid, K>;
-  if constexpr (!energy && NamesPsi<Law>) {
+  if constexpr (!energy && names_psi<Law>()) {
     static_assert(!requires(Law& law, const H& h, const K& k) { { law.psi(h, k) } -> std::same_as<T>; } || energy,
                   "psi must not change the law: write const behind it, template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept");
     static_assert(!requires(const Law& law, const H& h, const K& k) { law.psi(h, k); } || energy,
                   "psi returns another type than T: write template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept");
     static_assert(energy || requires(Law& law, const H& h, const K& k) { law.psi(h, k); },
                   "psi does not take every scalar T and space S: write template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept");
-  } else if constexpr (!stress && NamesP<Law>) {
+  } else if constexpr (!stress && names_P<Law>()) {
     static_assert(stress, "P is not as it must be: write template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept");
   } else {
     static_assert(energy || stress, "a law needs an energy: template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept");
@@ -54,7 +60,7 @@ consteval void check_energy_and_stress() {
       static_assert(HasEnergy<Law, Dual<T>, Solid, K>,
                     "psi takes packs alone, and the stress is its derivative: write it for every scalar T, "
                     "template <class T, class S, class K> T psi(const Tensor<T, S>& H, const K& k) const noexcept");
-    else if constexpr (!HasTangent<Law, T, Solid, K>)
+    else if constexpr (stress && !HasTangent<Law, T, Solid, K>)
       static_assert(HasStress<Law, Dual<T>, Solid, K>,
                     "P takes packs alone, and the tangent is its derivative: write it for every scalar T, "
                     "template <class T, class S, class K> Tensor<T, S> P(const Tensor<T, S>& H, const K& k) const noexcept");
