@@ -70,6 +70,13 @@ def with_inclusion(text):
     return text.replace("[sets]\n", '[sets]\nsome = "x > 11 && y > 7 && x < 21"\n') + INCLUSION
 
 
+def lone_points(kinematics):
+    """Two laws, and a crack and a hole that leave points without a gradient."""
+    text = scene(kinematics, 3, False, 'type = "verlet"\nend_time = 1.0\ntime_step = 0.05', cells=[3, 6, 7]).replace("ratio = 2.515", "ratio = 1.515")
+    text = text.replace("[sets]\n", 'inside = "(x - 2.3)^2 + (y - 2.7)^2 + (z - 4.3)^2 > 1.69"\n[sets]\nsome = "x > 1.78"\n', 1)
+    return text + INCLUSION + "[[crack]]\npolygon = [[1.57, -1, -1], [1.57, 1.7, -1], [1.57, 1.7, 8], [1.57, -1, 8]]\n"
+
+
 def with_face(text):
     """The layer of held points becomes a face that moves as it did."""
     begin, end = text.index("[[boundary]]"), text.index("[[load]]")
@@ -209,6 +216,8 @@ def cases(everything, work):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")
     yield "conventional, body with a hole", hole, ranks, threads
+    # Ranks leave out bonds that nobody feels, in other batches than one rank evaluates.
+    yield "baqp, points without a gradient", lone_points(KINEMATICS["baqp"]), (2, 3), (1,)
     # Rows in pieces, some of which no point of a rank feels beside pieces that it does.
     porous = scene(KINEMATICS["baqp"], 3, False, 'type = "verlet"\nend_time = 0.5\ntime_step = 0.05', cells=[200, 8, 4])
     yield "baqp, porous bar", porous.replace("[sets]", 'inside = "sin(12.9898*x + 78.233*y + 37.719*z) > 0.2"\n[sets]'), ranks, threads

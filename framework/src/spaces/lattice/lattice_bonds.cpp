@@ -161,7 +161,8 @@ void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, boo
 }
 
 template <int D>
-int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
+int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy,
+                                    std::vector<OneSidedStress>& later) {
   const LatticeChunk& chunk = tiles_.chunks[index];
   const LatticePattern& pattern = families_.pattern(chunk);
   const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, both_ends = pairs_ && !pass.gathers_only(), sampled_pairs = samples_pairs(pass);
@@ -230,7 +231,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
   }
   if (pass.gathers_only()) return -1;
   s.stress_weight ? choose(adjoint, true_type()) : choose(adjoint, false_type());
-  if (without_.any()) one_sided_stress(chunk, slot, slots, vectors, s);
+  if (without_.any()) one_sided_stress(chunk, slot, slots, vectors, s, later);
   if (selective_) add_pressures(chunk, slot, slots, s, both_ends, tangent);
   return -1;
 }
@@ -264,22 +265,29 @@ void LatticeBonds<D>::one_sided_gradients(const LatticeChunk& chunk, std::size_t
   });
 }
 
-/// Gives the ends of these bonds what their shares differ from those that the adjoint has taken for granted.
 template <int D>
-void LatticeBonds<D>::one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s) noexcept {
+void LatticeBonds<D>::one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s,
+                                       std::vector<OneSidedStress>& later) const {
   over_one_sided(chunk, slot, slots, [&](int lane, int k, std::size_t near, std::size_t far, const EndShares& shares) {
     if (shares.none()) return;
+    OneSidedStress& out = later.emplace_back(OneSidedStress{near, far, {shares.near - (1 - far_share_), shares.far - far_share_}, {}});
     double xi[D], g[D], row[D];
     vectors.of(lane, k, xi, g);
     for (int c = 0; c < D; ++c) {
       for (int e = 0; e < D; ++e) row[e] = (s.stress_weight ? s.stress_weight[lane] : 1.0) * s.P[(c * D + e) * batch_points + lane];
       bond_shape_row_adjoint<D>(row, xi, g);
-      for (int e = 0; e < D; ++e) {
-        flux_.component(c * D + e)[near] += (shares.near - (1 - far_share_)) * row[e];
-        flux_.component(c * D + e)[far] += (shares.far - far_share_) * row[e];
-      }
+      std::copy_n(row, D, out.stress + c * D);
     }
   });
+}
+
+template <int D>
+void LatticeBonds<D>::give(const std::vector<OneSidedStress>& corrections) noexcept {
+  for (const OneSidedStress& at : corrections)
+    for (int c = 0; c < D * D; ++c) {
+      flux_.component(c)[at.near] += at.shares.near * at.stress[c];
+      flux_.component(c)[at.far] += at.shares.far * at.stress[c];
+    }
 }
 
 template <int D>
@@ -288,15 +296,19 @@ void LatticeBonds<D>::bonds(std::size_t b, Pass& pass) {
   BatchScratch& s = scratch_.mine();
   const bool all = pass.gathers_only();
   const std::vector<SlotBatch>& of_all = samples_pairs(pass) ? roles_.slots.front() : every_slot_;
+  std::vector<OneSidedStress> later;
   for (std::size_t c = block.chunk_begin; c < block.chunk_end; ++c) {
     const LatticeChunk& chunk = tiles_.chunks[c];
     if (!pass.wanted(chunk.first) || !roles_.wants(c, &ChunkRole::bonds)) continue;
     GroupEnergy energy;
     s.one_law = roles_.chunk.empty() || pass.work.laminates_near(chunk.first) ? ChunkRole::mixed : roles_.chunk[c].law;
     for (const auto& [slot, count] : all ? of_all : roles_.slots_of(c)) {
-      const int bad = bonds_of_chunk(c, slot, count, s, pass, &energy);
+      const int bad = bonds_of_chunk(c, slot, count, s, pass, &energy, later);
       if (bad >= 0) return pass.report(chunk.first + bad % chunk_points);
     }
+    // After all slots: ranks that leave out slots that nobody feels take the others in other batches, and a point gets its share from several slots.
+    give(later);
+    later.clear();
     if (pass.energies) pass.energies[chunk.first / chunk_points] = energy;
   }
 }

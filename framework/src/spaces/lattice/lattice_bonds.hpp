@@ -31,20 +31,28 @@ class LatticeBonds final : public EvaluationSpace {
   void report(ModelReport& report) const override;
 
  private:
+  /// Of a bond beside a point without a gradient: what its ends get beside what the adjoint gives them.
+  struct OneSidedStress {
+    std::size_t near, far;
+    EndShares shares;  ///< less those that the adjoint takes for granted
+    double stress[D * D];
+  };
   std::size_t blocks() const noexcept { return tiles_.blocks.size(); }
   void gradients(std::size_t b, Pass& pass);
   void bonds(std::size_t b, Pass& pass);
-  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy);
+  int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy, std::vector<OneSidedStress>& later);
   void number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();
   void store_corrections();
-  /// Calls visit(lane, slot, shares) for the bonds of a chunk beside points without a gradient.
+  /// Calls visit(lane, slot, near, far, shares) for the bonds of a chunk beside points without a gradient.
   template <class Visit>
   void over_one_sided(const LatticeChunk& chunk, std::size_t slot, int slots, Visit&& visit) const;
   void one_sided_gradients(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, ConstFieldView u, ConstFieldView Hbar,
                            double* H, BatchScratch& s) const noexcept;
-  void one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s) noexcept;
+  void one_sided_stress(const LatticeChunk& chunk, std::size_t slot, int slots, const BondVectors& vectors, const BatchScratch& s,
+                        std::vector<OneSidedStress>& later) const;
+  void give(const std::vector<OneSidedStress>& corrections) noexcept;
   void divergence(Pass& pass, int number) const;
   bool samples_pairs(const Pass& pass) const noexcept;
   int sample_far_ends(int lanes, BatchScratch& s, Pass& pass);
