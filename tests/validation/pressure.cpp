@@ -120,6 +120,37 @@ TEST_CASE("pressure: exact totals, on one side and on a hole") {
   }
 }
 
+TEST_CASE("a pressure on one side is the same on both halves of it, and where the body lies elsewhere") {
+  // Points in a corner between the side and another one are equally near to both.
+  const auto forces = [](double shift, bool cloud) {
+    const std::string cells = cloud ? "jitter = 1e-13\n" : "";
+    const std::string text = fmt::format("dimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [{0}, {0}]\nupper = [{1}, {2}]\n{3}",
+                                         shift, shift + 1.2, shift + 0.9, cells);
+    const auto simulation = under_pressure({text.c_str(), 2, shift + 1.1}, "baqp", "[[load]]\nset = \"right\"\npressure = 2.0\n[integrator]\ntype = \"evaluate\"\n");
+    const Body& body = simulation->problem().body();
+    Field force = simulation->problem().make_field();
+    simulation->problem().loads().evaluate(1.0, force);
+    std::vector<std::array<double, 2>> rows;   // by the order of the points in the input: row by row
+    for (std::size_t n = 0; n < 12 * 9; ++n) {
+      const std::int32_t p = *std::ranges::find_if(body.owned(), [&](std::int32_t q) { return body.number(static_cast<std::size_t>(q)) == static_cast<std::int64_t>(n); });
+      rows.push_back({force.component(0)[p], force.component(1)[p]});
+    }
+    return rows;
+  };
+  for (const bool cloud : {false, true}) {
+    const auto here = forces(0.0, cloud), there = forces(0.37, cloud);
+    double largest = 0, mirrored = 0, shifted = 0;
+    for (std::size_t n = 0; n < here.size(); ++n) {
+      const auto& other = here[n % 12 + 12 * (8 - n / 12)];
+      largest = std::max(largest, std::abs(here[n][0]));
+      mirrored = std::max({mirrored, std::abs(here[n][0] - other[0]), std::abs(here[n][1] + other[1])});
+      shifted = std::max({shifted, std::abs(here[n][0] - there[n][0]), std::abs(here[n][1] - there[n][1])});
+    }
+    CHECK_MESSAGE(mirrored < 1e-11 * largest, "cloud ", cloud, ": ", mirrored / largest);
+    CHECK_MESSAGE(shifted < 1e-11 * largest, "cloud ", cloud, ": ", shifted / largest);
+  }
+}
+
 TEST_CASE("the stiffness of a pressure that follows is its derivative") {
   const auto simulation = under_pressure(
       ring, "baqp", "[[load]]\nset = \"all\"\npressure = \"1e5*(1 + 0.2*x)\"\nfollower = true\n[integrator]\ntype = \"evaluate\"\n");

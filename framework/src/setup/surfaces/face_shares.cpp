@@ -296,21 +296,12 @@ Shares by_kinematics(const std::vector<std::int32_t>& points, const Face& face, 
   std::vector<SurfacePoint> outer;
   for (const std::int32_t p : body.owned())
     if (const auto i = static_cast<std::size_t>(p); layer.outer(p) && layer.depth(p) >= -1e-9 * body.spacing())
-      outer.push_back({body.position(i), body.part() ? body.places().place[i] : p, in_set[i]});
+      outer.push_back({body.position(i), in_set[i]});
   const double felt = 3 * body.horizon();  // a face is felt no deeper
-  const NearestPoint nearest(of_ranks_near(body, outer, felt * (1 + 1e-9)), 2 * body.spacing());
-  std::vector<std::int32_t> below;
-  for (const std::int32_t p : images ? body.internal() : std::span(body.owned())) {
-    if (body.image(static_cast<std::size_t>(p)) || layer.depth(p) > std::min(felt, 0.5 * layer.thickness())) continue;
-    const SurfacePoint* const at = nearest.to(body.position(static_cast<std::size_t>(p)), felt);
-    if (at && at->chosen) below.push_back(p);
-  }
-  if (images) images->append_images(below);
-  std::vector<std::uint8_t> complete(body.stride(), 0);
-  for (const std::int32_t p : body.complete()) complete[static_cast<std::size_t>(p)] = 1;
+  const double deepest = std::min(felt, 0.5 * layer.thickness()) + 1e-6 * body.spacing();
   Shares shares;
-  for (const std::int32_t p : below)
-    if (complete[static_cast<std::size_t>(p)]) shares[p].area = face.outward * areas.data()[p];
+  for (const auto& [p, share] : points_below(body, outer, felt, images, [&](std::int32_t p) { return layer.depth(p) <= deepest; }))
+    shares[p].area = face.outward * share * areas.data()[p];
   return shares;
 }
 

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <functional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "perikit/body/body.hpp"
+#include "perikit/problem/image_map.hpp"
 
 namespace perikit {
 
@@ -27,30 +27,21 @@ struct CellFaces {
 /// from the points around, no other point lies within two spacings, or within the horizon where that is less.
 std::vector<std::int32_t> free_surface(const Body& body);
 
-/// A point at the surface, of whatever rank.
+/// A point at the surface.
 struct SurfacePoint {
   Point x;
-  std::int64_t place;   ///< in the whole body
   std::int64_t chosen;  ///< 1: of the set that is asked for
 };
 
-/// The nearest of some points to a place.
-class NearestPoint {
- public:
-  /// They are looked up in cells of this size [m].
-  NearestPoint(std::vector<SurfacePoint> points, double cell);
-  /// Not farther than `most` [m]; of equally near ones the one with the smallest place. Null where there is none.
-  const SurfacePoint* to(const Point& x, double most) const;
-
- private:
-  std::int64_t key(const std::array<std::int64_t, 3>& cell) const noexcept;
-  std::array<std::int64_t, 3> cell_of(const Point& x) const noexcept;
-
-  std::vector<SurfacePoint> points_;
-  double cell_;
-  Point lower_{};
-  std::array<std::int64_t, 3> cells_{1, 1, 1};
-  std::vector<std::pair<std::int64_t, std::size_t>> entries_;  ///< (key of the cell, number of the point), ascending
+/// A point below chosen points of the surface. In a corner between a chosen and another face several are equally near: either face has its share.
+struct PointBelow {
+  std::int32_t p;   ///< internal index
+  double share;
 };
+
+/// The points whose nearest points of the surface are chosen, no farther than `most` [m], then images of these; all whose forces are complete here.
+/// candidate(p): whether p may be one of them. surface: of this rank; all ranks must call it.
+std::vector<PointBelow> points_below(const Body& body, const std::vector<SurfacePoint>& surface, double most, const ImageMap* images,
+                                     const std::function<bool(std::int32_t)>& candidate);
 
 }  // namespace perikit

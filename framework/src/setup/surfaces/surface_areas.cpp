@@ -128,7 +128,7 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
   std::vector<SurfacePoint> surface;
   for (const std::int32_t p : free_surface(body)) {
     const auto i = static_cast<std::size_t>(p);
-    surface.push_back({body.position(i), body.part() ? body.places().place[i] : p, in_set[i]});
+    surface.push_back({body.position(i), in_set[i]});
   }
   const auto chosen = std::ranges::count_if(surface, [](const SurfacePoint& point) { return point.chosen != 0; });
   if (counted(chosen).all == 0 && communicator().complete()) {
@@ -138,20 +138,12 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
                                  load.set));
   }
   const double felt = 3 * body.horizon();  // a surface is felt no deeper
-  const NearestPoint nearest(of_ranks_near(body, surface, felt * (1 + 1e-9)), 2 * body.spacing());
   SurfaceAreas found;
-  for (const std::int32_t p : images ? body.internal() : std::span(body.owned())) {
-    const auto i = static_cast<std::size_t>(p);
-    if (body.image(i)) continue;
-    if (const SurfacePoint* at = nearest.to(body.position(i), felt); at && at->chosen) found.points.push_back(p);
+  for (const auto& [p, share] : points_below(body, surface, felt, images, [](std::int32_t) { return true; })) {
+    found.points.push_back(p);
+    found.area.emplace_back();
+    for (std::size_t a = 0; a < 3; ++a) found.area.back()[a] = share * areas[static_cast<std::size_t>(p)][a];
   }
-  if (images) {  // what the evaluation points of the set have of the surface beyond planes
-    images->append_images(found.points);
-    std::vector<std::uint8_t> complete(body.stride(), 0);
-    for (const std::int32_t p : body.complete()) complete[static_cast<std::size_t>(p)] = 1;
-    std::erase_if(found.points, [&](std::int32_t p) { return !complete[static_cast<std::size_t>(p)]; });
-  }
-  for (const std::int32_t p : found.points) found.area.push_back(areas[static_cast<std::size_t>(p)]);
   const bool whole = counted(std::ssize(surface)).all == counted(chosen).all;
   if (body.lattice()) add_samples(body, in_set, found);
   if (body.lattice() && !images && !whole) exact_moments(body, found);
