@@ -3,6 +3,7 @@
 usage: same_bits.py PROGRAM LIBRARY WORK small|all
 """
 
+import concurrent.futures
 import itertools
 import os
 import random
@@ -499,32 +500,37 @@ def not_as_meant(text, folder):
     return found
 
 
+def compare(program, gathered, folder, name, text, ranks, threads):
+    """The name of the case, how many runs were compared, and what was wrong, a line each."""
+    one, several = folder + "_one", folder + "_several"
+    done = run(program, text, one, 0)
+    if done.returncode != 0:
+        return name, 0, [" on one rank: " + done.stderr.strip()]
+    lines, count = [": " + what for what in not_as_meant(text, one)], 0
+    for r, t in itertools.product(ranks, threads):
+        done = run(program, text, several, r, t, environment=gathered)
+        found = [done.stderr.strip()] if done.returncode != 0 else differences(one, several)
+        count += 1
+        if found:
+            lines.append(", %d ranks x %d threads: %s" % (r, t, "; ".join(found[:3])))
+    return name, count, lines
+
+
 def main():
     program, library, work, which = sys.argv[1:]
     need(library)
     # The companion of one rank on several: the first of them has it.
     gathered = hide_petsc(library, work)
     failed, count = [], 0
-    for number, (name, text, ranks, threads) in enumerate(cases(which == "all", work)):
-        one = "%s/%d_one" % (work, number)
-        done = run(program, text, one, 0)
-        if done.returncode != 0:
-            failed.append(name)
-            print("FAILED  %s on one rank: %s" % (name, done.stderr.strip()))
-            continue
-        for what in not_as_meant(text, one):
-            failed.append(name)
-            print("FAILED  %s: %s" % (name, what), flush=True)
-        for r, t in itertools.product(ranks, threads):
-            several = "%s/%d_several" % (work, number)
-            done = run(program, text, several, r, t, environment=gathered)
-            found = [done.stderr.strip()] if done.returncode != 0 else differences(one, several)
-            count += 1
-            if found:
+    # Two at a time: most of a short run on several ranks is their start, in which they wait for each other.
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        jobs = [pool.submit(compare, program, gathered, "%s/%d" % (work, number), *case) for number, case in enumerate(list(cases(which == "all", work)))]
+        for job in jobs:
+            name, compared, lines = job.result()
+            count += compared
+            if lines:
                 failed.append(name)
-                print("FAILED  %s, %d ranks x %d threads: %s" % (name, r, t, "; ".join(found[:3])), flush=True)
-        if name not in failed:
-            print("same    " + name, flush=True)
+            print("\n".join("FAILED  %s%s" % (name, line) for line in lines) if lines else "same    " + name, flush=True)
     for name, found in itertools.chain(carried(program, work, which == "all"), checkpoints(program, work, which == "all"), written_by_all(program, work, which == "all")):
         count += 1
         if found:
