@@ -31,7 +31,7 @@ struct SaintVenantKirchhoff {
     const auto& [lambda, mu] = k;
     const Tensor<T, S> c = right_cauchy_green_minus_identity(H);
     const T mean = (0.5 * lambda) * trace(c);
-    const Tensor<T, S> second = Tensor<T, S>::map([&](int k) { return row<S>(k) == column<S>(k) ? T(mu * c[k] + mean) : T(mu * c[k]); });
+    const Tensor<T, S> second = Tensor<T, S>::map([&, &mu = mu](int k) { return row<S>(k) == column<S>(k) ? T(mu * c[k] + mean) : T(mu * c[k]); });
     return second + H * second;
   }
 

@@ -236,7 +236,7 @@ double bending_energy(BodyProblem& problem, const Extents& box, int across, int 
 void find_thin_body(const Scene& scene, BodyProblem& problem, std::vector<std::string>& lines) {
   const Body& body = problem.body();
   const int d = body.dimension();
-  const auto stores = [](const MaterialRecord& record) { return !record.silent && !record.far; };
+  const auto stores = [](const MaterialRecord& record) { return !record.silent && !record.incomplete; };
   const std::vector<MaterialRecord>& records = problem.laws().records();
   if (d == 1 || std::ranges::count_if(records, stores) != 1 || !std::ranges::find_if(records, stores)->uniform || problem.laws().state_components() > 0 || !scene.cracks.empty()) return;
   const Extents box = extents(body);

@@ -363,13 +363,11 @@ namespace detail {
 /// Rows i and i + Step change places of their blocks of Step lanes off the diagonal.
 template <int Step, int Rows, std::size_t... J>
 [[gnu::always_inline]] inline void transpose_blocks(Pack (&rows)[Rows], std::index_sequence<J...>) noexcept {
-  constexpr Bits low = {((J & Step) != 0 ? pack_width + static_cast<int>(J) - Step : static_cast<int>(J))...};
-  constexpr Bits high = {((J & Step) != 0 ? pack_width + static_cast<int>(J) : static_cast<int>(J) + Step)...};
   _Pragma("GCC unroll 8") for (int i = 0; i < Rows; ++i) {
     if ((i & Step) != 0) continue;
     const Lanes a = rows[i].v, b = rows[i + Step].v;
-    rows[i].v = __builtin_shuffle(a, b, low);
-    rows[i + Step].v = __builtin_shuffle(a, b, high);
+    rows[i].v = __builtin_shufflevector(a, b, ((J & Step) != 0 ? pack_width + static_cast<int>(J) - Step : static_cast<int>(J))...);
+    rows[i + Step].v = __builtin_shufflevector(a, b, ((J & Step) != 0 ? pack_width + static_cast<int>(J) : static_cast<int>(J) + Step)...);
   }
 }
 }  // namespace detail

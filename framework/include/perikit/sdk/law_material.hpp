@@ -286,6 +286,8 @@ class LawMaterial final : public Material {
     const Equation& equation;
     const Pack& root;
   };
+  template <class Equation>
+  FreeRoot(const Equation&, const Pack&) -> FreeRoot<Equation>;   // which clang does not find by itself before version 17
 
   template <class S, bool own>
   static auto zeros_of_batch() noexcept {

@@ -111,8 +111,7 @@ class TwoRows {
 
   template <int c, std::size_t... lane>
   static detail::Lanes spread_lanes(detail::Lanes v, std::index_sequence<lane...>) noexcept {
-    constexpr detail::Bits at = {(static_cast<int>(lane) / 4 * 4 + c) % pack_width...};
-    return __builtin_shuffle(v, at);
+    return __builtin_shufflevector(v, v, ((static_cast<int>(lane) / 4 * 4 + c) % pack_width)...);
   }
 
   Pack part_[packs];
