@@ -351,3 +351,19 @@ TEST_CASE("questionable: surfaces that are stairs on a lattice") {
   silent(with("x < 25 || y < 10"));
   silent(with("abs(x - 15) > 4.2 || abs(y - 10) > 3.3"));
 }
+
+TEST_CASE("questionable: forces on plates of a forgotten thickness, and places far from any point") {
+  const std::string small = replaced(replaced(plate, "spacing = 1.0", "spacing = 0.01"), "upper = [8, 5]", "upper = [0.08, 0.05]");
+  const std::string held = replaced(replaced(replaced(small, "x < 2", "x < 0.02"), "x > 6", "x > 0.06"), "time_step = 0.02\n", "");
+  const std::string plate_in_metres =
+      replaced(replaced(held, "plane = \"strain\"", "plane = \"stress\""), "[sets]", "[sets]\nmiddle = \"x > 0.02 && x < 0.06 && y > 0.004\"") + "[[load]]\nset = \"middle\"\nforce = [0, 1]\n";
+  warned(plate_in_metres, "", "a force acts on a body in plane stress that is 1 m thick and 0.08 m long");
+  silent(plate_in_metres, "--set body.thickness=0.01");
+  const auto with = [](const std::string& place) { return replaced(plate, "[sets]", "[sets]\ngauge = { nearest = " + place + " }"); };
+  warned(with("[40, 25]"), "", "the point of sets.gauge (line 13) is 38.");
+  silent(with("[8.9, 2.5]"));
+}
+
+TEST_CASE("questionable: expressions without quotes are told of") {
+  refused(replaced(plate, "spacing = 1.0", "spacing = dx"), "", "could not determine value type; texts and expressions stand in quotes");
+}

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <span>
 
@@ -75,6 +76,25 @@ bool decided_by_rounding(const Expression& condition, const Body& body) {
 /// Sets of boundaries and loads that hold other points than their author may think. Bodies of more points than this are not looked at for rounding.
 constexpr std::size_t most_points = 300000;
 
+/// A set may be the point nearest to a place: in other units, or beyond a hole, the place is somewhere else. Farther than this many spacings it is told.
+constexpr double far_away = 2;
+
+void find_far_places(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  for (const SetDescription& set : scene.sets) {
+    if (!set.nearest) continue;
+    double distance = 0;
+    for (const std::int32_t p : body.set(set.name)) {
+      double squared = 0;
+      for (std::size_t a = 0; a < static_cast<std::size_t>(body.dimension()); ++a) squared += std::pow(body.position(static_cast<std::size_t>(p))[a] - (*set.nearest)[a], 2);
+      distance = std::max(distance, std::sqrt(squared));
+    }
+    distance = communicator().largest(distance);
+    if (distance <= far_away * body.spacing()) continue;
+    lines.push_back(named("set", fmt::format("the point of sets.{}{} is {:.4g} m, {:.4g} spacings, away from the place that it is nearest to; a place in the body, in metres", set.name,
+                                             set.position.line > 0 ? fmt::format(" (line {})", set.position.line) : std::string(), distance, distance / body.spacing())));
+  }
+}
+
 void find_strange_sets(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
   for (const SetDescription& set : scene.sets) {
     if (!set.expression || (!held(scene, set.name) && !loaded(scene, set.name))) continue;
@@ -96,6 +116,7 @@ void find_doubts_of_model(const Scene& scene, const BodyProblem& problem, std::v
   find_locking(scene, problem, lines);
   find_nothing_acts(scene, lines);
   find_strange_sets(scene, problem.body(), lines);
+  find_far_places(scene, problem.body(), lines);
 }
 
 }  // namespace perikit

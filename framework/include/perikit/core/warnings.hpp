@@ -40,6 +40,7 @@ inline constexpr auto warning_kinds = std::to_array<std::string_view>({
     "singular",
     "small_strains",
     "stairs",
+    "thickness",
     "thin",
     "threads",
     "time_step",

@@ -29,8 +29,9 @@ toml::table parse_toml(const std::string& text, const std::string& file) {
     return toml::parse(std::string_view(text), std::string_view(file));
   } catch (const toml::parse_error& error) {
     const auto begin = error.source().begin;
+    const bool bare_word = error.description().find("could not determine value type") != std::string_view::npos;
     throw InputError({file, static_cast<int>(begin.line), static_cast<int>(begin.column)}, "",
-                     fmt::format("not valid TOML: {}", error.description()));
+                     fmt::format("not valid TOML: {}{}", error.description(), bare_word ? "; texts and expressions stand in quotes, as in spacing = \"dx\"" : ""));
   }
 }
 
