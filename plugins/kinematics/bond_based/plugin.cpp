@@ -32,7 +32,7 @@ class BondBased final : public PairKinematics {
 
   void bond_law(const BondBatch& b) const noexcept override {
     for (int k = 0; k < b.n; k += pack_width) {
-      const Pack stiffness = Pack::load(b.modulus + k) * reciprocal(Pack::load(b.length + k)), e = Pack::load(b.extension + k), force = stiffness * e;
+      const Pack stiffness = Pack::load(b.modulus + k) * b.inverse_lengths(k), e = Pack::load(b.extension + k), force = stiffness * e;
       if (b.energy) (0.5 * force * e).store(b.energy + k);
       if (b.force) force.store(b.force + k);
       if (b.stiffness) stiffness.store(b.stiffness + k);

@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "perikit/core/simd.hpp"
 #include "perikit/model/family_point.hpp"
 
 namespace perikit {
@@ -71,6 +72,10 @@ struct BondBatch {
   double* energy = nullptr;           ///< w [J/m^6]
   double* force = nullptr;            ///< dw/de [N/m^6]; exactly 0 at e = 0
   double* stiffness = nullptr;        ///< d2w/de2 [N/m^7]
+  const double* inverse_length = nullptr;  ///< reciprocal(|xi|) [1/m] where it is at hand, as on lattices; else null
+
+  /// The same of the bonds from k on, at hand or not.
+  Pack inverse_lengths(int k) const noexcept { return inverse_length ? Pack::load(inverse_length + k) : reciprocal(Pack::load(length + k)); }
 };
 
 /// Arrays over n points, as above.

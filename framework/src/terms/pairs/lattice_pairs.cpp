@@ -46,10 +46,12 @@ class LatticePairs final : public PairLoop {
     find_needed();
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
+    inverse_length_.resize(length_.size());
+    for (std::size_t k = 0; k < length_.size(); k += pack_width) reciprocal(Pack::load(length_.data() + k)).store(inverse_length_.data() + k);
   }
 
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
-  std::size_t bytes() const noexcept override { return (length_.size() + omega_.size()) * sizeof(double); }
+  std::size_t bytes() const noexcept override { return 3 * length_.size() * sizeof(double); }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
@@ -130,7 +132,7 @@ class LatticePairs final : public PairLoop {
   const LatticeFamilies& families_;
   double squared_volume_;
   std::vector<std::uint8_t> needed_[2];   ///< by chunk, for forces and for dilatations; empty: all are
-  AlignedVector<double> length_, omega_;  ///< by slot, one value a lane
+  AlignedVector<double> length_, omega_, inverse_length_;  ///< by slot, one value a lane
   std::vector<double> shortest_;          ///< by slot: the extension below which a bond has no length
   std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
@@ -305,7 +307,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
     }
     if (!uniform) moduli(pattern, p, slot, count, s.modulus);
     law_.bond_law({count * chunk_points, lengths + slot * chunk_points, omegas + slot * chunk_points, s.e, s.modulus, energies ? s.energy : nullptr,
-                   work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr});
+                   work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr, inverse_length_.data() + slot * chunk_points});
     if (screened) screen(pass, pattern, p, slot, count, s);
     Pack sum_of[packs][D], sum_stored[packs], own_q[packs], own_dq[packs];
     for (int v = 0; v < packs; ++v) {
