@@ -27,6 +27,12 @@ void add_directions(const FamilyArrays& family, int d, std::array<double, 9>& su
 bool spans(const FamilyArrays& family, int d) {
   std::array<double, 9> sum{};
   add_directions(family, d, sum);
+  // By the determinant where that is enough: of the eigenvalues l1 <= l2 <= l3 the trace t is at least l3 and at least 2 sqrt(l2 l3), so that l1 >= 4 det/t^2.
+  if (d == 3) {
+    const auto& [xx, xy, xz, yx, yy, yz, zx, zy, zz] = sum;
+    const double trace = xx + yy + zz, determinant = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx);
+    if (4 * determinant > 2 * singular_ratio * trace * trace * trace) return true;
+  }
   const SymmetricEigen eigen(d, sum.data(), false);
   return eigen.largest() > 0 && eigen.least() > singular_ratio * eigen.largest();
 }
