@@ -36,10 +36,11 @@ constexpr bool has_lanes = std::same_as<T, Pack> || std::same_as<T, Product>;
 template <class T>
 constexpr bool has_lanes<Dual<T>> = has_lanes<T>;
 template <class T>
-std::string name_of = std::same_as<T, Pack> ? "Pack" : std::same_as<T, Product> ? "Product" : std::same_as<T, PackMask> ? "PackMask" : std::integral<T> ? "int"
-                      : sizeof(T) == 4 ? "float" : "double";
-template <class T>
-std::string name_of<Dual<T>> = "Dual<" + name_of<T> + ">";
+std::string name_of() {
+  if constexpr (depth_of<T> > 0) return "Dual<" + name_of<decltype(T::value)>() + ">";
+  else if constexpr (has_lanes<T>) return std::same_as<T, Pack> ? "Pack" : "Product";
+  else return std::integral<T> ? "int" : sizeof(T) == 4 ? "float" : "double";
+}
 
 /// The paths from number `first` on: one, or one in each lane.
 template <class T, class Paths>
@@ -85,7 +86,7 @@ std::array<double, 4> parts_by_differences(F&& f) {
 }
 
 void compare(const std::string& what, const std::array<double, 4>& found, const std::array<double, 4>& expected) {
-  const char* const part[] = {"value", "derivative", "outer derivative", "second derivative"};
+  const std::string part[] = {"value", "derivative", "outer derivative", "second derivative"};
   for (std::size_t i = 0; i < 4; ++i)
     CHECK_MESSAGE(std::abs(found[i] - expected[i]) <= (i == 0 ? 4e-15 : 2e-6) * (1 + std::abs(expected[i])), what, ": ", part[i], " ", found[i], ", expected ",
                   expected[i]);
@@ -101,7 +102,7 @@ void check(const std::string& name, F operation, G exact, double lower, double u
     static_assert(depth_of<std::remove_cvref_t<decltype(result)>> == depth_of<A>);
     for (int lane = 0; lane < (has_lanes<A> ? pack_width : 1); ++lane) {
       const Path x = paths(trial + lane);
-      compare(name + " of " + name_of<A>, parts(result, lane), parts_by_differences([&](Real s, Real t) { return exact(x.at(depth_of<A>, s, t)); }));
+      compare(name + " of " + name_of<A>(), parts(result, lane), parts_by_differences([&](Real s, Real t) { return exact(x.at(depth_of<A>, s, t)); }));
     }
   }
 }
@@ -124,7 +125,7 @@ void check_pair(const std::string& name, F operation, G exact) {
         if constexpr (depth_of<T> > 0) return path.at(depth_of<T>, s, t);
         else return parts(number, lane)[0];
       };
-      compare(name + " of " + name_of<A> + " and " + name_of<B>, parts(result, lane), parts_by_differences([&](Real s, Real t) {
+      compare(name + " of " + name_of<A>() + " and " + name_of<B>(), parts(result, lane), parts_by_differences([&](Real s, Real t) {
                 const auto of = exact(at(a, rising(trial + lane), s, t), at(b, falling(trial + lane), s, t));
                 return static_cast<Real>(of);
               }));
@@ -158,7 +159,7 @@ void check_equal() {
   const auto two = [](int) { return Path{2.0, 0.8, -0.6, 0.3}; };
   const A a = made<A>(two, 0);
   const B b = made<B>(two, 0);
-  const std::string what = name_of<A> + " and " + name_of<B>;
+  const std::string what = name_of<A>() + " and " + name_of<B>();
   for (int lane = 0; lane < (has_lanes<A> || has_lanes<B> ? pack_width : 1); ++lane) {
     const auto answers = [&](auto mask) { return parts(mask, lane)[0] == 1; };
     CHECK_MESSAGE((answers(a == b) && answers(a <= b) && answers(a >= b)), what);
