@@ -12,6 +12,8 @@ namespace {
 
 /// YOUR PHYSICS: a stored energy in H = F - I, written once for 3D, plane and uniaxial states and for numbers with derivatives.
 /// Stress and tangent follow by exact differentiation; `template ... Tensor<T, S> P(H, k)` beside psi makes the law faster.
+/// T holds several points at once: a law branches by select(a < b, x, y), and sqrt, max and their like are written without std::
+/// (framework/docs/scalars.md).
 /// What rounding leaves of psi and P at H = 0 is taken off by the framework.
 struct PartName {
   static constexpr MaterialTraits traits{.constants = 3};
