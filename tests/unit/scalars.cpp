@@ -255,6 +255,24 @@ TEST_CASE("masks are joined with each other and with conditions that all lanes s
   CHECK(!all(low));
 }
 
+TEST_CASE("scalars are changed in place by numbers, constants and their like") {
+  const auto change = []<class T>(T x) {
+    const Pack p = 2.0;
+    x += 1;
+    x -= 0.5f;
+    x *= 4.0;
+    x /= x + 1;
+    if constexpr (has_lanes<T>) x += p * p, x *= p;
+    return x;   // (x + 1/2) 4 / ((x + 1/2) 4 + 1), and 4 more, times 2
+  };
+  CHECK(std::abs(change(1.0) - 6.0 / 7) < 1e-15);
+  CHECK(std::abs(change(Dual<double>(1, 1)).derivative - 4.0 / 49) < 1e-15);
+  CHECK(std::abs(change(Pack(1.0))[0] - (6.0 / 7 + 4) * 2) < 1e-14);
+  const Dual<Dual<Pack>> found = change(Dual<Dual<Pack>>(Dual<Pack>(1, 1), Dual<Pack>(1, 0)));
+  CHECK(std::abs(found.value.derivative[0] - 8.0 / 49) < 1e-15);
+  CHECK(std::abs(found.derivative.derivative[0] + 64.0 / 343) < 1e-15);
+}
+
 TEST_CASE("where two are equal, and at zero") {
   const Dual<double> a(1, 2), b(1, 3);
   CHECK(min(a, b).derivative == 3);   // the second
