@@ -97,7 +97,7 @@ class SharedSearch {
         again.size(),
         [&](CellSearch& search, std::size_t k) {
           const auto n = static_cast<std::int64_t>(again[k]);
-          const auto [first, last] = std::ranges::equal_range(further, n, {}, &Further::n);
+          const auto first = std::ranges::lower_bound(further, n, {}, &Further::n), last = std::ranges::upper_bound(further, n, {}, &Further::n);
           const auto of_cell = std::span(numbers).subspan(static_cast<std::size_t>(first - further.begin()),
                                                           static_cast<std::size_t>(last - first));
           keep_cell(search.find(static_cast<std::int32_t>(n), of_cell), again[k], cells);
