@@ -321,7 +321,8 @@ void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit
   for (std::size_t l = 0; l < padding; ++l) {
     const std::size_t p = static_cast<std::size_t>(group) * padding + l;
     if (!body_.alive(p) || !looks_at(p)) continue;
-    const auto [first, last] = std::ranges::equal_range(named_, static_cast<std::int32_t>(p), {}, &BondId::point);
+    const auto first = std::ranges::lower_bound(named_, static_cast<std::int32_t>(p), {}, &BondId::point),
+               last = std::ranges::upper_bound(named_, static_cast<std::int32_t>(p), {}, &BondId::point);
     load(static_cast<std::int32_t>(p), u, {first, last}, m);
     if (!m.place.empty()) visit(static_cast<std::int32_t>(p), m);
   }

@@ -21,7 +21,6 @@ struct Keyed {
   friend auto operator<=>(const Keyed& a, const Keyed& b) {
     return std::pair(a.key, a.point.number) <=> std::pair(b.key, b.point.number);
   }
-  friend bool operator==(const Keyed& a, const Keyed& b) { return a <=> b == 0; }
 };
 
 /// The first `most` of all points that it is shown, in the order of `Before`.
