@@ -33,7 +33,7 @@ struct Expected {
   double bar, shear, inclusion;
 };
 
-const std::vector<Expected> all{{"\"baqp\"", 30, 8, 4},
+const std::vector<Expected> expectations{{"\"baqp\"", 30, 8, 4},
                                 {"\"projection\"", 15, 3, 4},
                                 {"\"bond_associated\"", 20, 5, 4},
                                 {"\"bond_augmented\"", 12, 8, 3.5},
@@ -49,7 +49,7 @@ const std::vector<Expected> all{{"\"baqp\"", 30, 8, 4},
 }  // namespace
 
 TEST_CASE("interfaces: a bar of two materials, tension and shear across an interface, a round inclusion") {
-  for (const Expected& expected : all)
+  for (const Expected& expected : expectations)
     for (const auto& [scene, factor] :
          {std::pair{"bar", expected.bar}, std::pair{"shear", expected.shear}, std::pair{"inclusion", expected.inclusion}}) {
       const double before = error(scene, 20, expected.kinematics, false), after = error(scene, 20, expected.kinematics, true);
