@@ -130,6 +130,25 @@ void find_small_horizon(const Scene& scene, const Body& body, std::vector<std::s
                                                scene.horizon > 0 ? "family.horizon" : "family.horizon_ratio", ratio)));
 }
 
+/// A force [N] on a plate: the thickness counts, and has a value where nobody gave one.
+void find_thick_plate(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  const bool force = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::force; });
+  if (!force || scene.body.space != Space::plane_stress) return;
+  double length = 0;
+  for (std::size_t a = 0; a < 2; ++a) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const std::int32_t p : body.owned()) {
+      low = std::min(low, body.position(static_cast<std::size_t>(p))[a]);
+      high = std::max(high, body.position(static_cast<std::size_t>(p))[a]);
+    }
+    length = std::max(length, communicator().largest(high) + communicator().largest(-low) + body.spacing());
+  }
+  if (scene.body.section <= length) return;
+  lines.push_back(named("thickness", fmt::format("a force acts on a body in plane stress that is {:.6g} m thick and {:.6g} m long: plane stress is of bodies that are thin; thickness in [body], which is 1 m "
+                                                 "where it is not given",
+                                                 scene.body.section, length)));
+}
+
 }  // namespace
 
 std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
@@ -142,6 +161,7 @@ std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
   find_cut_cells(scene, body, lines);
   find_stairs(scene, body, lines);
   find_small_horizon(scene, body, lines);
+  find_thick_plate(scene, body, lines);
   find_doubts_of_model(scene, problem, lines);
   find_doubts_of_stiffness(scene, problem, lines);
   double farthest = 0;
@@ -154,7 +174,6 @@ std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
         named("origin", fmt::format("points {:.3g} m away from the origin: the position of a point rounds to {:.2g} of the spacing; allowed: points "
                     "near the origin",
                     farthest, rounding)));
-  double largest_extent = 0;
   for (int a = 0; a < body.dimension(); ++a) {
     const auto c = static_cast<std::size_t>(a);
     double low = body.position(static_cast<std::size_t>(body.internal()[0]))[c],
@@ -166,17 +185,11 @@ std::vector<std::string> doubts(const Scene& scene, BodyProblem& problem) {
     low = -communicator().largest(-low);
     high = communicator().largest(high);
     const double extent = high - low + body.spacing();
-    largest_extent = std::max(largest_extent, extent);
     if (extent >= body.horizon()) continue;
     lines.push_back(
         named("thin", fmt::format("the body is {:.6g} m thick along {}, less than the horizon, {:.6g} m: no point has half of a family across",
                     extent, "xyz"[a], body.horizon())));
   }
-  const bool force = std::ranges::any_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::force; });
-  if (force && scene.body.space == Space::plane_stress && scene.body.section > largest_extent)
-    lines.push_back(named("thickness", fmt::format("a force acts on a body in plane stress that is {:.6g} m thick and {:.6g} m long: plane stress is of bodies that are thin; thickness in [body], which is 1 m "
-                                                   "where it is not given",
-                                                   scene.body.section, largest_extent)));
   return lines;
 }
 
