@@ -63,6 +63,13 @@ std::vector<HistoryPlace> Mechanics::history_points() {
   };
   // Those of points and of parts of families have no far end.
   const bool of_bonds = parts_.formulation.bond || (parts_.formulation.weighted && parts_.formulation.parts(body.dimension()) == 0);
+  // Of bonds between unlike laws alone, and never of those that store nothing here: a body of one law has other laws on ranks, of their ghosts, and yet
+  // the same evaluation points.
+  const auto two_states = [&](const LaminateFinder::Found& found) {
+    const auto owner = static_cast<std::size_t>(found.owner), far = static_cast<std::size_t>(found.far);
+    if (parts_.formulation.selective()) return true;
+    return !parts_.laws.same(owner, far) && !(parts_.laws.has_incomplete_points() && (parts_.laws.incomplete(owner) || parts_.laws.incomplete(far)));
+  };
   std::vector<HistoryPlace> points;
   std::map<std::int32_t, std::int64_t> parts;  // so far, of those whose evaluation points are parts of their families
   const std::size_t groups = body.stride() / padding;
@@ -78,7 +85,7 @@ std::vector<HistoryPlace> Mechanics::history_points() {
       const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1,
                                of_bonds ? std::int64_t{0} : parts[found.owner]++};
       points.push_back({point, found.number, own});
-      if (found.other_number >= 0) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
+      if (found.other_number >= 0 && two_states(found)) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
     }
   }
   std::ranges::sort(points, {}, &HistoryPlace::point);
