@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
+#include <utility>
 
 #include "perikit/core/parallel.hpp"
 
@@ -89,6 +91,29 @@ TEST_CASE("interfaces: both sides of a thin layer") {
     INFO(width, " points");
     CHECK(worst <= 1e-10 * h);
   }
+}
+
+TEST_CASE("interfaces: the distance from a small block is the same on all its sides, however its corners are rounded") {
+  for (const int width : {1, 2, 3})
+    for (const int first : {7, 8, 9}) {
+      const double h = 1.0 / 20, half = 0.5 * width * h;
+      const Point middle{first * h + half, first * h + half, 0};
+      const Body body = lattice_body(2, 20, [&](const Point& x) { return static_cast<std::uint16_t>(std::max(std::abs(x[0] - middle[0]), std::abs(x[1] - middle[1])) > half); });
+      const Interfaces found = find(body, 3.3 * h);
+      REQUIRE(found.all.size() == 1);
+      std::map<std::pair<long, long>, double> distances;   // by twice the cells from the middle
+      for (std::size_t k = 0; k < found.all[0].point.size(); ++k) {
+        const Point x = body.position(static_cast<std::size_t>(found.all[0].point[k]));
+        distances[{std::lround(2 * (x[0] - middle[0]) / h), std::lround(2 * (x[1] - middle[1]) / h)}] = found.all[0].distance[k];
+      }
+      double worst = 0;
+      for (const auto& [at, distance] : distances)
+        for (const std::pair<long, long> there : {std::pair{-at.first, at.second}, {at.first, -at.second}, {at.second, at.first}}) {
+          REQUIRE(distances.contains(there));
+          worst = std::max(worst, std::abs(distances[there] - distance));
+        }
+      CHECK_MESSAGE(worst <= 1e-10 * h, width, " points from ", first, " on: ", worst / h);
+    }
 }
 
 TEST_CASE("interfaces: the distance from a circle, whatever the number of threads") {

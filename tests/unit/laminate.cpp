@@ -304,6 +304,10 @@ TEST_CASE("a stencil that sees a corner or both sides of a layer is no laminate"
   LaminatePoint point;
   const double up[2] = {0.4, 0}, down[2] = {0.3, 0}, one[2] = {0.3, 0.1}, other[2] = {-0.7, 0.1};
   CHECK(!make_laminate(2, up, down, point));
+  for (const double rounding : {-1e-15, 0.0, 1e-15}) {
+    const double half[2] = {0.5 + rounding, 0}, none[2] = {0, 0};
+    CHECK(!make_laminate(2, half, none, point));
+  }
   REQUIRE(make_laminate(2, one, other, point));
   CHECK(point.share == doctest::Approx(0.7));
   // What is tangential is left out: both directions lie along the normal, and their mean vanishes.

@@ -84,6 +84,7 @@ double falling(double x) noexcept {
 void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& middles, std::size_t n, Crossing& own) {
   constexpr double window = 3, core = 1.2;  // bonds long
   constexpr double undecided = 1e-12;       // weight of the directions of the bonds: below all variances but those that are zero
+  constexpr double across = -1e-6;          // of bonds at right angles to the side, which count, whatever rounding says
   const double radius = window * own.length;
   Point side{};
   middles.near(middles.place(n), core * own.length, [&](std::size_t m, double) {
@@ -93,7 +94,7 @@ void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& mid
   Point sum{}, along{};
   double moment[3][3] = {};
   middles.near(middles.place(n), radius, [&](std::size_t m, double square) {
-    if (dot(all[m].along, side) < 0) return;
+    if (dot(all[m].along, side) < across) return;
     const double w = falling(std::sqrt(square) / radius);
     const Point x = middles.place(m) - own.middle;
     weight += w;
@@ -124,28 +125,36 @@ void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& mid
   }
 }
 
-Distance distance_of(const Point& x, bool in_first, std::span<const Crossing> all, const Boxes& middles, double reach) {
-  double least = INFINITY;
-  std::size_t nearest = 0;
-  middles.near(x, reach, [&](std::size_t m, double square) {
-    if (std::pair(square, m) < std::pair(least, nearest)) {
-      least = square;
-      nearest = m;
-    }
-  });
-  if (!std::isfinite(least)) return {};
-  // Blended over one more bond, so that no side of a surface is preferred.
-  const double from = std::sqrt(least), length = all[nearest].length;
+/// Blended over one more bond beyond the nearest midpoint, so that no side of a surface is preferred; sides at right angles to it are other surfaces.
+double blended_distance(const Point& x, std::size_t nearest, double from, std::span<const Crossing> all, const Boxes& middles) {
+  constexpr double across = 1e-6;   // cosine
   double weight = 0, sum = 0;
-  middles.near(x, from + length, [&](std::size_t m, double square) {
-    if (dot(all[m].normal, all[nearest].normal) <= 0) return;
-    const double w = falling(std::max(0.0, std::sqrt(square) - from) / length);
+  middles.near(x, from + all[nearest].length, [&](std::size_t m, double square) {
+    if (dot(all[m].normal, all[nearest].normal) <= across) return;
+    const double w = falling(std::max(0.0, std::sqrt(square) - from) / all[nearest].length);
     weight += w;
     sum += w * dot(x - all[m].centre, all[m].normal);
   });
-  const double value = sum / weight;
+  return sum / weight;
+}
+
+Distance distance_of(const Point& x, bool in_first, std::span<const Crossing> all, const Boxes& middles, double reach) {
+  double least = INFINITY;
+  middles.near(x, reach, [&](std::size_t, double square) { least = std::min(least, square); });
+  if (!std::isfinite(least)) return {};
+  // Of several midpoints that are equally near, in corners and in the middle of layers, each has its say.
+  const double from = std::sqrt(least);
+  double sum = 0;
+  int count = 0;
+  std::size_t first = all.size();
+  middles.near(x, std::min(reach, from * (1 + 1e-6)), [&](std::size_t m, double) {
+    sum += blended_distance(x, m, from, all, middles);
+    ++count;
+    first = std::min(first, m);
+  });
   // A point lies on the side of its material.
-  return {in_first ? std::min(value, 0.0) : std::max(value, 0.0), in_first ? all[nearest].of_second : all[nearest].of_first};
+  const double value = sum / count;
+  return {in_first ? std::min(value, 0.0) : std::max(value, 0.0), in_first ? all[first].of_second : all[first].of_first};
 }
 
 std::vector<Point> middles_of(const std::vector<Crossing>& crossings) {

@@ -51,8 +51,10 @@ bool make_laminate(int dimension, const double* plus, const double* minus, Lamin
     square += normal[e] * normal[e];
     positive += normal[e] * plus[e];
   }
-  // Where the gradient of the distance itself is far from a unit vector, the stencil sees a corner or both sides of a layer.
-  if (square < 0.25) return false;
+  // Where the gradient of the distance itself is far from a unit vector, the stencil sees a corner or both sides of a layer. On lattices just a half is
+  // common, of bonds one of whose ends is in the middle of a layer: one of these, whatever rounding says.
+  constexpr double half = 0.25 * (1 + 1e-6);
+  if (square < half) return false;
   // What has next to no share has none: laws in series would let rounding of the share decide between stiffnesses far apart.
   double share = 1 - positive / square;
   if (share < least_share) share = 0;
