@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "body/partition/block_colours.hpp"
+#include "core/drop_repeated.hpp"
 #include "perikit/body/body.hpp"
 
 namespace perikit {
@@ -62,7 +63,7 @@ Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& c
         if (const std::int32_t other = std::exchange(last[static_cast<std::size_t>(cell)], b); other >= 0)
           before.push_back(other);
       std::ranges::sort(before);
-      before.erase(std::unique(before.begin(), before.end()), before.end());
+      drop_repeated(before);
       late[static_cast<std::size_t>(b)] =
           reach.late(static_cast<std::size_t>(b)) ||
           std::ranges::any_of(before, [&](std::int32_t other) { return late[static_cast<std::size_t>(other)] != 0; });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/drop_repeated.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/normalised_influence.hpp"
@@ -66,7 +67,7 @@ std::vector<BondId> Families::fragment_bonds(std::span<const std::int32_t> point
     for (const std::int32_t far : family.far) bonds.push_back(BondId::of(p, far));
   }
   std::sort(bonds.begin(), bonds.end());
-  bonds.erase(std::unique(bonds.begin(), bonds.end()), bonds.end());
+  drop_repeated(bonds);
   return bonds;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/drop_repeated.hpp"
 #include "output/recorder.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -38,7 +39,7 @@ void refuse_twice(const Scene& scene, const Body& body, const Images& images, co
   std::vector<Held> held;
   const auto keep_each_once = [&] {
     std::ranges::sort(held);
-    held.erase(std::unique(held.begin(), held.end()), held.end());
+    drop_repeated(held);
   };
   for (const ImageTerm& term : images.terms)
     if (term.motion >= 0 && !motions[static_cast<std::size_t>(term.motion)].of_set) held.push_back({term.surface, term.component});

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/drop_repeated.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "perikit/core/parallel.hpp"
 #include "terms/bond_energy_split.hpp"
@@ -141,8 +142,7 @@ void BondCriterion::name_near_failure() {
   }
   std::erase_if(named_, [&](BondId b) { return !body_.owns(static_cast<std::size_t>(b.point)); });   // their owners look at them
   std::ranges::sort(named_);
-  const auto rest = std::ranges::unique(named_);
-  named_.erase(rest.begin(), rest.end());
+  drop_repeated(named_);
 }
 
 /// Those of these groups, by their lower ends.
@@ -360,8 +360,7 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   // Where a bond lies in two pieces it was found in both.
   const auto bond = [](const Found& f) { return f.change.bond; };
   std::ranges::sort(found_, {}, bond);
-  const auto rest = std::ranges::unique(found_, {}, bond);
-  found_.erase(rest.begin(), rest.end());
+  drop_repeated(found_, bond);
   for (const Found& f : found_) all.push_back(f.change);
   return all;
 }
@@ -380,7 +379,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   std::vector<std::int32_t> groups;
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
   std::sort(groups.begin(), groups.end());
-  groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+  drop_repeated(groups);
   named_.assign(bonds.begin(), bonds.end());
   std::ranges::sort(named_);
   look_at_named();
@@ -414,8 +413,7 @@ std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
   });
   flux_ = {};
   std::sort(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond < b.bond; });
-  all.erase(std::unique(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond == b.bond; }),
-            all.end());
+  drop_repeated(all, &BondEnergy::bond);
   return all;
 }
 

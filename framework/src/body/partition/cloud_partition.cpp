@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/drop_repeated.hpp"
+
 #include "body/family_limit.hpp"
 #include "body/images/cloud_images.hpp"
 #include "body/partition/block_colours.hpp"
@@ -144,7 +146,7 @@ Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Re
     });
     std::ranges::sort(here);
     std::ranges::sort(sources);
-    sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
+    drop_repeated(sources);
     std::ranges::set_difference(sources, here, std::back_inserter(missing));
     blocks.fetch(images->sources(missing), missing, reached);
     return communicator().largest(missing.empty() ? 0 : 1) > 0;

@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/drop_repeated.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -31,7 +32,7 @@ Point lowest(const std::vector<Point>& positions) {
 template <class T>
 void keep_each_once(std::vector<T>& values) {
   std::ranges::sort(values);
-  values.erase(std::unique(values.begin(), values.end()), values.end());
+  drop_repeated(values);
 }
 
 }  // namespace

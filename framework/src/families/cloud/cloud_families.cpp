@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/drop_repeated.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/shape_tensor.hpp"
 #include "perikit/core/parallel.hpp"
@@ -168,7 +169,7 @@ std::vector<std::int32_t> CloudFamilies::set_bonds(std::span<const BondChange> c
     }
   }
   std::sort(ends.begin(), ends.end());
-  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  drop_repeated(ends);
   for (const std::int32_t p : ends) {
     const auto at = static_cast<std::size_t>(p);
     body_.dimension() == 1 ? renew<1>(at) : body_.dimension() == 2 ? renew<2>(at) : renew<3>(at);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "body/partition/block_colours.hpp"
+#include "core/drop_repeated.hpp"
 #include "families/resting_blocks.hpp"
 
 namespace perikit {
@@ -69,7 +70,7 @@ BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks) {
       }
     }
     std::sort(units.begin(), units.end());
-    units.erase(std::unique(units.begin(), units.end()), units.end());
+    drop_repeated(units);
   }
   return reach;
 }

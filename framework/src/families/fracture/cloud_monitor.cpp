@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/drop_repeated.hpp"
+
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/fracture/bond_monitor.hpp"
@@ -64,7 +66,7 @@ void CloudMonitor::make_cells() {
       if (cell != near.back()) near.push_back(cell);
     }
     std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
+    drop_repeated(near);
   }
   first.push_back(groups.size());
   set_cells(std::move(groups), std::move(first));

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "core/drop_repeated.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -317,8 +318,7 @@ std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange>
     for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
   std::ranges::sort(all);
-  const auto rest = std::ranges::unique(all);
-  all.erase(rest.begin(), rest.end());
+  drop_repeated(all);
   return all;
 }
 

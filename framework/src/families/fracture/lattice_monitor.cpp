@@ -4,6 +4,8 @@
 #include <limits>
 #include <tuple>
 
+#include "core/drop_repeated.hpp"
+
 #include "families/fracture/bond_monitor.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/stretch.hpp"
@@ -91,7 +93,7 @@ void LatticeMonitor<D>::make_cells() {
           if (at < cell_of.size() && cell_of[at] >= 0 && cell_of[at] != near.back()) near.push_back(cell_of[at]);
         }
     std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
+    drop_repeated(near);
   }
   set_cells(std::move(groups), std::move(first));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/drop_repeated.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -17,8 +18,7 @@ std::vector<NamedChange> SharedBonds::merged(std::span<const BondChange> mine) c
   for (const BondChange& change : mine) named.push_back(this->named(change));
   std::vector<NamedChange> all = gathered<NamedChange>(named);
   std::ranges::sort(all, {}, &NamedChange::bond);
-  const auto rest = std::ranges::unique(all, {}, &NamedChange::bond);
-  all.erase(rest.begin(), rest.end());
+  drop_repeated(all, &NamedChange::bond);
   return all;
 }
 
@@ -38,8 +38,7 @@ std::vector<std::uint8_t> SharedBonds::points_beside(std::span<const std::int32_
   for (const std::int32_t p : points) groups.push_back(place(p) / group);
   if (part()) groups = told_to_all(gathered<std::int64_t>(groups));
   std::ranges::sort(groups);
-  const auto rest = std::ranges::unique(groups);
-  groups.erase(rest.begin(), rest.end());
+  drop_repeated(groups);
   if (groups.empty()) return {};
   std::vector<std::uint8_t> marks(body_.stride(), 0);
   for (const std::int64_t g : groups)

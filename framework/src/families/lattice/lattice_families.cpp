@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/drop_repeated.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
@@ -239,7 +240,7 @@ std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange>
     set(bond.far, slots.reverse(slot), integrity);
   }
   std::sort(ends.begin(), ends.end());
-  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  drop_repeated(ends);
   std::vector<std::uint8_t> live_mask;
   for (std::size_t k = 0; k < ends.size();) {
     const std::int32_t first = ends[k] / chunk_points * chunk_points;

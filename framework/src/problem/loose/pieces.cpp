@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 
+#include "core/drop_repeated.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "perikit/problem/image_map.hpp"
 
@@ -54,7 +55,7 @@ std::map<std::int64_t, std::int64_t> names_of_parts(const std::vector<Link>& lin
     numbers.push_back(link.other);
   }
   std::ranges::sort(numbers);
-  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
+  drop_repeated(numbers);
   const auto index = [&](std::int64_t number) { return static_cast<std::int32_t>(std::ranges::lower_bound(numbers, number) - numbers.begin()); };
   Parts parts(numbers.size());
   for (const Link& link : all) parts.join(index(link.mine), index(link.other));
@@ -84,7 +85,7 @@ std::vector<Piece> joined_over_ranks(const Body& body, Parts& parts, Problem& pr
     }
     const auto both = [](const Link& link) { return std::pair(link.mine, link.other); };
     std::ranges::sort(links, {}, both);
-    links.erase(std::ranges::unique(links, {}, both).begin(), links.end());
+    drop_repeated(links, both);
     name_of = names_of_parts(links);
   }
   std::map<std::int64_t, std::size_t> place;  // by name
@@ -160,7 +161,7 @@ std::vector<Piece> find_pieces(const Families& families, Problem& problem, const
   }
   if (bonded_images) {
     std::ranges::sort(*bonded_images);
-    bonded_images->erase(std::ranges::unique(*bonded_images, {}, &BondedImage::first).begin(), bonded_images->end());
+    drop_repeated(*bonded_images, &BondedImage::first);
   }
   std::vector<Piece> pieces = joined_over_ranks(body, parts, problem);
   std::vector<double> counts;
