@@ -116,6 +116,42 @@ TEST_CASE("interfaces: the distance from a small block is the same on all its si
     }
 }
 
+TEST_CASE("interfaces: the distances from grains of a few points do not depend on the order of the axes") {
+  constexpr int n = 6;
+  constexpr double h = 1.0 / n;
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 60; ++trial) {
+    // Some of the cells of a cube of two, which may lie at the surface.
+    std::array<int, 3> corner{};
+    for (int& at : corner) at = static_cast<int>(random() % (n - 1));
+    const unsigned grain = 1 + random() % 255;
+    const auto distances = [&](bool swapped) {
+      const Body body = lattice_body(3, n, [&](const Point& x) {
+        unsigned bit = 0;
+        for (std::size_t a = 0; a < 3; ++a) {
+          const int k = static_cast<int>(x[swapped ? 2 - a : a] / h) - corner[a];
+          if (k < 0 || k > 1) return std::uint16_t{0};
+          bit += static_cast<unsigned>(k) << a;
+        }
+        return static_cast<std::uint16_t>(grain >> bit & 1);
+      });
+      std::map<std::array<long, 3>, double> all;
+      for (const Interface& interface : find(body, 2.2 * h).all)
+        for (std::size_t k = 0; k < interface.point.size(); ++k) {
+          std::array<long, 3> cell{};
+          for (std::size_t a = 0; a < 3; ++a) cell[a] = std::lround(2 * body.position(static_cast<std::size_t>(interface.point[k]))[swapped ? 2 - a : a] / h);
+          all[cell] = interface.distance[k];
+        }
+      return all;
+    };
+    const auto straight = distances(false), swapped = distances(true);
+    REQUIRE(straight.size() == swapped.size());
+    double worst = 0;
+    for (const auto& [cell, distance] : straight) worst = std::max(worst, std::abs(distance - swapped.at(cell)));
+    CHECK_MESSAGE(worst <= 1e-10 * h, "grain ", grain, ": ", worst / h);
+  }
+}
+
 TEST_CASE("interfaces: the distance from a circle, whatever the number of threads") {
   for (const int n : {40, 80}) {
     const double radius = 0.31, h = 1.0 / n;

@@ -118,6 +118,9 @@ void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& mid
   for (int k = 1; k < 3; ++k)
     if (modes.values[k] < modes.values[least]) least = k;
   for (int a = 0; a < 3; ++a) own.normal[static_cast<std::size_t>(a)] = a < dimension ? modes.vectors(a, least) : 0.0;
+  // Few midpoints may vary least along the surface, of a grain of two points or so: nothing would say which way that direction points.
+  constexpr double steepest = 0.5;   // cosine between a normal and the bonds
+  if (std::abs(dot(own.normal, along)) < steepest * std::sqrt(dot(own.normal, own.normal) * dot(along, along))) own.normal = along;
   const double length = std::copysign(std::sqrt(dot(own.normal, own.normal)), dot(own.normal, along));
   for (std::size_t a = 0; a < 3; ++a) {
     own.normal[a] /= length;
