@@ -7,7 +7,7 @@ namespace perikit {
 Ghosts::Ghosts(const Partition& partition, int components) {
   for (std::size_t k = 0; k < partition.lent().size(); ++k) {
     if (partition.lent()[k].empty() && partition.borrowed()[k].empty()) continue;
-    Neighbour& neighbour = neighbours_.emplace_back(static_cast<int>(k), partition.lent()[k], partition.borrowed()[k]);
+    Neighbour& neighbour = neighbours_.emplace_back(Neighbour{static_cast<int>(k), partition.lent()[k], partition.borrowed()[k]});
     neighbour.to.resize(neighbour.lent.size() * static_cast<std::size_t>(components));
     neighbour.from.resize(neighbour.borrowed.size() * static_cast<std::size_t>(components));
   }

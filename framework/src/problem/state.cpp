@@ -94,7 +94,7 @@ void State::write(ByteWriter& out) const {
     out.text(name);
     out.value(static_cast<std::int64_t>(field.components()));
     for (int c = 0; c < field.components(); ++c)
-      each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
+      each_piece(body_->stride_of_all_ranks(), [&, &field = field](std::size_t first, std::size_t count) {
         const std::vector<double> piece = gather_piece(own.places, first, count, 1, [&](std::size_t from, std::size_t to) {
           values.clear();
           for (std::size_t n = from; n < to; ++n) values.push_back(field.component(c)[own.points[n]]);

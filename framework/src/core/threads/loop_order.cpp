@@ -35,7 +35,7 @@ std::vector<std::int32_t> LoopOrder::turns_of(std::size_t threads) const {
       for (const std::int32_t follower : followers_[static_cast<std::size_t>(turns[k])])
         if (--awaited[static_cast<std::size_t>(follower)] == 0) ready.push(follower);
   }
-  if (!late_.empty()) std::ranges::stable_partition(turns, [&](std::int32_t i) { return late_[static_cast<std::size_t>(i)] == 0; });
+  if (!late_.empty()) std::stable_partition(turns.begin(), turns.end(), [&](std::int32_t i) { return late_[static_cast<std::size_t>(i)] == 0; });
   return turns;
 }
 

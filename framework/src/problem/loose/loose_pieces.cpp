@@ -170,7 +170,7 @@ std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& pro
   }
   for (const auto& [q, p] : bonded_images)
     for (int c = 0; c < d; ++c)
-      add_row(p, [&](const LoosePiece& piece, const LoosePiece::Motion& motion) {
+      add_row(p, [&, q = q](const LoosePiece& piece, const LoosePiece::Motion& motion) {
         const auto e = static_cast<std::size_t>(c);
         return piece.at(motion, d, place(body, u, q))[e] -
                sources.sign.component(c)[q] * piece.at(motion, d, place(body, u, source(q)))[e];
