@@ -108,7 +108,7 @@ TEST_CASE("interfaces: the distance from a small block is the same on all its si
       }
       double worst = 0;
       for (const auto& [at, distance] : distances)
-        for (const std::pair<long, long> there : {std::pair{-at.first, at.second}, {at.first, -at.second}, {at.second, at.first}}) {
+        for (const std::pair<long, long>& there : {std::pair{-at.first, at.second}, {at.first, -at.second}, {at.second, at.first}}) {
           REQUIRE(distances.contains(there));
           worst = std::max(worst, std::abs(distances[there] - distance));
         }
