@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit::app {

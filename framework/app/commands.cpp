@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "bench.hpp"
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 #include "data_folder.hpp"
 #include "describe.hpp"
 #include "machine_check.hpp"

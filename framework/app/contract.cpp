@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 #include "data_folder.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/plugin/abi.hpp"

@@ -21,7 +21,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 #include "machine_check.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"

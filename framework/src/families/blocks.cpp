@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "body/partition/block_colours.hpp"
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/body/body.hpp"
 
 namespace perikit {
@@ -32,9 +32,8 @@ std::vector<std::int32_t> free_colours(const BlockReach& reach) {
 
 BlockSequence::BlockSequence(const BlockReach& reach) : blocks_(reach.own.size()) {
   std::iota(blocks_.begin(), blocks_.end(), std::int32_t{0});
-  const auto late =
-      std::ranges::stable_partition(blocks_, [&](std::int32_t b) { return !reach.late(static_cast<std::size_t>(b)); });
-  early_ = blocks_.size() - late.size();
+  const auto late = std::stable_partition(blocks_.begin(), blocks_.end(), [&](std::int32_t b) { return !reach.late(static_cast<std::size_t>(b)); });
+  early_ = static_cast<std::size_t>(late - blocks_.begin());
 }
 
 Colouring::Colouring(const BlockReach& reach)
@@ -62,8 +61,7 @@ Colouring::Colouring(const BlockReach& reach, const std::vector<std::int32_t>& c
       for (const std::int32_t cell : touched)
         if (const std::int32_t other = std::exchange(last[static_cast<std::size_t>(cell)], b); other >= 0)
           before.push_back(other);
-      std::ranges::sort(before);
-      drop_repeated(before);
+      keep_each_once(before);
       late[static_cast<std::size_t>(b)] =
           reach.late(static_cast<std::size_t>(b)) ||
           std::ranges::any_of(before, [&](std::int32_t other) { return late[static_cast<std::size_t>(other)] != 0; });

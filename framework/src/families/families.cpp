@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/normalised_influence.hpp"
@@ -66,8 +66,7 @@ std::vector<BondId> Families::fragment_bonds(std::span<const std::int32_t> point
     load(static_cast<std::size_t>(p), BondsOf::intact, family);
     for (const std::int32_t far : family.far) bonds.push_back(BondId::of(p, far));
   }
-  std::sort(bonds.begin(), bonds.end());
-  drop_repeated(bonds);
+  keep_each_once(bonds);
   return bonds;
 }
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/rank_values.hpp"
 
@@ -176,8 +176,7 @@ void ImageMap::fold(const BlockMatrix& full, BlockMatrix& K) const {
     for (std::size_t r = 0; r < n; ++r) {
       columns.clear();
       each_block(r, [&](std::int32_t column, const double*, const double*, std::int64_t) { columns.push_back(column); });
-      std::ranges::sort(columns);
-      drop_repeated(columns);
+      keep_each_once(columns);
       K.column.insert(K.column.end(), columns.begin(), columns.end());
       K.row_first.push_back(static_cast<std::int64_t>(K.column.size()));
     }

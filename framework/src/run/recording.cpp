@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "core/fingerprint.hpp"
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 #include "files/atomic_file.hpp"
 #include "files/shared_file.hpp"
 #include "output/history_file.hpp"

@@ -8,7 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "output/recorder.hpp"
 #include "output/result_file.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -37,15 +37,11 @@ void refuse_twice(const Scene& scene, const Body& body, const Images& images, co
     auto operator<=>(const Held&) const = default;
   };
   std::vector<Held> held;
-  const auto keep_each_once = [&] {
-    std::ranges::sort(held);
-    drop_repeated(held);
-  };
   for (const ImageTerm& term : images.terms)
     if (term.motion >= 0 && !motions[static_cast<std::size_t>(term.motion)].of_set) held.push_back({term.surface, term.component});
-  keep_each_once();
+  keep_each_once(held);
   if (body.part()) held = told_to_all(gathered<Held>(held));
-  keep_each_once();
+  keep_each_once(held);
   for (std::size_t k = 0; k < prescriptions.size(); ++k)
     for (const std::int32_t p : prescriptions[k].points) {
       if (!std::ranges::binary_search(held, Held{body.number(static_cast<std::size_t>(p)), prescriptions[k].component})) continue;

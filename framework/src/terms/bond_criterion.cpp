@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "perikit/core/parallel.hpp"
 #include "terms/bond_energy_split.hpp"
@@ -141,8 +141,7 @@ void BondCriterion::name_near_failure() {
     for (const std::int32_t far : family.far) named_.push_back(BondId::of(p, far));
   }
   std::erase_if(named_, [&](BondId b) { return !body_.owns(static_cast<std::size_t>(b.point)); });   // their owners look at them
-  std::ranges::sort(named_);
-  drop_repeated(named_);
+  keep_each_once(named_);
 }
 
 /// Those of these groups, by their lower ends.
@@ -359,8 +358,7 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   flux_ = {};
   // Where a bond lies in two pieces it was found in both.
   const auto bond = [](const Found& f) { return f.change.bond; };
-  std::ranges::sort(found_, {}, bond);
-  drop_repeated(found_, bond);
+  keep_each_once(found_, bond);
   for (const Found& f : found_) all.push_back(f.change);
   return all;
 }
@@ -378,8 +376,7 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
   std::vector<std::int32_t> groups;
   for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
-  std::sort(groups.begin(), groups.end());
-  drop_repeated(groups);
+  keep_each_once(groups);
   named_.assign(bonds.begin(), bonds.end());
   std::ranges::sort(named_);
   look_at_named();
@@ -412,8 +409,7 @@ std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
     for (const auto& of_group : found) all.insert(all.end(), of_group.begin(), of_group.end());
   });
   flux_ = {};
-  std::sort(all.begin(), all.end(), [](const BondEnergy& a, const BondEnergy& b) { return a.bond < b.bond; });
-  drop_repeated(all, &BondEnergy::bond);
+  keep_each_once(all, &BondEnergy::bond);
   return all;
 }
 

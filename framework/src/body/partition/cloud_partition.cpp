@@ -2,12 +2,11 @@
 
 #include <algorithm>
 
-#include "core/drop_repeated.hpp"
-
 #include "body/family_limit.hpp"
 #include "body/images/cloud_images.hpp"
 #include "body/partition/block_colours.hpp"
 #include "body/partition/partition.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -145,8 +144,7 @@ Partition::Partition(const BodyFrame& frame, const CloudShares& shares, const Re
       if (reached[p]) image(point) ? sources.push_back(images->source(point.number)) : here.push_back(point.number);
     });
     std::ranges::sort(here);
-    std::ranges::sort(sources);
-    drop_repeated(sources);
+    keep_each_once(sources);
     std::ranges::set_difference(sources, here, std::back_inserter(missing));
     blocks.fetch(images->sources(missing), missing, reached);
     return communicator().largest(missing.empty() ? 0 : 1) > 0;

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -27,12 +27,6 @@ Point lowest(const std::vector<Point>& positions) {
     lower[c] = -communicator().largest(-least);
   }
   return lower;
-}
-
-template <class T>
-void keep_each_once(std::vector<T>& values) {
-  std::ranges::sort(values);
-  drop_repeated(values);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/shape_tensor.hpp"
 #include "perikit/core/parallel.hpp"
@@ -168,8 +168,7 @@ std::vector<std::int32_t> CloudFamilies::set_bonds(std::span<const BondChange> c
       ends.push_back(from);
     }
   }
-  std::sort(ends.begin(), ends.end());
-  drop_repeated(ends);
+  keep_each_once(ends);
   for (const std::int32_t p : ends) {
     const auto at = static_cast<std::size_t>(p);
     body_.dimension() == 1 ? renew<1>(at) : body_.dimension() == 2 ? renew<2>(at) : renew<3>(at);

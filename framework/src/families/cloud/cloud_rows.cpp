@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "body/partition/block_colours.hpp"
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "families/resting_blocks.hpp"
 
 namespace perikit {
@@ -34,9 +34,10 @@ ArrivingPieces::ArrivingPieces(const Body& body) : size_(body.stride()) {
       while (end < blocks.end(b) && same(end)) ++end;
       pieces_.push_back({static_cast<std::int32_t>(begin), static_cast<std::int32_t>(end)});
     }
-  const auto late = std::ranges::stable_partition(
-      pieces_, [&](const Piece& piece) { return arriving.empty() || arriving[static_cast<std::size_t>(piece.begin)] == 0; });
-  here_ = pieces_.size() - late.size();
+  const auto late = std::stable_partition(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
+    return arriving.empty() || arriving[static_cast<std::size_t>(piece.begin)] == 0;
+  });
+  here_ = static_cast<std::size_t>(late - pieces_.begin());
 }
 
 ArrivingRows::ArrivingRows(const ArrivingPieces& pieces, ConstFieldView u, AlignedVector<Row>& rows, Arrival* first, const double* fourth)
@@ -69,8 +70,7 @@ BlockReach cloud_reach(const FamilyLists& families, const CloudBlocks& blocks) {
         if (unit != units.back()) units.push_back(unit);
       }
     }
-    std::sort(units.begin(), units.end());
-    drop_repeated(units);
+    keep_each_once(units);
   }
   return reach;
 }

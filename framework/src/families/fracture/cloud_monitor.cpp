@@ -3,8 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/drop_repeated.hpp"
-
+#include "core/each_once.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/fracture/bond_monitor.hpp"
@@ -65,8 +64,7 @@ void CloudMonitor::make_cells() {
       const auto cell = static_cast<std::int32_t>(static_cast<std::size_t>(lists_.neighbour[static_cast<std::size_t>(k)]) / cell_points);
       if (cell != near.back()) near.push_back(cell);
     }
-    std::sort(near.begin(), near.end());
-    drop_repeated(near);
+    keep_each_once(near);
   }
   first.push_back(groups.size());
   set_cells(std::move(groups), std::move(first));

@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -317,8 +317,7 @@ std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange>
     if (gradual_) break;   // bonds of fragments fade
     for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
-  std::ranges::sort(all);
-  drop_repeated(all);
+  keep_each_once(all);
   return all;
 }
 

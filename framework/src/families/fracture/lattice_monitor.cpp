@@ -4,8 +4,7 @@
 #include <limits>
 #include <tuple>
 
-#include "core/drop_repeated.hpp"
-
+#include "core/each_once.hpp"
 #include "families/fracture/bond_monitor.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/stretch.hpp"
@@ -92,8 +91,7 @@ void LatticeMonitor<D>::make_cells() {
           const auto at = static_cast<std::size_t>(groups[g].first + shift + end) / chunk_points;
           if (at < cell_of.size() && cell_of[at] >= 0 && cell_of[at] != near.back()) near.push_back(cell_of[at]);
         }
-    std::sort(near.begin(), near.end());
-    drop_repeated(near);
+    keep_each_once(near);
   }
   set_cells(std::move(groups), std::move(first));
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -17,8 +17,7 @@ std::vector<NamedChange> SharedBonds::merged(std::span<const BondChange> mine) c
   std::vector<NamedChange> named;
   for (const BondChange& change : mine) named.push_back(this->named(change));
   std::vector<NamedChange> all = gathered<NamedChange>(named);
-  std::ranges::sort(all, {}, &NamedChange::bond);
-  drop_repeated(all, &NamedChange::bond);
+  keep_each_once(all, &NamedChange::bond);
   return all;
 }
 
@@ -37,8 +36,7 @@ std::vector<std::uint8_t> SharedBonds::points_beside(std::span<const std::int32_
   std::vector<std::int64_t> groups;
   for (const std::int32_t p : points) groups.push_back(place(p) / group);
   if (part()) groups = told_to_all(gathered<std::int64_t>(groups));
-  std::ranges::sort(groups);
-  drop_repeated(groups);
+  keep_each_once(groups);
   if (groups.empty()) return {};
   std::vector<std::uint8_t> marks(body_.stride(), 0);
   for (const std::int64_t g : groups)

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "families/shape_tensor.hpp"
 
 namespace perikit {
@@ -239,8 +239,7 @@ std::vector<std::int32_t> LatticeFamilies::set_bonds(std::span<const BondChange>
     set(bond.point, slot, integrity);
     set(bond.far, slots.reverse(slot), integrity);
   }
-  std::sort(ends.begin(), ends.end());
-  drop_repeated(ends);
+  keep_each_once(ends);
   std::vector<std::uint8_t> live_mask;
   for (std::size_t k = 0; k < ends.size();) {
     const std::int32_t first = ends[k] / chunk_points * chunk_points;

@@ -5,7 +5,7 @@
 #include <map>
 #include <numeric>
 
-#include "core/drop_repeated.hpp"
+#include "core/each_once.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "perikit/problem/image_map.hpp"
 
@@ -54,8 +54,7 @@ std::map<std::int64_t, std::int64_t> names_of_parts(const std::vector<Link>& lin
     numbers.push_back(link.mine);
     numbers.push_back(link.other);
   }
-  std::ranges::sort(numbers);
-  drop_repeated(numbers);
+  keep_each_once(numbers);
   const auto index = [&](std::int64_t number) { return static_cast<std::int32_t>(std::ranges::lower_bound(numbers, number) - numbers.begin()); };
   Parts parts(numbers.size());
   for (const Link& link : all) parts.join(index(link.mine), index(link.other));
@@ -84,8 +83,7 @@ std::vector<Piece> joined_over_ranks(const Body& body, Parts& parts, Problem& pr
       if (!body.owns(point) && !body.image(point) && first_of(p) != none) links.push_back({first_of(p), static_cast<std::int64_t>(at_owners.data()[p])});
     }
     const auto both = [](const Link& link) { return std::pair(link.mine, link.other); };
-    std::ranges::sort(links, {}, both);
-    drop_repeated(links, both);
+    keep_each_once(links, both);
     name_of = names_of_parts(links);
   }
   std::map<std::int64_t, std::size_t> place;  // by name

@@ -1,4 +1,4 @@
-#include "core/ranks/messages.hpp"
+#include "core/messages.hpp"
 
 #include <cstdio>
 
